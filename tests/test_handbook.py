@@ -13,6 +13,7 @@ import pytest
 
 import robocov as rc
 from robocov.controllers import CONTROLLERS
+from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
 from robocov_app.commands.handbook import find_page_sources
 
@@ -107,12 +108,12 @@ def test_it_is_built_without_a_warning_and_its_links_lead_somewhere(tmp_path: Pa
             assert target.is_file(), f"{file.name}: {link}"
             if parts.fragment and target in found:
                 assert unquote(parts.fragment) in found[target].places, f"{file.name}: {link}"
-    reference = {
-        name: (site / f"reference/{name}.html").read_text() for name in ("commands", "gains", "names")
-    }
+    reference = {file.stem: file.read_text() for file in (site / "reference").glob("*.html")}
     assert all(f"robocov {name}" in reference["commands"] for name in COMMANDS)
     assert all(f'id="{name}"' in reference["gains"] for name in CONTROLLERS)
     assert all(f'.{name}"' in reference["names"] for name in rc.__all__)
+    assert all(f'id="robocov_app.learning.{name}"' in reference["learning"] for name in learning.__all__)
+    assert "Play or pause" in reference["keys"] and "Undo" in reference["keys"]
 
 
 def test_nothing_in_a_terminal_is_answered_in_five_lines(

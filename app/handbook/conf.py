@@ -17,7 +17,7 @@ html_static_path = ["static"]
 html_css_files = ["handbook.css"]
 html_copy_source = False
 html_show_sphinx = False
-default_role = "code"
+default_role = "py:obj"  # a link where the name is documented
 # A plain list: entries of their own would describe the attributes of a dataclass twice.
 napoleon_custom_sections = [("Attributes", "params_style")]
 autodoc_member_order = "bysource"

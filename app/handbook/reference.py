@@ -1,4 +1,4 @@
-"""The reference, written from the program itself at each build: commands, gains, formats, metrics, names."""
+"""The reference, which each build of the handbook generates from the program."""
 
 from __future__ import annotations
 
@@ -6,8 +6,13 @@ import contextlib
 import inspect
 import io
 import json
+import re
 import sys
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from sphinx.pycode import ModuleAnalyzer
@@ -15,155 +20,328 @@ from sphinx.pycode import ModuleAnalyzer
 import robocov as rc
 from robocov.controllers import get_gains, get_information, list_controller_classes
 from robocov.controllers.base import BaseController
-from robocov.controllers.gains import Option, format_value
-from robocov.mapfile import build_map_schema
+from robocov.controllers.gains import Gain, Option, format_value
+from robocov.mapfile import build_map_schema, load_map
 from robocov.metrics.run_metrics import COLUMNS
+from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
+from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.sweep.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
+from robocov_app.toolkit.commands.command import Command
+from robocov_app.toolkit.window.input import format_key, split_key_name
+from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.files.models import build_session_schema
+from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+OTHER_NAMES = {
+    "Figures": ("robocov_app.figures.files.save_figure", "robocov_app.figures.files.render_png"),
+    "Maps": (
+        "robocov.environment.Start",
+        "robocov.mapfile.check.MapReport",
+        "robocov.environment.Gap",
+        "robocov.errors.Mistake",
+    ),
+    "Controllers": (
+        "robocov.controllers.get_gains",
+        "robocov.controllers.get_information",
+        "robocov.observation.Scanning",
+        "robocov.observation.Scans",
+        "robocov.observation.Cells",
+    ),
+    "Results": ("robocov.metrics.CostHistory", "robocov.conditions.JoinedRobot"),
+    "Learning": (
+        "robocov_app.learning.environment.EpisodeEnv",
+        "robocov_app.learning.environment.draw_episode",
+        "robocov_app.learning.rewards.share_reward",
+    ),
+}
+"""Names outside the top level that the handbook imports, or that public functions return, by heading."""
+
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Write the pages before Sphinx looks for sources."""
-    app.connect("builder-inited", write)
-    app.connect("autodoc-process-signature", gains_as_signature)
+    app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-signature", replace_signature)
     return {"parallel_read_safe": True}
 
 
-def write(app: Sphinx) -> None:
-    """Write every page of the reference into `reference/` beside the sources."""
+def write_pages(app: Sphinx) -> None:
+    """Write every page of the reference into the folder `reference` of the sources."""
     folder = Path(app.srcdir) / "reference"
     folder.mkdir(exist_ok=True)
-    for page in (commands, gains, formats, metrics):
-        (folder / f"{page.__name__}.md").write_text(page(), encoding="utf-8")
-    (folder / "names.rst").write_text(names(), encoding="utf-8")
+    builders = {
+        "commands.md": build_commands_page,
+        "keys.md": build_keys_page,
+        "gains.md": build_gains_page,
+        "formats.md": build_formats_page,
+        "metrics.md": build_metrics_page,
+        "names.rst": build_names_page,
+        "other-names.rst": build_other_names_page,
+        "learning.rst": build_learning_page,
+    }
+    for name, build_page in builders.items():
+        (folder / name).write_text(build_page(), encoding="utf-8")
 
 
-def gains_as_signature(*event: Any) -> tuple[str, None] | None:
-    """Return the gains of a control law in the place of what its ``__new__`` takes."""
-    _, what, _, value = event[:4]
-    if what != "class" or not issubclass(value, BaseController):
+def replace_signature(*event: Any) -> tuple[str, None] | None:
+    """Show the gains of a controller instead of the parameters of its ``__new__``."""
+    _, kind, _, value = event[:4]
+    if kind != "class" or not issubclass(value, BaseController):
         return None
     return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
 
 
-def commands() -> str:
-    """Return the help of every command."""
+# Commands and keys
+
+
+def build_commands_page() -> str:
+    """Build the page with the help of every command."""
     text = "# Commands\n\nWhat `robocov COMMAND -h` prints.\n"
     for name, command in COMMANDS.items():
-        told = io.StringIO()
-        with contextlib.redirect_stdout(told), contextlib.suppress(SystemExit):
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.suppress(SystemExit):
             main([name, "-h"])
-        text += f"\n## robocov {name}\n\n{command.summary[0].upper()}{command.summary[1:]}.\n\n"
-        text += f"```text\n{told.getvalue().strip()}\n```\n"
+        text += f"\n## robocov {name}\n\n{capitalize(command.summary)}.\n\n"
+        text += f"```text\n{output.getvalue().strip()}\n```\n"
     return text
 
 
-def gains() -> str:
-    """Return a table of gains for every controller."""
-    text = "# Controllers and their gains\n\n`--set GAIN=VALUE` sets a gain in every command, "
-    text += (
-        "`rc.Rapf(k_rep=1.0)` in Python. [Control laws](../controllers.md) says where each law comes from.\n"
-    )
-    for name, kind in list_controller_classes().items():
-        summary = f"{kind.summary[0].upper()}{kind.summary[1:].rstrip('.')}."
-        text += f"\n## {name}\n\n{summary} Information that it uses: {get_information(kind)}.\n"
-        rows = get_gains(kind).values()
-        text += "\n| gain | meaning | default | unit | range |\n|---|---|---|---|---|\n" if rows else ""
-        for gain in rows:
-            if isinstance(gain, Option):
-                span = ", ".join(gain.choices)
-            else:
-                span = f"{gain.low:g} to {gain.high:g}{', or null' * gain.optional}"
-            default = format_value(gain.default, none="null")
-            text += f"| `{gain.name}` | {_cell(gain.meaning)} | {default} | {gain.unit} | {span} |\n"
-    return text
-
-
-def formats() -> str:
-    """Return the fields of map and session files by their schemas, and the keys of study files."""
+def build_keys_page() -> str:
+    """Build the page with the keys of both windows, from their tables of commands."""
     text = (
-        "# File formats\n\nMaps and sessions are JSON, studies TOML; [the folder of a run](../results.md) is "
+        "# Keys\n\nThe keys of [the window](../window.md) and of [the editor](../draw-a-map.md). F1 shows "
+        "them there. Ctrl+K finds every command by its title or name. Type those that need a value, such as "
+        "`robots 12`.\n"
     )
-    text += "described by itself. `robocov schema map` and `robocov schema session` print the schemas.\n"
-    for title, schema in (("Maps", build_map_schema()), ("Sessions", build_session_schema())):
-        text += f"\n## {title}\n"
-        parts = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
-        for name, part in parts.items():
-            if not part.get("properties"):
-                continue
-            text += f"\n### {name}\n\n{_prose(part.get('description', ''))}\n\n"
-            text += "| field | meaning | type | default |\n|---|---|---|---|\n"
-            needed = part.get("required", [])
-            for field, of in part["properties"].items():
-                default = "required" if field in needed else f"`{_cell(json.dumps(of.get('default')))}`"
-                said = _cell(of.get("description", ""))
-                text += f"| `{field}` | {said} | {_cell(_type(of))} | {default} |\n"
-    text += "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys.\n\n| key | value |\n|---|---|\n"
-    return text + "".join(f"| `{key}` | {_cell(value)} |\n" for key, value in list_study_keys().items())
+    with TemporaryDirectory() as folder:
+        session = Session(SessionScenario(load_map("square")))
+        viewer_launcher = ViewerLauncher(session, "square", Path(folder), headless=True)
+        with viewer_launcher.window() as viewer:
+            text += "\n## The window\n" + build_key_tables(viewer.groups, viewer.commands.commands)
+        editor_launcher = EditorLauncher(None, Path(folder), headless=True)
+        with editor_launcher.window() as editor:
+            text += "\n## The editor\n" + build_key_tables(editor.groups, editor.commands.commands)
+    return text
 
 
-def _type(of: dict[str, Any]) -> str:
-    if "$ref" in of:
-        return str(of["$ref"].rpartition("/")[2])
-    for several in ("anyOf", "oneOf"):
-        if several in of:
-            return " or ".join(_type(each) for each in of[several])
-    if "const" in of or "enum" in of:
-        return " or ".join(f"`{json.dumps(each)}`" for each in of.get("enum", [of.get("const")]))
-    if of.get("type") == "array" and isinstance(of.get("items"), dict):
-        return f"list of {_type(of['items'])}"
-    return str(of.get("type", "anything"))
+def build_key_tables(groups: Sequence[str], commands: Sequence[Command]) -> str:
+    """Build a table of keys for each group of commands."""
+    text = ""
+    for group in groups:
+        listed = [command for command in commands if command.group == group and not command.hidden]
+        rows = [(format_keys(command), escape_cell(command.title)) for command in listed]
+        text += f"\n### {group}\n\n" + build_table(("key", "command"), rows)
+    return text
 
 
-def metrics() -> str:
-    """Return the columns of ``metrics.csv`` and of the table of a sweep."""
-    told = ModuleAnalyzer.for_module("robocov.metrics.run_metrics").find_attr_docs()
+def format_keys(command: Command) -> str:
+    """Format the keys of a command, or the way to start one that has none."""
+    if command.argument is not None:
+        return f"Ctrl+K `{command.name}` *{command.argument.description}*"
+    if not command.keys:
+        return "Ctrl+K"
+    keys = ["+".join(format_key(key) for key in split_key_name(name)) for name in command.keys]
+    # Both keys named Enter are listed once.
+    return escape_cell(" or ".join(dict.fromkeys(keys))).replace("`", "\\`")
+
+
+# Controllers, files and metrics
+
+
+def build_gains_page() -> str:
+    """Build the page with a table of gains for every controller."""
+    text = (
+        "# Controllers and their gains\n\n`--set GAIN=VALUE` sets a gain in every command, "
+        "`rc.Rapf(k_rep=1.0)` in Python. [Controllers](../controllers.md) explains where each of them "
+        "comes from.\n"
+    )
+    for name, controller in list_controller_classes().items():
+        summary = capitalize(controller.summary.rstrip("."))
+        text += f"\n## {name}\n\n{summary}. Information that it uses: {get_information(controller)}.\n"
+        rows = [
+            (
+                f"`{gain.name}`",
+                escape_cell(gain.meaning),
+                format_value(gain.default, none="null"),
+                gain.unit,
+                format_range(gain),
+            )
+            for gain in get_gains(controller).values()
+        ]
+        if rows:
+            text += "\n" + build_table(("gain", "meaning", "default", "unit", "range"), rows)
+    return text
+
+
+def format_range(gain: Gain | Option) -> str:
+    """Format the values that a gain may have."""
+    if isinstance(gain, Option):
+        return ", ".join(gain.choices)
+    text = f"{gain.low:g} to {gain.high:g}"
+    return f"{text}, or null" if gain.optional else text
+
+
+def build_formats_page() -> str:
+    """Build the page with the fields of map and session files, and the keys of study files."""
+    text = (
+        "# File formats\n\nMaps and sessions are JSON files, studies are TOML files; "
+        "[the folder of a run](../results.md) has a page of its own. `robocov schema map` and "
+        "`robocov schema session` print the schemas.\n"
+    )
+    text += build_schema_tables("Maps", build_map_schema())
+    text += build_schema_tables("Sessions", build_session_schema())
+    rows = [(f"`{key}`", escape_cell(value)) for key, value in list_study_keys().items()]
+    text += "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys.\n\n"
+    return text + build_table(("key", "value"), rows)
+
+
+def build_schema_tables(title: str, schema: Mapping[str, Any]) -> str:
+    """Build a table of fields for each type of a JSON schema."""
+    text = f"\n## {title}\n"
+    types = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
+    for name, definition in types.items():
+        if not definition.get("properties"):
+            continue
+        required = definition.get("required", [])
+        rows = []
+        for field, field_schema in definition["properties"].items():
+            default = "required"
+            if field not in required:
+                default = f"`{escape_cell(json.dumps(field_schema.get('default')))}`"
+            meaning = escape_cell(field_schema.get("description", ""))
+            rows.append((f"`{field}`", meaning, escape_cell(format_type(field_schema)), default))
+        text += f"\n### {name}\n\n{escape_text(definition.get('description', ''))}\n\n"
+        text += build_table(("field", "meaning", "type", "default"), rows)
+    return text
+
+
+def format_type(schema: Mapping[str, Any]) -> str:
+    """Format the type of a value in a JSON schema."""
+    if "$ref" in schema:
+        return str(schema["$ref"].rpartition("/")[2])
+    for key in ("anyOf", "oneOf"):
+        if key in schema:
+            return " or ".join(format_type(alternative) for alternative in schema[key])
+    if "const" in schema:
+        return f"`{json.dumps(schema['const'])}`"
+    if "enum" in schema:
+        return " or ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
+    if schema.get("type") == "array" and isinstance(schema.get("items"), dict):
+        return f"list of {format_type(schema['items'])}"
+    return str(schema.get("type", "anything"))
+
+
+def build_metrics_page() -> str:
+    """Build the page with the columns of ``metrics.csv`` and of the table of a sweep."""
     text = "# Metrics\n\n## Along a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
-    text += "Python the attributes of [RunMetrics](names.rst).\n\n| column | meaning | attribute |\n"
-    text += "|---|---|---|\n"
-    for name, column in COLUMNS.items():
-        text += f"| `{column}` | {_cell(' '.join(told['RunMetrics', name]))} | `{name}` |\n"
-    text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after what was run; most stand "
-    text += "in `summary` of each `run.json`, too.\n\n| column | unit | meaning |\n|---|---|---|\n"
-    for column in RESULT_COLUMNS:
-        text += f"| `{column.name}` | {column.unit} | {_cell(column.meaning)} |\n"
-    return text
+    text += "Python the attributes of [RunMetrics](names.rst).\n\n"
+    meanings = read_attribute_docs(rc.RunMetrics)
+    rows = [(f"`{column}`", escape_cell(meanings[name]), f"`{name}`") for name, column in COLUMNS.items()]
+    text += build_table(("column", "meaning", "attribute"), rows)
+    text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after those of the parameters. "
+    text += "Most are also in `summary` of each `run.json`.\n\n"
+    rows = [(f"`{column.name}`", column.unit, escape_cell(column.meaning)) for column in RESULT_COLUMNS]
+    return text + build_table(("column", "unit", "meaning"), rows)
 
 
-def names() -> str:
-    """Return directives that document every public name of the package."""
-    text = "Python: every public name\n=========================\n\nAll are names of ``robocov``: "
-    text += "``import robocov as rc``.\n"
+def read_attribute_docs(kind: type) -> dict[str, str]:
+    """Return the descriptions in the section Attributes of the docstring of a class."""
+    _, _, section = inspect.getdoc(kind).partition("Attributes\n----------\n")  # type: ignore[union-attr]
+    pattern = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*\n)*)", re.M)
+    return {name: " ".join(description.split()) for name, description in pattern.findall(section)}
+
+
+# Python names
+
+
+def build_names_page() -> str:
+    """Build the page that documents every public name of the library."""
+    text = build_heading("Python: every public name", "=")
+    text += "\nAll are names of ``robocov``: ``import robocov as rc``.\n\n.. py:currentmodule:: robocov\n"
     for name in sorted(rc.__all__, key=str.lower):
+        text += "\n" + build_heading(name, "-") + "\n"
         value = getattr(rc, name)
-        text += f"\n{name}\n{'-' * len(name)}\n\n"
-        if isinstance(value, type):
-            members = "\n   :members:" if not issubclass(value, Exception) else ""
-            text += f".. autoclass:: robocov.{name}{members}\n"
-        elif callable(value):
-            text += f".. autofunction:: robocov.{name}\n"
+        if callable(value):
+            text += build_directive(f"robocov.{name}", value)
         else:
-            text += f".. autodata:: {_find_documenting_module(name)}.{name}\n   :no-value:\n"
+            text += f".. autodata:: {find_documenting_module(name)}.{name}\n   :no-value:\n"
     return text
 
 
-def _find_documenting_module(name: str) -> str:
-    """Return the module of the library in which a comment beside a constant documents it."""
+def build_other_names_page() -> str:
+    """Build the page that documents further names, which are not at the top level."""
+    text = build_heading("Python: further names", "=")
+    text += "\nWhat public functions return and expect, and what the pages of the handbook import.\n"
+    for heading, names in OTHER_NAMES.items():
+        text += "\n" + build_heading(heading, "-")
+        for name in names:
+            module, _, attribute = name.rpartition(".")
+            text += "\n" + build_directive(name, getattr(import_module(module), attribute))
+    return text
+
+
+def build_learning_page() -> str:
+    """Build the page that documents the learning environments."""
+    text = build_heading("Python: robocov_app.learning", "=")
+    text += '\nThe simulation for gymnasium and PettingZoo: ``pip install "robocov[rl]"``.\n\n'
+    text += ".. py:currentmodule:: robocov_app.learning\n"
+    has_packages = all(find_spec(name) for name in ("gymnasium", "pettingzoo"))
+    for name in learning.__all__:
+        text += "\n" + build_heading(name, "-") + "\n"
+        if has_packages or not name.endswith("Env"):
+            text += build_directive(f"robocov_app.learning.{name}", getattr(learning, name))
+        else:
+            text += "Not documented here: this handbook was built without gymnasium and PettingZoo.\n"
+    return text
+
+
+def build_directive(name: str, value: object) -> str:
+    """Build the directive that documents a class or a function."""
+    if not isinstance(value, type):
+        return f".. autofunction:: {name}\n"
+    if issubclass(value, Exception):
+        return f".. autoclass:: {name}\n"
+    return f".. autoclass:: {name}\n   :members:\n"
+
+
+def build_heading(title: str, underline: str) -> str:
+    """Build a heading in reStructuredText."""
+    return f"{title}\n{underline * len(title)}\n"
+
+
+def find_documenting_module(name: str) -> str:
+    """Return the module of the library in which a string below a constant documents it."""
     for module in sorted(sys.modules):
         is_candidate = module.startswith("robocov.") and hasattr(sys.modules[module], name)
         if is_candidate and ("", name) in ModuleAnalyzer.for_module(module).find_attr_docs():
             return module
-    raise LookupError(f"{name}: expected a comment beside it, got none")
+    raise LookupError(f"{name}: expected a string below the constant that documents it, got none")
 
 
-def _cell(text: str) -> str:
-    return _prose(text).replace("|", "\\|")
+# Markdown
 
 
-def _prose(text: str) -> str:
+def build_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Build a table in Markdown."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def escape_cell(text: str) -> str:
+    """Return a text on one line, for a cell of a table."""
+    return escape_text(text).replace("|", "\\|")
+
+
+def escape_text(text: str) -> str:
+    """Return a text on one line, in which no HTML starts."""
     return " ".join(text.split()).replace("<", "&lt;")
+
+
+def capitalize(text: str) -> str:
+    """Return a text with an upper-case first letter."""
+    return text[:1].upper() + text[1:]

@@ -135,6 +135,11 @@ class Team:
     read_team : Read a team from a file.
     Conditions : Noise, message loss, and robots that fail or join.
 
+    Notes
+    -----
+    Robots move by equation (28), m q'' = F - ν q', within `max_speed` and `max_acceleration`. The paper
+    prints the viscous term with the other sign, which would add energy.
+
     Examples
     --------
     >>> team = Team.homogeneous(3, max_speed=0.5)

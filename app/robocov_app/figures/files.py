@@ -44,6 +44,21 @@ def plain_style() -> Iterator[None]:
 
     A dollar sign does not start a formula, and glyphs that the font does not have cause no warning. It is
     also a decorator: ``@plain_style()``.
+
+    Yields
+    ------
+    None
+
+    See Also
+    --------
+    save_figure : Save a figure in this style.
+
+    Examples
+    --------
+    >>> import matplotlib
+    >>> with plain_style():
+    ...     matplotlib.rcParams["font.family"]
+    ['DejaVu Sans']
     """
     import matplotlib.style
 
@@ -53,7 +68,26 @@ def plain_style() -> Iterator[None]:
 
 
 def render_png(figure: Figure) -> bytes:
-    """Render a figure as PNG."""
+    """Render a figure as PNG.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+
+    Returns
+    -------
+    bytes
+
+    See Also
+    --------
+    save_figure : Write a figure to a file.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> render_png(Figure())[1:4]
+    b'PNG'
+    """
     file = io.BytesIO()
     _write_figure(figure, file, "png")
     return file.getvalue()
@@ -74,6 +108,18 @@ def save_figure(figure: Figure, path: Path | str) -> None:
         If the file cannot be written.
     ParameterError
         If the suffix is a different one.
+
+    See Also
+    --------
+    render_png : Render a figure as PNG, in memory.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import robocov as rc
+    >>> record = rc.run("square", robots=2, duration=0.5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_figure(record.plot().figure, f"{folder}/run.svg")
     """
     kind = get_figure_kind(Path(path))
     with replace_file(Path(path)) as temporary_path:
@@ -101,12 +147,24 @@ def _write_figure(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
 def check_figure_path(path: Path) -> None:
     """Check, before any work is done, that a figure can be saved.
 
+    Parameters
+    ----------
+    path : Path
+
     Raises
     ------
     OutputError
         If the folder does not exist.
     ParameterError
         If the suffix is not that of a figure.
+
+    See Also
+    --------
+    save_figure : Save a figure.
+
+    Examples
+    --------
+    >>> check_figure_path(Path("run.svg"))
     """
     get_figure_kind(path)
     if not resolve_target(path).parent.is_dir():
@@ -116,10 +174,22 @@ def check_figure_path(path: Path) -> None:
 def get_figure_kind(path: Path) -> str:
     """Return the format for the suffix of a path.
 
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    {"png", "svg", "pdf"}
+
     Raises
     ------
     ParameterError
         If it is not the suffix of a figure.
+
+    See Also
+    --------
+    check_figure_path : Check the folder as well.
 
     Examples
     --------

@@ -58,6 +58,25 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         If a value is out of range.
     InputError
         If a map cannot be read.
+
+    See Also
+    --------
+    CoverageVectorEnv : Many of these environments, advanced together.
+    CoverageParallelEnv : One learner for each robot.
+    CoverageTask : Everything that defines the environment.
+
+    Examples
+    --------
+    >>> from robocov_app.learning import CoverageEnv
+    >>> env = CoverageEnv(maps="square", robots=3, duration=1.0)
+    >>> observation, info = env.reset(seed=0)
+    >>> observation.shape, env.action_space.shape
+    ((3, 19), (3, 2))
+    >>> is_truncated = False
+    >>> while not is_truncated:
+    ...     action = env.action_space.sample()
+    ...     observation, reward, is_terminated, is_truncated, info = env.step(action)
+    >>> env.close()
     """
 
     shared_run: "SharedRun | None" = None
@@ -161,6 +180,22 @@ class CoverageVectorEnv(SyncVectorEnv):
         If a value is out of range.
     InputError
         If a map cannot be read.
+
+    See Also
+    --------
+    CoverageEnv : One of these environments.
+
+    Examples
+    --------
+    >>> from robocov_app.learning import CoverageVectorEnv
+    >>> envs = CoverageVectorEnv(2, maps="square", robots=3)
+    >>> observations, infos = envs.reset(seed=0)
+    >>> observations.shape
+    (2, 3, 19)
+    >>> observations, rewards, terminations, truncations, infos = envs.step(envs.action_space.sample())
+    >>> rewards.shape
+    (2,)
+    >>> envs.close()
     """
 
     def __init__(
@@ -191,7 +226,24 @@ class CoverageVectorEnv(SyncVectorEnv):
         return simulation
 
     def step(self, actions: Any) -> Any:
-        """Execute the actions of all teams, and return the results as gymnasium does."""
+        """Execute the actions of all teams, and return the results as gymnasium does.
+
+        Parameters
+        ----------
+        actions : (num_envs, n, 2) array_like, N or m/s
+
+        Returns
+        -------
+        observations : (num_envs, n, size) array
+        rewards : (num_envs,) array
+        terminations, truncations : (num_envs,) bool arrays
+        infos : dict
+
+        Raises
+        ------
+        ParameterError
+            If the actions of an environment have another shape, or are not finite.
+        """
         is_restarted = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         checked = np.zeros((self.num_envs, self.task.robots, 2))
         shared_episodes = {}

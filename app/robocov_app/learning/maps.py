@@ -38,6 +38,11 @@ class GeneratedMaps:
     ParameterError
         If `seeds` is empty.
 
+    See Also
+    --------
+    robocov.generate_map : Generate one map.
+    CoverageTask : Its `maps` may be such a function.
+
     Examples
     --------
     >>> GeneratedMaps("rooms", seeds=range(100))(742).name

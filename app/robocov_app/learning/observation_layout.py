@@ -61,6 +61,11 @@ class ObservationLayout:
     ParameterError
         If a number is out of range.
 
+    See Also
+    --------
+    CoverageTask : Contains the layout of the observations.
+    PolicyController : Builds the same observations when a policy is a controller.
+
     Examples
     --------
     >>> layout = ObservationLayout(neighbors=2)

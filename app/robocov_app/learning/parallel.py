@@ -48,6 +48,25 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         If a value is out of range.
     InputError
         If a map cannot be read.
+
+    See Also
+    --------
+    CoverageEnv : One learner for all robots.
+    ObservationLayout : The numbers of an observation.
+    CoverageTask : Everything that defines the environment.
+
+    Examples
+    --------
+    >>> from robocov_app.learning import CoverageParallelEnv
+    >>> env = CoverageParallelEnv(maps="square", robots=3, duration=1.0)
+    >>> observations, infos = env.reset(seed=0)
+    >>> sorted(observations), observations["robot_1"].shape
+    (['robot_1', 'robot_2', 'robot_3'], (19,))
+    >>> while env.agents:
+    ...     actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    ...     observations, rewards, terminations, truncations, infos = env.step(actions)
+    >>> sorted(rewards)
+    ['robot_1', 'robot_2', 'robot_3']
     """
 
     metadata = EpisodeEnv.metadata | {"name": "robocov_coverage_v0", "is_parallelizable": True}
@@ -72,11 +91,30 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self.state_space = Box(-1.0, 1.0, (4 * self.task.robots,), np.float32)
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a robot's observations, the same object every time."""
+        """Return the space of a robot's observations, the same object every time.
+
+        Parameters
+        ----------
+        agent : str
+
+        Returns
+        -------
+        Box
+        """
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Box:
-        """Return the space of a robot's actions, the same object every time."""
+        """Return the space of a robot's actions, the same object every time.
+
+        Parameters
+        ----------
+        agent : str
+
+        Returns
+        -------
+        Box
+            In N or m/s, up to the largest useful action.
+        """
         return self.action_spaces[agent]
 
     def reset(

@@ -49,17 +49,8 @@ class PolicyController:
     """A controller that executes a policy, with the decisions and observations of the training.
 
     The policy is called for each robot alone, with its own row of the observations, so that it cannot use
-    the knowledge of other robots. The command line needs a class that contains the policy::
-
-        # mine.py
-        @dataclass(frozen=True)
-        class MyPolicy(PolicyController):
-            layout: ObservationLayout = ObservationLayout(neighbors=4)
-
-            def act(self, observation):
-                return observation @ WEIGHTS
-
-    and ``robocov run rooms --controller mine.py:MyPolicy``.
+    the knowledge of other robots. To use a policy on the command line, write a subclass with a method `act`
+    in a file, and run ``robocov run rooms --controller mine.py:MyPolicy``.
 
     Parameters
     ----------
@@ -77,11 +68,28 @@ class PolicyController:
     ParameterError
         If an attribute is invalid, or the policy does not return two numbers.
 
+    See Also
+    --------
+    ControllerPolicy : The reverse: a controller acts in a learning environment.
+    CoverageTask : The task of the training, with the same layout, action and period.
+
     Examples
     --------
     >>> still = PolicyController(lambda observation: (0.0, 0.0))
     >>> still.name, still.period
     ('policy', 0.1)
+
+    A policy in a class, which returns to the middle of the map:
+
+    >>> import robocov as rc
+    >>> @dataclass(frozen=True)
+    ... class Returning(PolicyController):
+    ...     layout: ObservationLayout = ObservationLayout(neighbors=2)
+    ...
+    ...     def act(self, observation):
+    ...         return -3.0 * observation[:2]
+    >>> rc.run("square", Returning(), robots=2, duration=0.5)
+    <Record Returning on Square, 2 robots, 0.5 s>
     """
 
     name: ClassVar[str] = "policy"
@@ -109,17 +117,52 @@ class PolicyController:
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
     def act(self, observation: NDArray[np.float32]) -> Any:
-        """Return the action of one robot, (2,), for its observation, (size,)."""
+        """Return the action of one robot, (2,), for its observation, (size,).
+
+        Parameters
+        ----------
+        observation : (size,) float32 array
+            The robot's own row of the observations; see `ObservationLayout`.
+
+        Returns
+        -------
+        (2,) array_like, N or m/s
+
+        Raises
+        ------
+        ParameterError
+            If there is no policy, and no subclass has this method.
+        """
         if self.policy is None:
             raise ParameterError(f"{self.name}: expected a policy or a method act(observation)")
         return self.policy(observation)
 
     def begin(self, region: Region, team: Team) -> PolicyMemory:
-        """Return the memory before the first decision."""
+        """Return the memory before the first decision.
+
+        Parameters
+        ----------
+        region : Region
+        team : Team
+
+        Returns
+        -------
+        PolicyMemory
+        """
         return PolicyMemory(team)
 
     def decide(self, seen: Observations, memory: PolicyMemory) -> Decision:
-        """Return the forces of the actions, which are decided again in each period."""
+        """Return the forces of the actions, which are decided again in each period.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : PolicyMemory
+
+        Returns
+        -------
+        Decision
+        """
         actions = memory.actions
         if actions is None or self._is_due(seen, memory):
             actions = self._compute_actions(seen, memory.team)
@@ -152,14 +195,21 @@ class ControllerPolicy:
     ----------
     controller : Controller
 
+    See Also
+    --------
+    PolicyController : The reverse: a policy as a controller.
+
     Examples
     --------
-    ::
-
-        expert = ControllerPolicy(rc.Rapf())
-        observations, infos = env.reset(seed=0)
-        while env.agents:
-            observations, rewards, *_ = env.step(expert(env))
+    >>> import robocov as rc
+    >>> from robocov_app.learning import ControllerPolicy, CoverageParallelEnv
+    >>> expert = ControllerPolicy(rc.Rapf())
+    >>> env = CoverageParallelEnv(maps="square", robots=3, duration=1.0)
+    >>> observations, infos = env.reset(seed=0)
+    >>> while env.agents:
+    ...     observations, rewards, *_ = env.step(expert(env))
+    >>> len(rewards)
+    3
     """
 
     def __init__(self, controller: Controller) -> None:

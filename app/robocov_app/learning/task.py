@@ -85,6 +85,11 @@ class CoverageTask:
     ParameterError
         If a value is out of range.
 
+    See Also
+    --------
+    CoverageEnv : The environment of one learner.
+    CoverageParallelEnv : The environment with one learner for each robot.
+
     Examples
     --------
     >>> task = CoverageTask(robots=4, duration=30.0)

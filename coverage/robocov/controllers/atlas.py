@@ -248,7 +248,18 @@ class Atlas(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
-        """Return the memory of robots that know neither walls nor other robots."""
+        """Return the memory of robots that know neither walls nor other robots.
+
+        Parameters
+        ----------
+        region : Region
+            The known outer boundary.
+        team : Team
+
+        Returns
+        -------
+        AtlasMemory
+        """
         unknown_map = build_unknown_map(region)
         no_knowledge = TeamKnowledge(Teammates.build_empty())
         states = []
@@ -261,7 +272,18 @@ class Atlas(BaseController):
         return AtlasMemory(team, tuple(states), routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
-        """Plan the routes that are due, and compute the forces that lead all robots along their routes."""
+        """Plan the routes that are due, and compute the forces that lead all robots along their routes.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : AtlasMemory
+            From `begin` or the previous decision.
+
+        Returns
+        -------
+        Decision
+        """
         estimates = memory.estimates
         # Plans use the most likely positions of neighbors; collision avoidance assumes that they are closer.
         conservative = seen

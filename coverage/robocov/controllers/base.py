@@ -82,6 +82,11 @@ class Controller(Protocol):
             The known outer boundary.
         team : Team
             The robots, which know their own bodies and limits.
+
+        Returns
+        -------
+        object
+            The memory, which the first call of `decide` receives.
         """
 
     def decide(self, seen: Observations, memory: Any) -> Decision:
@@ -92,6 +97,11 @@ class Controller(Protocol):
         seen : Observations
         memory : object
             What `begin` returned, or `Decision.memory` of the previous decision.
+
+        Returns
+        -------
+        Decision
+            One row for each robot; its `memory` is passed to the next call.
         """
 
 
@@ -199,5 +209,17 @@ class BaseController:
         validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> Any:
-        """Return the initial memory of the robots, each of which knows only its own body and limits."""
+        """Return the initial memory of the robots, each of which knows only its own body and limits.
+
+        Parameters
+        ----------
+        region : Region
+            The known outer boundary.
+        team : Team
+
+        Returns
+        -------
+        Memory
+            Or another class, `memory_type`.
+        """
         return self.memory_type(team)

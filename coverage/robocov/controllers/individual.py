@@ -22,6 +22,25 @@ from robocov.voronoi.delaunay import Mesh
 class OwnView:
     """Everything that one robot knows.
 
+    Attributes
+    ----------
+    number : int
+        Its own number, from 0.
+    position : (2,) array, m
+    velocity : (2,) array, m/s
+    neighbors : (k, 2) array, m
+        Positions of the robots within communication range, by their last messages.
+    obstacle_point : (2,) array or None, m
+        The closest obstacle or boundary point within sensing range; None if there is none.
+    region : Region
+        The known convex outer boundary.
+    time : float, s
+        Simulation time.
+    heading : float or None, rad
+        Heading of a unicycle, from +x; None in a team of points.
+    memory : object
+        Memory of the robot: the result of ``begin``, or the value that the controller assigned last.
+
     See Also
     --------
     IndividualController : A controller that gets this view of a robot.
@@ -38,24 +57,15 @@ class OwnView:
     """
 
     number: int
-    """Its own number, from 0."""
     position: Array
-    """(2,) m"""
     velocity: Array
-    """(2,) m/s"""
     neighbors: Array
-    """(k, 2) m, positions of the robots within communication range, by their last messages."""
     obstacle_point: Array | None
-    """(2,) m, the closest obstacle or boundary point within sensing range; None if there is none."""
     region: Region
-    """The known convex outer boundary."""
     time: float
-    """s"""
     _cells: VoronoiPartition
     heading: float | None = None
-    """Heading of a unicycle, rad from +x; None in a team of points."""
     memory: Any = None
-    """Memory of the robot: the result of ``begin``, or the value that the controller assigned last."""
 
     @property
     def centroid(self) -> Array:
@@ -100,7 +110,17 @@ class IndividualController(Protocol):
     """
 
     def force(self, own: OwnView) -> Sequence[float] | Array:
-        """Return the force on the robot, two numbers in newtons."""
+        """Return the force on the robot, two numbers in newtons.
+
+        Parameters
+        ----------
+        own : OwnView
+            What the robot knows.
+
+        Returns
+        -------
+        (2,) sequence or array, N
+        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +174,18 @@ class IndividualControllerAdapter:
         self.information: Information = getattr(controller, "information", "own")
 
     def begin(self, region: Region, team: Team) -> IndividualMemories:
-        """Return the memories of the robots before their first decision."""
+        """Return the memories of the robots before their first decision.
+
+        Parameters
+        ----------
+        region : Region
+            The known outer boundary.
+        team : Team
+
+        Returns
+        -------
+        IndividualMemories
+        """
         begin = getattr(self.controller, "begin", None)
         if begin is None:
             return IndividualMemories([None] * len(team))
@@ -168,6 +199,10 @@ class IndividualControllerAdapter:
         seen : Observations
         memory : IndividualMemories or None
             None if the robots remember nothing.
+
+        Returns
+        -------
+        Decision
 
         Raises
         ------

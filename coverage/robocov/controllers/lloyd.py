@@ -43,6 +43,11 @@ class Lloyd(BaseController):
     Rapf : The same goals, and repulsion from robots and obstacles.
     partition : The cells.
 
+    Notes
+    -----
+    The centroid C of the cell is the optimum for f = r²: the derivative (12) of the locational cost is
+    2 M (p - C), where M is the mass of the cell and p the position of its robot.
+
     Examples
     --------
     >>> from robocov.environment import Environment
@@ -64,7 +69,18 @@ class Lloyd(BaseController):
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        """Compute the forces that drive each robot to the target in its cell."""
+        """Compute the forces that drive each robot to the target in its cell.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : Memory
+            From `begin` or the previous decision.
+
+        Returns
+        -------
+        Decision
+        """
         team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         goals = find_targets(cells, seen.density, self.target, self.height)

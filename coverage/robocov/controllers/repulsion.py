@@ -88,6 +88,15 @@ class Rpf(BaseController):
     --------
     Rapf : The same repulsion, and attraction to the centroid of the cell.
 
+    Notes
+    -----
+    The force on a robot at q from a robot or an obstacle point at q_i, at a distance ρ below ρ0, is (24)::
+
+        F_rep = k_rep (1/ρ - 1/ρ0) (q - q_i) / ρ³
+
+    Below `robocov.potential.CONTACT_DISTANCE`, its magnitude is constant. The forces are summed over the
+    neighbors and the closest obstacle point (25).
+
     Examples
     --------
     >>> import robocov as rc
@@ -103,7 +112,18 @@ class Rpf(BaseController):
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        """Compute the forces (24) of all neighbors and of the closest obstacle point."""
+        """Compute the forces (24) of all neighbors and of the closest obstacle point.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : object
+            From `begin` or the previous decision.
+
+        Returns
+        -------
+        Decision
+        """
         gains = PotentialGains(
             k_rep=float(self.k_rep), rho_0=float(self.rho_0), k_att=0.0, max_attraction=np.inf
         )
@@ -153,6 +173,14 @@ class Rapf(BaseController):
     Rpf : The repulsion alone.
     Lloyd : The goals alone.
 
+    Notes
+    -----
+    The force is the repulsion (25) of `Rpf` plus the attraction (27) to the goal::
+
+        F_att = k_att (q_goal - q) |q_goal - q|²
+
+    The robots move by (28), m q'' = F - ν q', where ν is the `viscosity` of the team.
+
     Examples
     --------
     >>> from robocov.environment import Environment
@@ -178,10 +206,28 @@ class Rapf(BaseController):
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def begin(self, region: Region, team: Team) -> None:
-        """Return None, because the memory is the triangulation of the last cells, and there is none yet."""
+        """Return None, because the memory is the triangulation of the last cells, and there is none yet.
+
+        Parameters
+        ----------
+        region : Region
+            The known outer boundary.
+        team : Team
+        """
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
-        """Compute the forces (24) of neighbors and of the closest obstacle point, and (27) of the target."""
+        """Compute the forces (24) of neighbors and of the closest obstacle point, and (27) of the target.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : Mesh or None
+            From `begin` or the previous decision.
+
+        Returns
+        -------
+        Decision
+        """
         cells = compute_known_cells(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
         gains = PotentialGains(

@@ -76,6 +76,14 @@ class CoverageCost:
     find_optimum : Find positions of low cost.
     compute_cost_history : The cost along a run.
 
+    Notes
+    -----
+    The coverage cost of positions P in the free space Ω is (22), with the density φ of (4)::
+
+        J(P) = ∫_Ω min_i d(q, p_i) φ(q) dq
+
+    where d is the length of the shortest path around obstacles. Controllers do not use it: it rates them.
+
     Examples
     --------
     >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))

@@ -28,6 +28,11 @@ class Density(ABC):
     Raster : An image.
     Environment.with_density : Give a map a density.
 
+    Notes
+    -----
+    φ weights points in the locational cost (4), in the masses and centroids (2) of cells, and in the coverage
+    cost (22). The paper names it as future work.
+
     Examples
     --------
     >>> import numpy as np

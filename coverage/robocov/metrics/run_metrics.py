@@ -39,7 +39,35 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only working robots count. All arrays have shape (K,).
+    """Metrics along a run, at K of its moments. Only working robots count.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+        Simulation time.
+    sensed_area : (K,) array, m²
+        Free area within the sensing range of a robot and in its line of sight.
+    range_area : (K,) array, m²
+        Free area within the sensing range of a robot, regardless of walls (blanket coverage by discs).
+    visible_area : (K,) array, m²
+        Free area in line of sight of a robot at any distance (as in the art gallery problem).
+    work : (K,) array, J
+        Integral of ``|F v|`` so far, summed over the robots; F is the controller's force before any limit.
+    effort : (K,) array, N² s
+        Integral of ``|F|²`` so far, summed over the robots.
+    path_length : (K,) array, m
+        Path length so far, averaged over the robots.
+    components : (K,) int array
+        Number of components of the communication graph, see
+        `robocov.metrics.connectivity.measure_connectivity`.
+    algebraic_connectivity : (K,) array
+        Second smallest eigenvalue of the Laplacian of this graph; 0 for several components.
+    wall_clearance : (K,) array, m
+        Smallest gap between a robot's rim and a wall since the previous moment; inf if there is none.
+    robot_clearance : (K,) array, m
+        Smallest gap between the rims of two robots since the previous moment; inf if there is none.
+    free_area : float, m²
+        Free area of the map.
 
     See Also
     --------
@@ -54,30 +82,17 @@ class RunMetrics:
     """
 
     time: Array
-    """Simulation time, s."""
     sensed_area: Array
-    """Free area within the sensing range of a robot and in its line of sight, m²."""
     range_area: Array
-    """Free area within the sensing range of a robot, regardless of walls, m² (blanket coverage by discs)."""
     visible_area: Array
-    """Free area in line of sight of a robot at any distance, m² (as in the art gallery problem)."""
     work: Array
-    """Integral of ``|F v|`` so far, summed over the robots, J; F is the controller's force before any
-    limit."""
     effort: Array
-    """Integral of ``|F|²`` so far, summed over the robots, N² s."""
     path_length: Array
-    """Path length so far, averaged over the robots, m."""
     components: IntArray
-    """Number of components of the communication graph, see `connectivity.measure_connectivity`."""
     algebraic_connectivity: Array
-    """Second smallest eigenvalue of the Laplacian of this graph; 0 for several components."""
     wall_clearance: Array
-    """Smallest gap between a robot's rim and a wall since the previous moment, m; inf if there is none."""
     robot_clearance: Array
-    """Smallest gap between the rims of two robots since the previous moment, m; inf if there is none."""
     free_area: float
-    """Free area of the map, m²."""
 
     def __repr__(self) -> str:
         moments = format_count(len(self.time), "moment")

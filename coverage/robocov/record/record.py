@@ -45,6 +45,8 @@ class Record(Drawable):
 
     Attributes
     ----------
+    environment : Environment
+    team : Team
     controller, label : str
         Name of the controller, as `make_controller` accepts it, and its label in figures.
     gains : mapping of str to float, str or None

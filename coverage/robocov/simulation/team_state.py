@@ -15,6 +15,20 @@ from robocov.errors import StartError, quote, to_floats
 class TeamState:
     """The state of a team from which a simulation starts or continues.
 
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+    velocities : (n, 2) array or None, m/s
+        By default robots are at rest.
+    steering : (n, 2) array or None, rad and rad/s
+        Heading, from +x, and turning rate of unicycles. By default they face the direction in which they
+        move.
+    steps : int
+        Number of control steps taken before this state.
+    is_computed : bool
+        Whether a simulation computed this state, so that it need not be checked for overlaps: a robot that
+        leans on something overlaps with it a little.
+
     Raises
     ------
     StartError
@@ -36,17 +50,10 @@ class TeamState:
     """
 
     positions: Array
-    """(n, 2) m"""
     velocities: Array | None = None
-    """(n, 2) m/s; by default robots are at rest."""
     steering: Array | None = None
-    """(n, 2) rad and rad/s, heading from +x and turning rate of unicycles. By default they face the direction
-    in which they move."""
     steps: int = 0
-    """Number of control steps taken before this state."""
     is_computed: bool = False
-    """Whether a simulation computed this state, so that it need not be checked for overlaps: a robot that
-    leans on something overlaps with it a little."""
 
     def __post_init__(self) -> None:
         positions = to_floats("starts", self.positions, "[x, y] of each robot in meters", StartError)

@@ -127,6 +127,13 @@ def partition(
     partition_by_travel_time : Cells of robots of different speeds.
     VoronoiPartition : Masses, centroids, polygons and neighbors of the cells.
 
+    Notes
+    -----
+    Cell V_i of equation (1) contains the points of the region that are nearer to robot i than to any of its
+    neighbors. Its mass M and centroid C are those of equation (2)::
+
+        M = ∫ φ(q) dq        C = 1/M ∫ q φ(q) dq
+
     Examples
     --------
     >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))

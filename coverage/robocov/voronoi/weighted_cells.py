@@ -171,6 +171,12 @@ def partition_by_travel_time(
     partition : Cells of the points that are nearest to each robot.
     WeightedCells : Masses, centroids and outlines of the cells.
 
+    Notes
+    -----
+    Cell i contains the points q with ``|q - p_i| / v_i <= |q - p_j| / v_j`` for all neighbors j. The border
+    between two cells is part of a circle of Apollonius. The paper has only cells of equal speeds (1), and
+    names heterogeneous teams as future work.
+
     Examples
     --------
     The cell of a robot is a disc if the other one is twice as fast. Its radius is 2/3 of their distance.
