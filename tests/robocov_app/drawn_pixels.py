@@ -20,8 +20,13 @@ def layer_named(name, layers=None):
 def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):
     """Return the frame that shows these layers alone, and its painter."""
     painter = Painter(scene.environment, size, theme, layers)
-    painter.show(names)
-    return painter.frame(scene).astype(int), painter
+    painter.show_only(names)
+    return painter.render_frame(scene).astype(int), painter
+
+
+def list_legend_texts(painter, scene):
+    """Return the texts of the legend of a scene."""
+    return [entry.text for entry in painter.list_legend_entries(scene)]
 
 
 def changed(scene, *names, size=SIZE):

@@ -32,14 +32,14 @@ from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density_text import describe_density, format_cost, get_cost_name
-from robocov_app.render.distance_colors import (
+from robocov_app.render.distance_map.colors import (
     build_palette,
     choose_color_limit,
     compute_color_levels,
     compute_line_opacities,
     list_color_ticks,
 )
-from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.distance_map.field import DistanceField
 
 DOTS_PER_PIXEL = 2
 """Dots of the image of a map for each pixel of the page."""

@@ -197,7 +197,7 @@ class EpisodeEnv:
         if self.render_mode != "rgb_array":
             return None
         painter = self._get_painter(episode)
-        return painter.frame(self._build_scene(episode)).copy()
+        return painter.render_frame(self._build_scene(episode)).copy()
 
     def close(self) -> None:
         """Close the window."""

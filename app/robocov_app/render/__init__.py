@@ -6,11 +6,11 @@ painter, layer_catalog, layers
     `Painter`, which draws a scene, and the layers that it can show.
 scene, record_scene, moving_obstacles, sensed_points
     The content of a picture.
-annotations, legend_strip, color_bar
+annotations
     Texts and scales around the arena.
 camera, canvas, clipping, sprites, fonts, pixel_arrays, surface_cache
-    The means of drawing.
-field_lattice, distance_field, distance_colors
+    The tools that layers draw with.
+distance_map
     Distances to the nearest robot.
 density_shading, density_text
     The density as colors and as text.

@@ -14,7 +14,7 @@ MIN_ZOOM_PX_PER_M = 1e-4
 MAX_ZOOM_PX_PER_M = 1e7
 """Ten times the zoom that shows the smallest map."""
 MAX_PIXEL = 1e8
-"""Largest coordinate that pygame gets."""
+"""Maximum absolute coordinate that is passed to pygame."""
 _MIN_SIZE_M = 1e-9
 _MIN_SIZE_PX = 1.0
 Box: TypeAlias = tuple[float, float, float, float]
@@ -39,16 +39,16 @@ class Camera:
 
     @classmethod
     def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> Camera:
-        """Build the camera that shows a part of the world as large as possible.
+        """Build the camera that shows a rectangle of the world as large as possible.
 
         Parameters
         ----------
         bounds : tuple of float, m
-            Low x, low y, high x and high y of the part.
+            Low x, low y, high x and high y of the rectangle.
         view : tuple of float, px
             Left, top, width and height.
         margin : float, px
-            Distance of the part from the sides of the view.
+            Distance of the rectangle from the sides of the view.
 
         Returns
         -------

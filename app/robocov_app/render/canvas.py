@@ -257,8 +257,10 @@ class Canvas:
         sketch = sprites.Sketch.from_points([tail.tolist(), *barbs], 2 * width)
         if sketch is None:
             return
-        # The shaft must not stick out of the tip of a full head.
-        shaft_end = tip - 0.7 * head_length * along if head == "full" else tip
+        shaft_end = tip
+        if head == "full":
+            # The shaft must not stick out of the tip.
+            shaft_end = tip - 0.7 * head_length * along
         sketch.draw_path([tail.tolist(), shaft_end.tolist()], color, width)
         if head == "full":
             sketch.fill_polygon(barbs, color)
@@ -298,7 +300,9 @@ class Canvas:
         # As for lines, whole numbers are the middles of pixels.
         quarters = np.rint((centers[rows] + 0.5) * sprites.FINENESS).astype(int)
         pixels, shifts = np.divmod(quarters, sprites.FINENESS)
-        chosen = np.zeros(len(rows), dtype=int) if indices is None else indices[rows]
+        chosen = np.zeros(len(rows), dtype=int)
+        if indices is not None:
+            chosen = indices[rows]
         rendered: dict[tuple[int, int, int], tuple[pygame.Surface, int]] = {}
         placed = []
         looks = np.column_stack([chosen, shifts])
@@ -340,8 +344,9 @@ class Canvas:
         int
             Width of the text, px.
         """
-        pixels = self.scale_text_size(self.theme.text if size is None else size)
-        picture = render_text(text, pixels, color or self.theme.ink, bold)
+        if size is None:
+            size = self.theme.text
+        picture = render_text(text, self.scale_text_size(size), color or self.theme.ink, bold)
         width, height = picture.get_size()
         x, y = position
         offset = {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
@@ -350,5 +355,6 @@ class Canvas:
 
     def measure_text(self, text: str, size: float | None = None, bold: bool = False) -> int:
         """Return the width of a line of text, px; `size` is px at scale 1."""
-        pixels = self.scale_text_size(self.theme.text if size is None else size)
-        return measure_text(text, pixels, bold)
+        if size is None:
+            size = self.theme.text
+        return measure_text(text, self.scale_text_size(size), bold)

@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov_app.render.sprites import Pixel
 
 MAX_DRAWN_PX = 20000.0
-"""Largest coordinate that is drawn: products of twice this still fit 32 bits."""
+"""Maximum absolute coordinate that is drawn: products of twice this still fit into 32 bits."""
 
 
 def limit_pixels(points: Array) -> Array:
@@ -41,7 +41,7 @@ def clip_polygon(corners: Array) -> list[Array]:
     Returns
     -------
     list of (m, 2) arrays, px
-        The outlines of its parts: mostly the polygon itself.
+        Outlines of the pieces: mostly the polygon itself.
     """
     if len(corners) < 3:
         return []

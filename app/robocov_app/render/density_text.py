@@ -28,7 +28,9 @@ def describe_density_range(low: float, high: float) -> str:
 
 def get_density_kind(environment: Environment) -> str | None:
     """Return the kind of the density; None for an environment without one."""
-    return None if environment.density is None else environment.density.kind
+    if environment.density is None:
+        return None
+    return environment.density.kind
 
 
 def list_density_lines(environment: Environment) -> list[str]:
@@ -41,8 +43,10 @@ def list_density_lines(environment: Environment) -> list[str]:
 
 
 def get_cost_name(environment: Environment) -> str:
-    """Return the name of the coverage cost, which says whether a density weights it."""
-    return "mean distance by φ" if describe_density(environment) else "mean distance"
+    """Return the name of the coverage cost, which shows whether it is weighted by a density."""
+    if describe_density(environment):
+        return "mean distance by φ"
+    return "mean distance"
 
 
 def format_cost(name: str, mean_distance: float, mean_time: float | None = None) -> str:

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 from robocov.errors import ParameterError, describe_unknown_name
 from robocov_app.look.hues import ColorScheme
-from robocov_app.render import annotations
+from robocov_app.render.annotations import captions, scale_bar
+from robocov_app.render.annotations.color_bar import draw_color_bar
+from robocov_app.render.annotations.legend_strip import LegendLayer
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.color_bar import draw_color_bar
 from robocov_app.render.layers import (
     arrows,
     cells,
@@ -23,7 +24,6 @@ from robocov_app.render.layers import (
 )
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.layers.trajectories import TrajectoriesLayer
-from robocov_app.render.legend_strip import LegendLayer
 from robocov_app.render.scene import Scene
 
 FIELD_LAYERS = frozenset({"distances", "geodesic_cells"})
@@ -57,10 +57,10 @@ def build_pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
 
     def draw_status(canvas: Canvas, scene: Scene) -> None:
         # The caption contains the name of the controller and the cost.
-        annotations.draw_status(canvas, replace(scene, label="", cost=""))
+        captions.draw_status(canvas, replace(scene, label="", cost=""))
 
     shared = [layer for layer in build_standard_layers(trails) if layer.name not in ("legend", "status")]
-    caption = Layer("caption", "Caption", annotations.draw_caption, is_in_world=False)
+    caption = Layer("caption", "Caption", captions.draw_caption, is_in_world=False)
     status = Layer("status", "Status line", draw_status, is_in_world=False)
     return [*shared, caption, status]
 
@@ -265,6 +265,6 @@ def _build_strips() -> list[Layer]:
     return [
         Layer("color_bar", "Color scale", draw_color_bar, needs=("field",), is_in_world=False),
         Layer("legend", "Legend", LegendLayer().draw, is_in_world=False),
-        Layer("scale_bar", "Scale bar", annotations.draw_scale_bar, is_in_world=False),
-        Layer("status", "Status line", annotations.draw_status, is_in_world=False),
+        Layer("scale_bar", "Scale bar", scale_bar.draw_scale_bar, is_in_world=False),
+        Layer("status", "Status line", captions.draw_status, is_in_world=False),
     ]

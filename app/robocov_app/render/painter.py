@@ -13,13 +13,18 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, describe_unknown_name
 from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render.annotations import STRIP_HEIGHT_PX, is_low_pane
+from robocov_app.render.annotations.color_bar import measure_color_bar
+from robocov_app.render.annotations.legend_strip import (
+    MARGIN_PX,
+    PADDING_PX,
+    ROW_HEIGHT_PX,
+    arrange_legend_rows,
+)
+from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX, is_low_pane
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.color_bar import measure_color_bar
 from robocov_app.render.layer_catalog import FIELD_LAYERS, build_standard_layers
 from robocov_app.render.layers.layer import Layer
-from robocov_app.render.legend_strip import MARGIN_PX, PADDING_PX, ROW_HEIGHT_PX, arrange_legend_rows
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import LatestValue
 
@@ -77,8 +82,12 @@ class Painter:
         self.environment = environment
         self.size = size
         self.theme = theme
-        self.layers = list(layers) if layers is not None else build_standard_layers()
-        self.scale = choose_scale(size) if scale is None else scale
+        if layers is None:
+            layers = build_standard_layers()
+        if scale is None:
+            scale = choose_scale(size)
+        self.layers = list(layers)
+        self.scale = scale
         self.visible = {layer.name for layer in self.layers if layer.is_default}
         self._camera: Camera | None = None  # None shows the whole region.
         self._hues = choose_robot_hues(0)
@@ -86,7 +95,7 @@ class Painter:
         self._own_surface: pygame.Surface | None = None
         self._margins = _Margins(None, 0, 0.0)
 
-    def show(self, names: Iterable[str]) -> None:
+    def show_only(self, names: Iterable[str]) -> None:
         """Show these layers, and no others; raise ParameterError if one is unknown."""
         visible = set(names)
         known = {layer.name for layer in self.layers}
@@ -95,10 +104,10 @@ class Painter:
             raise ParameterError(describe_unknown_name("layer", min(unknown), known))
         self.visible = visible
 
-    def change(self, also: Iterable[str], without: Iterable[str]) -> None:
-        """Show some layers as well, and hide others; unknown names are ignored."""
+    def change_visible(self, shown: Iterable[str], hidden: Iterable[str]) -> None:
+        """Show some layers in addition, and hide others; unknown names are ignored."""
         known = {layer.name for layer in self.layers}
-        self.visible = (self.visible | set(also) & known) - set(without)
+        self.visible = (self.visible | set(shown) & known) - set(hidden)
 
     @property
     def needs_field(self) -> bool:
@@ -129,9 +138,10 @@ class Painter:
         top = MARGIN_PX
         if rows:
             top = PADDING_PX + ROW_HEIGHT_PX * rows + PADDING_PX
+        bottom = MARGIN_PX
         has_strip = bool({"scale_bar", "status"} & self.visible)
-        is_low = is_low_pane(height, self.scale, self.visible)
-        bottom = STRIP_HEIGHT_PX if has_strip and not is_low else MARGIN_PX
+        if has_strip and not is_low_pane(height, self.scale, self.visible):
+            bottom = STRIP_HEIGHT_PX
         view_width = max(width - self._margins.color_bar_width, 1.0)
         view_height = max(height - top * self.scale - bottom * self.scale, 1.0)
         return 0.0, top * self.scale, view_width, view_height
@@ -140,15 +150,13 @@ class Painter:
         """Show the whole region, also after changes of the size."""
         self._camera = None
 
-    def legend(self, scene: Scene) -> list[str]:
-        """Return the texts of the legend, those of the layers that draw something of a scene."""
-        return [entry.text for entry in self.legend_entries(scene)]
-
-    def legend_entries(self, scene: Scene) -> list[LegendEntry]:
+    def list_legend_entries(self, scene: Scene) -> list[LegendEntry]:
         """Return the entries of the legend, those of the layers that draw something of a scene."""
-        return [
-            entry for layer in self._list_visible() if layer.can_draw(scene) for entry in layer.legend(scene)
-        ]
+        entries = []
+        for layer in self._list_visible():
+            if layer.can_draw(scene):
+                entries += layer.legend(scene)
+        return entries
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw a scene on the whole of a surface, whose size becomes that of the painter.
@@ -167,7 +175,7 @@ class Painter:
             self.scale,
             self._hues,
             frozenset(self.visible),
-            self.legend_entries(scene),
+            self.list_legend_entries(scene),
         )
         self._update_margins(canvas, scene)
         canvas = replace(canvas, camera=self.camera)
@@ -210,8 +218,8 @@ class Painter:
             color_bar_width = max(color_bar_width, self._margins.color_bar_width)
         self._margins = _Margins(key, rows, color_bar_width)
 
-    def frame(self, scene: Scene) -> NDArray[np.uint8]:
-        """Draw a scene without a display.
+    def render_frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """Render a scene without a display.
 
         Parameters
         ----------

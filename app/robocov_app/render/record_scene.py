@@ -11,7 +11,7 @@ from robocov.arrays import IntArray
 from robocov.observation import Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
-from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.distance_map.field import DistanceFields
 from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.scene import Scene
 
@@ -26,7 +26,7 @@ def build_record_scene(
     record : Record
     row : int
     cost : str
-        The coverage cost in words.
+        The coverage cost as text.
     fields : DistanceFields, optional
         Computes the distances to the nearest robot.
 

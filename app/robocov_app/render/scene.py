@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
-from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.distance_map.field import DistanceField
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.render.sensed_points import SensedPoints
 
@@ -58,7 +58,7 @@ class Scene:
     trail_time : (k,) array or None, s
         Times of the trail, for trajectories that fade.
     trail_fade : float or None, s
-        Length of the part of the trail that is drawn; it fades into the past.
+        Length of the drawn end of the trail, which fades into the past.
     cells : sequence of (m, 2) arrays or None, m
         Outlines of the Voronoi cells.
     centroids : (n, 2) array or None, m
@@ -67,7 +67,7 @@ class Scene:
     label : str
         Display name of the controller.
     cost : str
-        The coverage cost in words.
+        The coverage cost as text.
     field : DistanceField or None
         Distances to the nearest robot.
     field_limit : float, m
@@ -122,7 +122,9 @@ class Scene:
 
     def get_number(self, row: int) -> int:
         """Return the number of a robot, given by its row."""
-        return row + 1 if self.numbers is None else self.numbers[row]
+        if self.numbers is None:
+            return row + 1
+        return self.numbers[row]
 
     def has_content(self, name: str) -> bool:
         """Return whether an attribute, given by its name, is neither None nor an empty collection."""

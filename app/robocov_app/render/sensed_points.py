@@ -12,7 +12,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 CELL_SIZE_M = 0.05
 """Points that a robot senses within the same square of this size count once."""
 MAX_POINTS = 20_000
-"""Number of points from which on no more are stored."""
+"""Maximum number of points. Further ones are ignored."""
 _TIME_TOLERANCE_S = 1e-6
 
 

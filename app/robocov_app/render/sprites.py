@@ -55,7 +55,7 @@ def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> p
     margin : float, px
         Space around the points.
     surface : pygame.Surface
-        Only the part within its clip is visible.
+        Only its clip is visible.
 
     Returns
     -------
@@ -70,16 +70,18 @@ def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> p
     high = np.ceil(flat.max(axis=0) + margin)
     box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist())
     visible = box.clip(surface.get_clip())
-    return visible if visible.width and visible.height else None
+    if not visible.width or not visible.height:
+        return None
+    return visible
 
 
 class Sketch:
-    """A part of a surface that is drawn larger and then shrunk: overlapping strokes show no seams.
+    """A rectangle of a surface that is drawn larger and then shrunk: overlapping strokes show no seams.
 
     Parameters
     ----------
     box : pygame.Rect, px
-        The part of the surface.
+        The rectangle of the surface.
     fineness : int
         Factor by which the drawing is larger.
 
@@ -358,8 +360,10 @@ def _build_bar(
     half_width = width / 2 / (dx * dx + dy * dy) ** 0.5
     side_x = -dy * half_width
     side_y = dx * half_width
-    start_x, start_y = x - dx * reach, y - dy * reach
-    end_x, end_y = x + dx * reach, y + dy * reach
+    start_x = x - dx * reach
+    start_y = y - dy * reach
+    end_x = x + dx * reach
+    end_y = y + dy * reach
     return [
         (start_x + side_x, start_y + side_y),
         (end_x + side_x, end_y + side_y),

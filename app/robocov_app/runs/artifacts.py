@@ -315,8 +315,8 @@ def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[Dista
         Those in which a robot works.
     """
     from robocov_app.figures.coverage import DistanceSnapshot
-    from robocov_app.render.distance_field import DistanceField
-    from robocov_app.render.field_lattice import FieldLattice
+    from robocov_app.render.distance_map.field import DistanceField
+    from robocov_app.render.distance_map.lattice import FieldLattice
 
     environment = runs[0].record.environment
     cost = refine_cost_for_figures(environment, cost)

@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.density_text import format_cost, get_cost_name
-from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.distance_map.field import DistanceFields
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.painter import Painter
@@ -92,7 +92,7 @@ def draw_frames(
             cost=_describe_cost(record, cost, float(record.time[row])),
             fields=fields if painter.needs_field else None,
         )
-        frame = painter.frame(scene)
+        frame = painter.render_frame(scene)
         for _ in repetitions:
             yield frame
 
@@ -120,7 +120,7 @@ def build_painter(
     Painter
     """
     painter = Painter(record.environment, size, settings.color_theme, layers, scale)
-    painter.change(settings.shown_layers, settings.hidden_layers)
+    painter.change_visible(settings.shown_layers, settings.hidden_layers)
     return painter
 
 

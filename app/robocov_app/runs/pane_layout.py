@@ -12,10 +12,10 @@ from robocov.record import Record
 from robocov_app.look.colors import Color
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import Theme
-from robocov_app.render.annotations import STRIP_HEIGHT_PX
-from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.annotations.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, render_legend_image
+from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
+from robocov_app.render.distance_map.field import DistanceFields
 from robocov_app.render.layer_catalog import build_pane_layers
-from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, render_legend_image
 from robocov_app.render.painter import Painter, choose_scale
 from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.record_scene import build_record_scene
@@ -182,7 +182,7 @@ def _draw_legend(
     painter = build_painter(records[0], settings, (64, 64), build_pane_layers(settings.colors), scale)
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
-    entries = [painter.legend_entries(scene) for scene in scenes]
+    entries = [painter.list_legend_entries(scene) for scene in scenes]
     # The longest legend determines the order, because it usually contains all entries.
     entries.sort(key=len)
     entries.reverse()

@@ -16,7 +16,7 @@ from x11_hands import MARKS, MAX_WAIT_S, Hands, read_errors, run_window, start_d
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov_app.editor.canvas.canvas import MARGIN_PX
-from robocov_app.render.annotations import STRIP_HEIGHT_PX
+from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE

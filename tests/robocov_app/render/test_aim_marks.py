@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import TWO, changed, drawn, nearest
+from drawn_pixels import TWO, changed, drawn, list_legend_texts, nearest
 from drawn_run import SQUARE, explained
 
 from robocov.observation import Decision, Snapshot
@@ -39,7 +39,7 @@ def test_crosses_are_called_what_they_are() -> None:
         scene = explained(TWO, goals=goals)
         pixels, painter = changed(scene, "centroids")
         assert bool(len(pixels)) == bool(words)
-        assert painter.legend(scene) == words
+        assert list_legend_texts(painter, scene) == words
 
 
 def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
@@ -54,7 +54,7 @@ def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
     )
     assert not are_centroids(heard.centroid, CENTROIDS)
     _, painter = changed(limited, "centroids")
-    assert painter.legend(limited) == ["cell centroid"]
+    assert list_legend_texts(painter, limited) == ["cell centroid"]
 
 
 @pytest.mark.parametrize("goals", [CENTROIDS, TWO + 1])

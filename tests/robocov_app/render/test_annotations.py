@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import SIZE, TWO, changed, drawn
+from drawn_pixels import SIZE, TWO, changed, drawn, list_legend_texts
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
-from robocov_app.render.annotations import fit_status
+from robocov_app.render.annotations.captions import fit_status
 from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.render.painter import Painter
@@ -104,13 +104,14 @@ def test_the_legend_lists_exactly_what_is_shown():
         "force_resultant": "resultant force",
     }
     for name, word in words.items():
-        painter.show({name})
-        assert painter.legend(scene) == [word]
-    painter.show({layer.name for layer in build_standard_layers()})
-    assert sorted(painter.legend(scene)) == sorted(words.values())  # no obstacles, starts or trail here
-    painter.show({"obstacles", "starts", "trajectories"})
+        painter.show_only({name})
+        assert list_legend_texts(painter, scene) == [word]
+    painter.show_only({layer.name for layer in build_standard_layers()})
+    # The scene has no obstacles, starts or trail.
+    assert sorted(list_legend_texts(painter, scene)) == sorted(words.values())
+    painter.show_only({"obstacles", "starts", "trajectories"})
     rooms = scene_of(run_of(ROOMS, 2))
-    assert painter.legend(rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
+    assert list_legend_texts(painter, rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
 
 
 def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
@@ -118,10 +119,10 @@ def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
     names = [layer.name for layer in build_standard_layers()]
     for size in (SIZE, (1920, 1080)):
         painter = Painter(ROOMS, size)
-        painter.show(names)
-        painter.frame(scene)
+        painter.show_only(names)
+        painter.render_frame(scene)
         top = painter.camera.to_pixels(ROOMS.region.vertices)[:, 1].min()
-        frame = painter.frame(scene).astype(int)
+        frame = painter.render_frame(scene).astype(int)
         strip = (frame[: int(top) - 4] != np.array(LIGHT.background)).any(axis=2)
         assert strip.any()
         assert not strip[:, -3:].any()  # nothing is cut at the right

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from density_cases import GAUSSIANS, POLYGONS
+from drawn_pixels import list_legend_texts
 from matplotlib.figure import Figure
 
 from robocov.controllers import Rapf
@@ -14,8 +15,8 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
 from robocov_app.figures.arena import build_map_handles, draw_map, set_meter_axes
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_field import DistanceField
-from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.distance_map.field import DistanceField
+from robocov_app.render.distance_map.lattice import FieldLattice
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 
@@ -40,8 +41,8 @@ def test_the_shading_is_where_it_counts(theme):
     frames = {}
     for environment in (PLAIN, HEAVY):
         painter = Painter(environment, (500, 460), theme)
-        painter.show({"density", "obstacles", "boundary"})
-        frames[environment.name, environment is HEAVY] = painter.frame(scene_of(environment))
+        painter.show_only({"density", "obstacles", "boundary"})
+        frames[environment.name, environment is HEAVY] = painter.render_frame(scene_of(environment))
     plain, heavy = frames.values()
     peak, edge = pixel(painter, heavy, 3.0, 3.0), pixel(painter, heavy, 7.8, 7.8)
     background = np.array(theme.background)
@@ -56,39 +57,41 @@ def test_the_shading_is_where_it_counts(theme):
 
 def test_the_legend_tells_of_it():
     painter = Painter(HEAVY, (500, 460))
-    assert "density φ, 0.1 to 2.1" in painter.legend(scene_of(HEAVY))
-    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN)))
-    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN.with_density(Uniform(2.0)))))
+    assert "density φ, 0.1 to 2.1" in list_legend_texts(painter, scene_of(HEAVY))
+    assert not any("φ" in words for words in list_legend_texts(painter, scene_of(PLAIN)))
+    assert not any(
+        "φ" in words for words in list_legend_texts(painter, scene_of(PLAIN.with_density(Uniform(2.0))))
+    )
     painter.visible.discard("density")
-    assert not any("φ" in words for words in painter.legend(scene_of(HEAVY)))
+    assert not any("φ" in words for words in list_legend_texts(painter, scene_of(HEAVY)))
 
 
 def test_colors_of_distances_hide_it():
     painter = Painter(HEAVY, (400, 380))
-    painter.show({"density", "distances", "obstacles"})
+    painter.show_only({"density", "distances", "obstacles"})
     cost = CoverageCost(HEAVY, 32)
     field = DistanceField(FieldLattice(cost.sites), cost(STARTS))
-    with_both = painter.frame(scene_of(HEAVY, field=field, field_limit=5.0))
-    painter.show({"distances", "obstacles"})
-    assert np.array_equal(painter.frame(scene_of(HEAVY, field=field, field_limit=5.0)), with_both)
-    painter.show({"density", "distances", "obstacles"})
-    assert not np.array_equal(painter.frame(scene_of(HEAVY)), with_both)
+    with_both = painter.render_frame(scene_of(HEAVY, field=field, field_limit=5.0))
+    painter.show_only({"distances", "obstacles"})
+    assert np.array_equal(painter.render_frame(scene_of(HEAVY, field=field, field_limit=5.0)), with_both)
+    painter.show_only({"density", "distances", "obstacles"})
+    assert not np.array_equal(painter.render_frame(scene_of(HEAVY)), with_both)
 
 
 def test_another_density_is_drawn_anew():
     painter = Painter(PLAIN, (400, 380))
-    first = painter.frame(scene_of(HEAVY))
+    first = painter.render_frame(scene_of(HEAVY))
     other = PLAIN.with_density(POLYGONS["rooms"])
-    second = painter.frame(scene_of(other))
+    second = painter.render_frame(scene_of(other))
     assert not np.array_equal(first, second)
-    assert np.array_equal(painter.frame(scene_of(HEAVY)), first)
+    assert np.array_equal(painter.render_frame(scene_of(HEAVY)), first)
 
 
 def test_zoomed_in_it_stays_in_the_view():
     painter = Painter(HEAVY, (400, 380))
-    painter.frame(scene_of(HEAVY))
+    painter.render_frame(scene_of(HEAVY))
     painter.camera = painter.camera.zoom_at(40.0, (200, 200))
-    assert painter.frame(scene_of(HEAVY)).shape == (380, 400, 3)
+    assert painter.render_frame(scene_of(HEAVY)).shape == (380, 400, 3)
 
 
 def test_on_a_page():

@@ -15,7 +15,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, WallObstacle
 from robocov_app.look.colors import compute_contrast, compute_luminance
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_colors import (
+from robocov_app.render.distance_map.colors import (
     MAX_LEVEL,
     build_palette,
     choose_color_limit,
@@ -23,8 +23,8 @@ from robocov_app.render.distance_colors import (
     compute_line_opacities,
     list_color_ticks,
 )
-from robocov_app.render.distance_field import BorderPixels, DistanceField, DistanceFields
-from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.distance_map.field import BorderPixels, DistanceField, DistanceFields
+from robocov_app.render.distance_map.lattice import FieldLattice
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
 

@@ -3,14 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from drawn_pixels import list_legend_texts
 from drawn_run import HALL, ROOMS, run_of, scene_of
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_colors import MAX_LEVEL, build_palette
-from robocov_app.render.distance_field import DistanceField, DistanceFields
-from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.distance_map.colors import MAX_LEVEL, build_palette
+from robocov_app.render.distance_map.field import DistanceField, DistanceFields
+from robocov_app.render.distance_map.lattice import FieldLattice
 from robocov_app.render.layer_catalog import check_layer_names
 from robocov_app.render.layers import distances
 from robocov_app.render.painter import Painter
@@ -28,8 +29,8 @@ def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
 
 def painted(what, *names, theme=LIGHT, size=SIZE):
     painter = Painter(what.environment, size, theme)
-    painter.show(names)
-    return painter.frame(what).astype(int), painter
+    painter.show_only(names)
+    return painter.render_frame(what).astype(int), painter
 
 
 def free_pixels(painter, environment, count, seed=0):
@@ -117,14 +118,14 @@ def test_without_a_field_nothing_is_drawn_or_explained():
     _, what = scene()
     frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "color_bar", "legend")
     assert (frame == LIGHT.background).all()
-    assert painter.legend(replace(what, field=None)) == []
+    assert list_legend_texts(painter, replace(what, field=None)) == []
 
 
 def test_the_legend_explains_what_is_shown():
     _, what = scene()
     painter = Painter(ROOMS, SIZE)
-    painter.change(["distances", "geodesic_cells"], ["cells"])
-    words = painter.legend(what)
+    painter.change_visible(["distances", "geodesic_cells"], ["cells"])
+    words = list_legend_texts(painter, what)
     assert words[:3] == ["distance to the nearest robot", "no robot can come", "geodesic cell border"]
     assert "Voronoi cell" not in words
 
@@ -170,14 +171,14 @@ def test_an_unchanged_picture_is_kept(layer, monkeypatch):
     real = getattr(distances, name)
     monkeypatch.setattr(distances, name, lambda *args: made.append(1) or real(*args))
     painter = Painter(ROOMS, SIZE)
-    painter.change([layer], [])
-    first = painter.frame(what).copy()
-    np.testing.assert_array_equal(painter.frame(what), first)
+    painter.change_visible([layer], [])
+    first = painter.render_frame(what).copy()
+    np.testing.assert_array_equal(painter.render_frame(what), first)
     assert len(made) == 1
     painter.camera = painter.camera.pan(10, 0)
-    painter.frame(what)
+    painter.render_frame(what)
     _, other = scene(seed=1)
-    painter.frame(other)
+    painter.render_frame(other)
     assert len(made) == 3
 
 
@@ -185,10 +186,10 @@ def test_an_unchanged_picture_is_kept(layer, monkeypatch):
 def test_any_zoom_shows_the_same_colors(zoom):
     cost, what = scene()
     painter = Painter(ROOMS, (300, 200))
-    painter.show(["distances"])
+    painter.show_only(["distances"])
     place = np.array([9.0, 8.0])
     painter.camera = replace(painter.camera, center=(9.0, 8.0), zoom=painter.camera.zoom * zoom)
-    frame = painter.frame(what).astype(int)
+    frame = painter.render_frame(what).astype(int)
     x, y = np.rint(painter.camera.to_pixels(place)).astype(int)
     exact = cost.geodesics.compute_distances(place[None], what.field.result.positions).min()
     wanted = build_palette(LIGHT)[int(exact / 8.0 * MAX_LEVEL)]

@@ -14,7 +14,7 @@ from robocov_app.render.crowding import (
     fit_radii,
 )
 from robocov_app.render.density_text import format_cost
-from robocov_app.render.distance_colors import choose_color_limit, list_color_ticks
+from robocov_app.render.distance_map.colors import choose_color_limit, list_color_ticks
 from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.surface_cache import LatestValue, cache_surfaces
 

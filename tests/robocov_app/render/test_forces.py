@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, TWO, changed, drawn, layer_named, nearest
+from drawn_pixels import ONE, TWO, changed, drawn, layer_named, list_legend_texts, nearest
 from drawn_run import explained
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -90,7 +90,7 @@ def test_viscosity_has_its_color_and_its_words(theme):
     frame, painter = drawn(scene, "force_viscosity", theme=theme)
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
     assert nearest(frame, start, theme.forces["viscosity"]) < 25
-    assert painter.legend(scene) == ["viscosity"]
+    assert list_legend_texts(painter, scene) == ["viscosity"]
     (picture,) = glyphs(layer_named("force_viscosity"), scene, theme)
     check_glyph(picture, theme, theme.forces["viscosity"])
 
@@ -116,7 +116,7 @@ def test_unlimited_ranges_are_not_drawn():
     scene = explained(ONE, communication_range=np.inf)
     pixels, painter = changed(scene, "communication")
     assert len(pixels) == 0
-    assert painter.legend(scene) == []
+    assert list_legend_texts(painter, scene) == []
 
 
 def test_links_are_those_of_the_graph():

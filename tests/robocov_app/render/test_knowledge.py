@@ -4,7 +4,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, layer_named, nearest
+from drawn_pixels import (
+    ONE,
+    SIZE,
+    TWO,
+    changed,
+    distance,
+    drawn,
+    inside,
+    layer_named,
+    list_legend_texts,
+    nearest,
+)
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
@@ -87,20 +98,20 @@ class TestRayScan:
     def test_close_up_it_is_drawn_too(self):
         scene = scanned(scan())
         painter = Painter(SQUARE, SIZE)
-        painter.show({"scan"})
+        painter.show_only({"scan"})
         painter.camera = Camera((5.4, 4.0), 2e4, painter.camera.view)
-        frame = painter.frame(scene).astype(int)
+        frame = painter.render_frame(scene).astype(int)
         assert nearest(frame, painter.camera.to_pixels(np.array([5.4, 4.0])), LIGHT.final) < 10
         assert distance(frame, (SIZE[0] // 2 + 60, SIZE[1] // 2), LIGHT.background) == 0
         assert distance(frame, (SIZE[0] // 2 - 60, SIZE[1] // 2 - 40), LIGHT.background) > 8
         painter.camera = Camera((400.0, 4.0), 100.0, painter.camera.view)
-        assert (painter.frame(scene) == 255).all()
+        assert (painter.render_frame(scene) == 255).all()
 
     def test_without_scans_there_is_nothing(self):
         pixels, painter = changed(explained(ONE), "scan")
         assert len(pixels) == 0
-        assert painter.legend(explained(ONE)) == []
-        assert painter.legend(scanned(scan())) == ["ray scan"]
+        assert list_legend_texts(painter, explained(ONE)) == []
+        assert list_legend_texts(painter, scanned(scan())) == ["ray scan"]
 
 
 SEEN = np.array([[7.2, 2.8], [11.0, 3.75], [4.0, 5.0]])
@@ -176,10 +187,10 @@ class TestSensedObstacles:
         scene = replace(scene, numbers=(1, 7, 3, 9))
         frame, painter = drawn(scene, "obstacles", "sensed")
         assert dots(frame, painter) == [False, True, False]
-        assert painter.legend(scene)[-1] == "known obstacles"
-        frame = painter.frame(replace(scene, selected=None)).astype(int)
+        assert list_legend_texts(painter, scene)[-1] == "known obstacles"
+        frame = painter.render_frame(replace(scene, selected=None)).astype(int)
         assert dots(frame, painter) == [True, True, True]
-        assert painter.legend(replace(scene, selected=None))[-1] == "known obstacles"
+        assert list_legend_texts(painter, replace(scene, selected=None))[-1] == "known obstacles"
 
     def test_points_come_and_go_with_time(self):
         record = run_of(ROOMS, 4)
@@ -187,31 +198,35 @@ class TestSensedObstacles:
         for time, point in zip((0.0, 1.0, 2.0), SEEN, strict=True):
             sensed.add(time, (1,), point[None])
         painter = Painter(ROOMS, SIZE)
-        painter.show({"obstacles", "sensed"})
+        painter.show_only({"obstacles", "sensed"})
         for row, known in ((0, 1), (10, 2), (15, 2), (20, 3), (39, 3), (12, 2), (0, 1)):
-            frame = painter.frame(replace(scene_of(record, row), sensed=sensed)).astype(int)
+            frame = painter.render_frame(replace(scene_of(record, row), sensed=sensed)).astype(int)
             assert dots(frame, painter) == [True] * known + [False] * (3 - known)
 
     def test_another_history_leaves_nothing_of_the_old(self):
         painter = Painter(ROOMS, SIZE)
-        painter.show({"obstacles", "sensed"})
+        painter.show_only({"obstacles", "sensed"})
         scene = knowing(SEEN[:2], (1, 2))
-        painter.frame(scene)
+        painter.render_frame(scene)
         scene.sensed.remove_after(-1.0)  # the same object, as long as before
         scene.sensed.add(0.0, (1, 2), SEEN[1:])
-        assert dots(painter.frame(scene).astype(int), painter) == [False, True, True]
-        assert dots(painter.frame(knowing(SEEN[:2], (1, 2))).astype(int), painter) == [True, True, False]
+        assert dots(painter.render_frame(scene).astype(int), painter) == [False, True, True]
+        assert dots(painter.render_frame(knowing(SEEN[:2], (1, 2))).astype(int), painter) == [
+            True,
+            True,
+            False,
+        ]
 
     def test_another_map_or_theme_or_view_is_drawn_anew(self):
         painter = Painter(ROOMS, SIZE)
-        painter.show({"obstacles", "sensed"})
-        painter.frame(knowing())
+        painter.show_only({"obstacles", "sensed"})
+        painter.render_frame(knowing())
         painter.theme = DARK
-        assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
+        assert dots(painter.render_frame(knowing()).astype(int), painter, DARK) == [True, True, True]
         painter.camera = painter.camera.pan(40, -30)
-        assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
+        assert dots(painter.render_frame(knowing()).astype(int), painter, DARK) == [True, True, True]
         scene = knowing(environment=Environment("empty", ROOMS.boundary, (), {"spread": UniformStart()}))
-        frame = painter.frame(scene).astype(int)
+        frame = painter.render_frame(scene).astype(int)
         at = painter.camera.to_pixels(np.array([4.4, 5.5]))
         assert distance(frame, at, DARK.background) == 0
 
@@ -227,13 +242,13 @@ class TestSensedObstacles:
         sensed = SensedPoints()
         layer = layer_named("sensed")
         painter = Painter(ROOMS, SIZE, layers=[layer])
-        painter.show({"sensed"})
+        painter.show_only({"sensed"})
         record = run_of(ROOMS, 4)
         pages = set()
         for row in range(9):
             if row in (0, 5):
                 sensed.add(0.1 * row, (1, 2), SEEN[:2] + 0.1 * row)
-            painter.frame(replace(scene_of(record, row), sensed=sensed))
+            painter.render_frame(replace(scene_of(record, row), sensed=sensed))
             pages.add(id(layer.draw.__self__._page))
         assert counts == [2, 2]
         assert len(pages) == 1
@@ -313,18 +328,18 @@ class TestCursorPath:
 
     def test_long_ways_are_told_in_whole_meters(self):
         painter = Painter(SQUARE, SIZE)
-        painter.show({"path"})
+        painter.show_only({"path"})
         painter.camera = Camera((4.0, 4.0), 0.5, painter.camera.view)
-        frame = painter.frame(pathed((4.0, 4.0), (4.0, 240.5))).astype(int)
+        frame = painter.render_frame(pathed((4.0, 4.0), (4.0, 240.5))).astype(int)
         assert len(tags(frame, painter, "236 m")) == 1
 
     @pytest.mark.parametrize("corner", [(0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)])
     @pytest.mark.parametrize("zoom", [50.0, 90.0])
     def test_the_tag_stays_in_the_picture(self, corner, zoom):
         painter = Painter(SQUARE, SIZE)
-        painter.show({"path"})
+        painter.show_only({"path"})
         painter.camera = Camera((4.0, 4.0), zoom, painter.camera.view)
-        frame = painter.frame(pathed(corner, (4.0, 4.0))).astype(int)
+        frame = painter.render_frame(pathed(corner, (4.0, 4.0))).astype(int)
         assert len(tags(frame, painter, "5.66 m")) == 1
 
     @pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
@@ -357,7 +372,7 @@ class TestCursorPath:
         scene = replace(explained(TWO), path=path)
         pixels, painter = changed(scene, "path")
         assert len(pixels) == 0
-        assert painter.legend(scene) == []
+        assert list_legend_texts(painter, scene) == []
 
 
 @THEMES

@@ -5,7 +5,7 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, list_legend_texts, nearest
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
@@ -165,7 +165,7 @@ class TestCrowds:
     def radii(self, positions, size=SIZE, radius=0.1):
         scene = replace(explained(positions), team=Team.homogeneous(len(positions), radius=radius))
         painter = Painter(SQUARE, size)
-        painter.frame(scene)
+        painter.render_frame(scene)
         canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, choose_robot_hues(0))
         return np.array(compute_drawn_radii(canvas, scene)), painter
 
@@ -328,11 +328,11 @@ class TestNumbers:
     def test_in_a_small_team_colors_stay_with_them(self, theme):
         places = np.array([[1.0, 1.0], [4.0, 4.0], [7.0, 7.0]])
         painter = Painter(SQUARE, SIZE, theme)
-        painter.show({"robots", "cells"})
+        painter.show_only({"robots", "cells"})
         for numbers in ((1, 2, 3), (1, 3), (3,), (2, 9)):
             rows = [3 if number == 9 else number for number in numbers]
             positions = places[np.array(rows) - 1]
-            frame = painter.frame(replace(explained(positions), numbers=numbers)).astype(int)
+            frame = painter.render_frame(replace(explained(positions), numbers=numbers)).astype(int)
             for number, place in zip(numbers, positions, strict=True):
                 pixel = painter.camera.to_pixels(place)
                 assert nearest(frame, pixel - np.array([0.0, 5.0]), theme.robots[number - 1]) < 30
@@ -389,9 +389,9 @@ class TestTrajectories:
     def test_frame_by_frame_looks_like_all_at_once(self):
         record = run_of(SQUARE, 5, steps=60)
         painter = Painter(SQUARE, SIZE)
-        painter.show({"trajectories"})
+        painter.show_only({"trajectories"})
         for row in range(60):
-            stepwise = painter.frame(scene_of(record, row)).astype(int)
+            stepwise = painter.render_frame(scene_of(record, row)).astype(int)
         at_once, _ = drawn(scene_of(record), "trajectories")
         drawn_pixels = (at_once != 255).any(axis=2)
         assert drawn_pixels.sum() > 500
@@ -410,11 +410,11 @@ class TestTrajectories:
     def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
         first, second = run_of(SQUARE, 5, seed=1), run_of(SQUARE, 5, seed=2)
         painter = Painter(SQUARE, SIZE)
-        painter.show({"trajectories"})
-        painter.frame(scene_of(first))
+        painter.show_only({"trajectories"})
+        painter.render_frame(scene_of(first))
         for scene in (scene_of(second), scene_of(second, 20), scene_of(first, 3)):
             fresh, _ = drawn(scene, "trajectories")
-            assert (painter.frame(scene) == fresh).all()
+            assert (painter.render_frame(scene) == fresh).all()
 
     def test_fading_forgets_the_past(self):
         record = run_of(SQUARE, 1, steps=80)
@@ -448,7 +448,7 @@ class TestMovingObstacles:
     @pytest.mark.parametrize("theme", [LIGHT, DARK])
     def test_look_different_from_static_ones(self, theme):
         painter = Painter(self.CARTS, (480, 360), theme)
-        frame = painter.frame(self.scene(2.0))
+        frame = painter.render_frame(self.scene(2.0))
 
         def at(x, y):
             column, row = painter.camera.to_pixels(np.array([x, y])).round().astype(int)
@@ -457,7 +457,8 @@ class TestMovingObstacles:
         assert at(6.0, 3.3) == theme.obstacle
         assert at(3.0, 1.3) == theme.moving_obstacle != theme.obstacle
         assert np.abs(np.subtract(at(3.0, 1.0), theme.ink)).max() < 5  # the arrow
-        assert painter.legend(self.scene(2.0))[-1] == "moving obstacle and its path"
+        assert list_legend_texts(painter, self.scene(2.0))[-1] == "moving obstacle and its path"
         assert not any(
-            "moving" in words for words in painter.legend(Scene(self.CARTS.static, Team.homogeneous(1)))
+            "moving" in words
+            for words in list_legend_texts(painter, Scene(self.CARTS.static, Team.homogeneous(1)))
         )

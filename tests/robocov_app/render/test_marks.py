@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, layer_named, nearest
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, layer_named, list_legend_texts, nearest
 from drawn_run import SQUARE, explained
 from written_words import check_glyph, glyphs, places
 
@@ -115,8 +115,8 @@ class TestFailed:
     def test_where_none_failed_there_is_nothing(self):
         pixels, painter = changed(broken({}), "failed")
         assert len(pixels) == 0
-        assert painter.legend(broken({})) == []
-        assert painter.legend(broken({3: (4.0, 5.0)})) == ["failed robot"]
+        assert list_legend_texts(painter, broken({})) == []
+        assert list_legend_texts(painter, broken({3: (4.0, 5.0)})) == ["failed robot"]
 
     def test_it_is_there_too_before_anything_moves(self):
         frame, painter = drawn(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
@@ -168,9 +168,9 @@ def test_marks_stay_inside_the_picture_of_the_map():
     """What is out of sight below is not drawn over the status line."""
     scene = replace(broken({3: (1.0, 0.0)}, np.array([[4.0, 0.0], [1.0, 1.0]])), selected=0)
     painter = Painter(SQUARE, SIZE)
-    painter.show({"failed", "selection", "status"})
+    painter.show_only({"failed", "selection", "status"})
     painter.camera = painter.camera.pan(0, 4)
-    frame = painter.frame(scene).astype(int)
+    frame = painter.render_frame(scene).astype(int)
     alone, _ = drawn(explained(TWO), "status")
     strip = int(painter.camera.view[1] + painter.camera.view[3]) + 1
     assert SIZE[1] - strip > 20
@@ -183,12 +183,12 @@ def test_unicycles_have_a_nose_where_they_face(theme):
     plain = explained(TWO)
     team = replace(plain.team, track_width=np.array([0.0, 0.16]))
     painter = Painter(SQUARE, SIZE, theme)
-    without = painter.frame(plain).astype(int)
+    without = painter.render_frame(plain).astype(int)
     middle = painter.camera.to_pixels(TWO)[1]
     for heading in (0.0, 0.5 * np.pi, -2.0):
         seen = replace(plain.now.seen, steering=np.array([[heading, 0.0]] * 2))
         turned = replace(plain, team=team, snapshot=replace(plain.now, seen=seen))
-        rows, columns = np.nonzero(np.abs(painter.frame(turned) - without).sum(axis=2) > 60)
+        rows, columns = np.nonzero(np.abs(painter.render_frame(turned) - without).sum(axis=2) > 60)
         nose = np.array([columns.mean(), rows.mean()]) - middle  # the point robot has none
         assert 9.0 < np.hypot(*nose) < 18.0
         assert nose @ [np.cos(heading), -np.sin(heading)] > 0.97 * np.hypot(*nose)

@@ -19,7 +19,7 @@ from robocov_app.render.painter import Painter, choose_scale
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
 def test_a_frame_has_the_size_that_was_asked_for(size):
-    frame = Painter(ROOMS, size).frame(scene_of(run_of(ROOMS, 6)))
+    frame = Painter(ROOMS, size).render_frame(scene_of(run_of(ROOMS, 6)))
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
 
@@ -28,15 +28,19 @@ def test_a_frame_has_the_size_that_was_asked_for(size):
 def test_the_same_scene_gives_the_same_bytes(theme):
     scene = scene_of(run_of(ROOMS, 12))
     first, second = Painter(ROOMS, (800, 600), theme), Painter(ROOMS, (800, 600), theme)
-    assert first.frame(scene).tobytes() == second.frame(scene).tobytes() == first.frame(scene).tobytes()
+    assert (
+        first.render_frame(scene).tobytes()
+        == second.render_frame(scene).tobytes()
+        == first.render_frame(scene).tobytes()
+    )
 
 
 def test_a_frame_is_not_overwritten_by_the_next():
     record = run_of(SQUARE, 4)
     painter = Painter(SQUARE, (320, 240))
-    first = painter.frame(scene_of(record, 5))
+    first = painter.render_frame(scene_of(record, 5))
     kept = first.copy()
-    second = painter.frame(scene_of(record, 30))
+    second = painter.render_frame(scene_of(record, 30))
     assert (first == kept).all()
     assert (first != second).any()
 
@@ -45,7 +49,7 @@ def test_a_frame_is_not_overwritten_by_the_next():
 @pytest.mark.parametrize("size", [(480, 360), (1280, 720), (400, 900)])
 def test_the_whole_region_is_in_the_picture(environment, size):
     painter = Painter(environment, size)
-    painter.frame(scene_of(run_of(environment, 3)))
+    painter.render_frame(scene_of(run_of(environment, 3)))
     corners = painter.camera.to_pixels(environment.region.vertices)
     left, top, width, height = painter.camera.view
     assert (corners[:, 0] >= left + 1).all() and (corners[:, 0] <= left + width - 1).all()
@@ -55,14 +59,14 @@ def test_the_whole_region_is_in_the_picture(environment, size):
 def test_zoomed_world_stays_in_its_view_and_fit_brings_it_back():
     scene = scene_of(run_of(ROOMS, 6))
     painter = Painter(ROOMS, (640, 480))
-    before = painter.frame(scene)
+    before = painter.render_frame(scene)
     strip = int(painter.camera.view[1])
     painter.camera = painter.camera.zoom_at(5.0, (300, 250)).pan(37, -12)
-    zoomed = painter.frame(scene)
+    zoomed = painter.render_frame(scene)
     assert (zoomed != before).any()
     assert (zoomed[:strip] == before[:strip]).all()  # the legend is not drawn over
     painter.fit()
-    assert (painter.frame(scene) == before).all()
+    assert (painter.render_frame(scene) == before).all()
 
 
 @settings(deadline=None, max_examples=40)
@@ -85,10 +89,10 @@ def test_any_zoom_can_be_drawn(factor, pan, at):
         scene, starts=np.ones((2, 2)), trail=np.linspace(np.ones((2, 2)), scene.snapshot.positions, 9)
     )
     painter = Painter(SQUARE, (320, 240))
-    painter.show({layer.name for layer in painter.layers})
-    painter.frame(scene)
+    painter.show_only({layer.name for layer in painter.layers})
+    painter.render_frame(scene)
     painter.camera = painter.camera.zoom_at(factor, at).pan(*pan)
-    assert painter.frame(scene).shape == (240, 320, 3)
+    assert painter.render_frame(scene).shape == (240, 320, 3)
 
 
 @settings(deadline=None, max_examples=15)
@@ -97,10 +101,10 @@ def test_what_is_magnified_is_still_true(factor, x, y):
     """Cells seen through a strong lens: edges that end far outside do not turn."""
     scene = explained(np.array([[1.0, 2.0], [6.0, 7.0], [5.0, 1.0]]))
     painter = Painter(SQUARE, (320, 240))
-    painter.show({"cells"})
-    painter.frame(scene)
+    painter.show_only({"cells"})
+    painter.render_frame(scene)
     painter.camera = replace(painter.camera, center=(x, y)).zoom_at(factor, painter.camera.middle)
-    frame = painter.frame(scene)
+    frame = painter.render_frame(scene)
     grid = np.stack(np.meshgrid(np.arange(4, 320, 13), np.arange(16, 225, 13)), axis=-1).reshape(-1, 2)
     points = painter.camera.to_world(grid + 0.5)
     distances = np.linalg.norm(points[:, None] - scene.snapshot.positions[None], axis=2)
@@ -119,8 +123,8 @@ def test_the_legend_follows_the_colors_of_the_trajectories():
     tops = []
     for colors in ("robots", "paper"):
         painter = Painter(ROOMS, (640, 480), layers=build_standard_layers(colors))
-        painter.show({"legend", "trajectories"})
-        tops.append(painter.frame(scene)[:20].copy())
+        painter.show_only({"legend", "trajectories"})
+        tops.append(painter.render_frame(scene)[:20].copy())
     assert (tops[0] != tops[1]).any()
 
 
@@ -131,7 +135,7 @@ def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():
     painter = Painter(ROOMS, (640, 480))
     painter.draw(window.subsurface((100, 50, 640, 480)), scene)
     pixels = np.frombuffer(pygame.image.tobytes(window, "RGB"), dtype=np.uint8).reshape(600, 900, 3)
-    assert (pixels[50:530, 100:740] == painter.frame(scene)).all()
+    assert (pixels[50:530, 100:740] == painter.render_frame(scene)).all()
     outside = np.ones((600, 900), dtype=bool)
     outside[50:530, 100:740] = False
     assert (pixels[outside] == (1, 2, 3)).all()
@@ -140,10 +144,10 @@ def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():
 def test_a_surface_of_another_size_is_filled():
     painter = Painter(ROOMS, (640, 480))
     scene = scene_of(run_of(ROOMS, 6))
-    painter.frame(scene)
+    painter.render_frame(scene)
     painter.draw(pygame.Surface((800, 500), 0, 32), scene)
     assert painter.size == (800, 500)
-    assert painter.frame(scene).shape == (500, 800, 3)
+    assert painter.render_frame(scene).shape == (500, 800, 3)
 
 
 def test_what_does_not_change_is_drawn_once():
@@ -155,27 +159,27 @@ def test_what_does_not_change_is_drawn_once():
     record = run_of(ROOMS, 6)
     painter = Painter(ROOMS, (640, 480), layers=layers)
     for row in range(10):
-        painter.frame(scene_of(record, row))
+        painter.render_frame(scene_of(record, row))
     assert len(calls) == 1
     painter.camera = painter.camera.pan(3, 0)
-    painter.frame(scene_of(record, 10))
+    painter.render_frame(scene_of(record, 10))
     assert len(calls) == 2
 
 
 def test_kept_pages_follow_what_is_shown():
     scene = scene_of(run_of(ROOMS, 6))
     painter = Painter(ROOMS, (640, 480))
-    with_grid = painter.frame(scene)
+    with_grid = painter.render_frame(scene)
     painter.visible -= {"grid"}
-    without = painter.frame(scene)
+    without = painter.render_frame(scene)
     assert (with_grid != without).any()
     painter.visible |= {"grid"}
-    assert (painter.frame(scene) == with_grid).all()
+    assert (painter.render_frame(scene) == with_grid).all()
 
 
 def test_unknown_layers_are_named_with_the_nearest():
     with pytest.raises(ParameterError, match="did you mean 'cells'"):
-        Painter(ROOMS, (640, 480)).show(["cell"])
+        Painter(ROOMS, (640, 480)).show_only(["cell"])
 
 
 def test_the_scale_grows_with_the_picture():
@@ -220,7 +224,7 @@ for module in ("pygame", "matplotlib"):
 import robocov_app.look.theme, robocov_app.render.camera, robocov_app.runs.encoding
 assert "pygame" not in sys.modules and "matplotlib" not in sys.modules
 from robocov_app.render.painter import Painter
-frame = Painter(ROOMS, (320, 240)).frame(scene_of(run_of(ROOMS, 3)))
+frame = Painter(ROOMS, (320, 240)).render_frame(scene_of(run_of(ROOMS, 3)))
 assert frame.std() > 10
 import pygame
 assert not pygame.display.get_init()
@@ -245,13 +249,13 @@ def test_the_map_does_not_jump_when_what_the_legend_tells_of_comes_and_goes() ->
     there = replace(scene, path=np.array([[1.0, 4.5], [2.0, 4.5]]), failed={9: (3.0, 4.0)})
     painter = Painter(ROOMS, (420, 320))
     painter.visible |= {"path", "links", "velocities"}
-    painter.frame(scene)
+    painter.render_frame(scene)
     few = painter.camera
-    painter.frame(there)
+    painter.render_frame(there)
     many = painter.camera
     assert many.view[1] > few.view[1]
-    painter.frame(scene)
+    painter.render_frame(scene)
     assert painter.camera == many
     painter.visible -= {"links"}
-    painter.frame(scene)
+    painter.render_frame(scene)
     assert painter.camera.view[1] < many.view[1]

@@ -93,7 +93,7 @@ def test_when_all_have_failed_the_map_is_still_drawn() -> None:
     assert scene.snapshot is None
     assert list(scene.failed) == [1, 2]
     painter = Painter(HALL, (320, 240), LIGHT, build_standard_layers(), 1.0)
-    assert painter.frame(scene).std() > 0
+    assert painter.render_frame(scene).std() > 0
     assert plot_trajectories(record).axes
 
 

@@ -56,13 +56,13 @@ class FadingPainter(Painter):
 def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
     """Return a painter of trajectories, and what draws them."""
     painter = FadingPainter(SQUARE, size, theme)
-    painter.show({"trajectories", *also})
+    painter.show_only({"trajectories", *also})
     painter.fade = fade
     return painter, layer_named("trajectories", painter.layers).draw.__self__
 
 
 def frame_of(painter, *scene, **more):
-    return painter.frame(walked(*scene, **more)).astype(int)
+    return painter.render_frame(walked(*scene, **more)).astype(int)
 
 
 def ink(frame, theme=LIGHT):
@@ -339,7 +339,7 @@ class TestFading:
         assert (ink(fades) > 0).sum() < 0.7 * (ink(stays) > 0).sum()
         painter.fade = 1.5
         scene = replace(walked(trail), trail_time=None)  # it cannot, without times
-        assert (painter.frame(scene) == stays).all()
+        assert (painter.render_frame(scene) == stays).all()
 
     def test_a_single_row_or_robots_at_rest_draw_nothing_far_off(self):
         still = np.repeat(walks(1), 30, axis=0)
@@ -374,7 +374,7 @@ def test_pieces_on_the_page_and_new_ones_are_alike(size):
     record = run_of(SQUARE, 3, steps=80)
     painter, _ = painter_of(size=size)
     for row in range(1, 80):
-        frame = painter.frame(scene_of(record, row)).astype(int)
+        frame = painter.render_frame(scene_of(record, row)).astype(int)
     at_once, _ = drawn(scene_of(record), "trajectories", size=size)
     for row in range(4, 74, 2):
         for pixel in painter.camera.to_pixels(record.positions[row]):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_pixels import list_legend_texts
 from shapely import Polygon
 
 from robocov.conditions import Conditions
@@ -168,11 +169,11 @@ def test_the_beliefs_of_the_selected_robot_are_drawn() -> None:
     # The cells of all robots are the true ones, which neither overlap nor leave gaps.
     assert scene.cells is not None
     assert sum(Polygon(cell).area for cell in scene.cells) == pytest.approx(HALL.area)
-    plain = painter.frame(replace(scene, numbers=session.displayed.numbers))
+    plain = painter.render_frame(replace(scene, numbers=session.displayed.numbers))
     selected = replace(scene, numbers=session.displayed.numbers, selected=1)
-    assert (painter.frame(selected) != plain).any(axis=-1).sum() > 200
-    assert "as robot 2 believes" in painter.legend(selected)
-    assert "as robot 2 believes" not in painter.legend(scene)
+    assert (painter.render_frame(selected) != plain).any(axis=-1).sum() > 200
+    assert "as robot 2 believes" in list_legend_texts(painter, selected)
+    assert "as robot 2 believes" not in list_legend_texts(painter, scene)
 
 
 def test_a_saved_run_with_conditions_is_replayed_and_continued(tmp_path: Path) -> None:

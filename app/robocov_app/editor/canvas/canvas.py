@@ -22,7 +22,7 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.look.theme import Theme
-from robocov_app.render import annotations, legend_strip
+from robocov_app.render.annotations import legend_strip, scale_bar
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density_shading import measure_density_range
@@ -115,7 +115,7 @@ class EditorCanvas:
         legend_height = 0
         if "legend" in self.editor.shown:
             legend_height = round((10 + legend_strip.ROW_HEIGHT_PX * self._legend_rows) * scale)
-        view_height = max(height - legend_height - round(annotations.STRIP_HEIGHT_PX * scale), 1)
+        view_height = max(height - legend_height - round(scale_bar.STRIP_HEIGHT_PX * scale), 1)
         return float(left), float(top + legend_height), float(width), float(view_height)
 
     def _update_legend(self, canvas: Canvas) -> None:
@@ -305,17 +305,15 @@ class EditorCanvas:
         """Draw the strip at the foot: scale bar, and facts about the map."""
         box = Rect(self.layout.arena)
         scale = scene.canvas.scale
-        height = round(annotations.STRIP_HEIGHT_PX * scale)
+        height = round(scale_bar.STRIP_HEIGHT_PX * scale)
         strip = Rect(box.left, box.bottom - height, box.width, height)
         canvas = replace(scene.canvas, surface=scene.screen.subsurface(strip))
-        annotations.draw_scale_bar(canvas)
-        bar_width = annotations.choose_bar_length(canvas) * canvas.camera.zoom
-        free_width = box.width - (annotations.EDGE_PX + SCALE_BAR_LABEL_PX) * scale - bar_width
+        scale_bar.draw_scale_bar(canvas)
+        bar_width = scale_bar.choose_bar_length(canvas) * canvas.camera.zoom
+        free_width = box.width - (scale_bar.EDGE_PX + SCALE_BAR_LABEL_PX) * scale - bar_width
         text_size = canvas.scale_text_size(canvas.theme.text)
-        text = shorten_to_width(
-            describe_map(self.editor), text_size, free_width - annotations.EDGE_PX * scale
-        )
-        canvas.draw_text(text, (box.width - annotations.EDGE_PX * scale, height / 2), anchor="right")
+        text = shorten_to_width(describe_map(self.editor), text_size, free_width - scale_bar.EDGE_PX * scale)
+        canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
 
 
 def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:

@@ -10,7 +10,7 @@ from robocov_app.render.scene import Scene
 _MIN_SMOOTH_WIDTH_PX = 20.0
 """Mean width of cells at scale 1 below which their edges are not smooth, which hardly shows."""
 _EDGE_STEPS_PER_PX = 16.0
-"""Corners that are equal after rounding to this fineness count as the same."""
+"""Corners are equal if they are equal after rounding to this fineness."""
 
 
 def _is_colored_by_distance(canvas: Canvas, scene: Scene) -> bool:
@@ -45,7 +45,9 @@ def _choose_fills(canvas: Canvas, scene: Scene) -> list[Color | None]:
     if _is_colored_by_distance(canvas, scene):
         return [None] * len(scene.cells)
     tints = [canvas.theme.get_cell_color(hue) for hue in range(len(canvas.theme.robots))]
-    hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
+    hues = canvas.hues
+    if scene.cell_owners is not None:
+        hues = hues[scene.cell_owners]
     return [tints[hue] for hue in hues.tolist()]
 
 

@@ -122,7 +122,9 @@ def _build_premultiplied_table(theme: Theme) -> NDArray[np.uint8]:
 def build_density_legend(scene: Scene) -> list[LegendEntry]:
     """Build the legend of a density that is not uniform."""
     text = describe_density(scene.environment)
-    return [build_density_entry(text)] if text else []
+    if not text:
+        return []
+    return [build_density_entry(text)]
 
 
 def build_density_entry(text: str) -> LegendEntry:

@@ -40,10 +40,9 @@ class KnownObstaclesLayer:
         """Draw the obstacles that are known at the time of a scene."""
         assert scene.sensed is not None
         points, robots = scene.sensed.get_until(scene.now.time)
-        selected = None if scene.selected is None else scene.get_number(scene.selected)
         if not self._is_continued(canvas, scene, points):
             self._start_page(canvas, scene)
-        self._add_points(canvas, points, robots, selected)
+        self._add_points(canvas, points, robots, _get_selected_number(scene))
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         discovered = get_discovered_map(scene)
         if discovered is not None:
@@ -89,7 +88,6 @@ class KnownObstaclesLayer:
 
 def _build_key(canvas: Canvas, scene: Scene) -> tuple[object, ...]:
     """Return the properties that the page depends on in addition to the points."""
-    selected = None if scene.selected is None else scene.get_number(scene.selected)
     return (
         canvas.camera,
         canvas.theme.name,
@@ -97,8 +95,15 @@ def _build_key(canvas: Canvas, scene: Scene) -> tuple[object, ...]:
         canvas.surface.get_size(),
         tuple(canvas.surface.get_clip()),
         canvas.visible_layers,
-        selected,
+        _get_selected_number(scene),
     )
+
+
+def _get_selected_number(scene: Scene) -> int | None:
+    """Return the number of the selected robot; None if no robot is selected."""
+    if scene.selected is None:
+        return None
+    return scene.get_number(scene.selected)
 
 
 def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
@@ -110,7 +115,9 @@ def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
     if scene.selected >= len(maps):
         return None
     known_map = maps[scene.selected]
-    return known_map if isinstance(known_map, DiscoveredMap) else None
+    if not isinstance(known_map, DiscoveredMap):
+        return None
+    return known_map
 
 
 def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:

@@ -72,28 +72,34 @@ def draw_centroids(canvas: Canvas, scene: Scene) -> None:
 def build_centroids_legend(scene: Scene) -> list[LegendEntry]:
     """Build the legend of centroids or goals, whichever are drawn."""
     name, _ = _choose_targets(scene)
-    return [LegendEntry(name, _build_cross_glyph(name))] if name else []
+    if not name:
+        return []
+    return [LegendEntry(name, _build_cross_glyph(name))]
 
 
 def _choose_targets(scene: Scene) -> tuple[str, Array]:
-    """Return the name and positions, (n, 2) m, of what robots head for: centroids, if goals equal them.
+    """Return the name and the positions of targets, (n, 2) m: centroids, if the goals equal them, or goals.
 
     The name is empty if there are no goals.
     """
-    goals = None if scene.snapshot is None else scene.snapshot.decision.goals
-    if goals is None or scene.centroids is None:
+    if scene.snapshot is None or scene.centroids is None:
         return "", np.empty((0, 2))
-    cells = scene.now.decision.cells
-    # Robots that do not hear all others compute other cells than the drawn ones. With the centroids of the
-    # drawn ones, the name would change with each lost message.
-    centroids = scene.centroids if cells is None else cells.centroid
+    goals = scene.snapshot.decision.goals
+    if goals is None:
+        return "", np.empty((0, 2))
+    centroids = scene.centroids
+    cells = scene.snapshot.decision.cells
+    if cells is not None:
+        # Robots that do not receive all messages compute other cells than the drawn ones. With the centroids
+        # of the drawn ones, the name would change with each lost message.
+        centroids = cells.centroid
     if centroids.shape == goals.shape and are_centroids(goals, centroids):
         return legend.CELL_CENTROID, scene.centroids
     return legend.GOAL, goals
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
-    """Draw a times sign at each goal, joined to its robot."""
+    """Draw a times sign at each goal, connected with its robot."""
     if scene.now.decision.goals is None:
         return
     goals = canvas.camera.to_pixels(scene.now.decision.goals)
@@ -108,8 +114,12 @@ def _build_cross(canvas: Canvas, name: str, arm: float) -> Sprite:
     """Return the mark of centroids or goals; `arm` is half its size, px."""
     theme = canvas.theme
     is_goal = name == legend.GOAL
-    color = theme.final if is_goal else theme.ink
-    width = min(1.8 * canvas.scale, 0.4 * arm) if is_goal else min(1.3 * canvas.scale, 0.3 * arm)
+    if is_goal:
+        color = theme.final
+        width = min(1.8 * canvas.scale, 0.4 * arm)
+    else:
+        color = theme.ink
+        width = min(1.3 * canvas.scale, 0.3 * arm)
     return partial(
         sprites.render_cross,
         arm,

@@ -23,7 +23,9 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
     is_dashed = kind == "communication"
 
     def get_ranges(scene: Scene) -> Array:
-        return scene.team.communication_range if is_dashed else scene.team.sensing_range
+        if kind == "communication":
+            return scene.team.communication_range
+        return scene.team.sensing_range
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         centers = canvas.camera.to_pixels(scene.now.positions).tolist()
@@ -75,7 +77,7 @@ build_links_legend = build_legend("neighbors", _draw_link_symbol)
 
 
 def draw_obstacle_points(canvas: Canvas, scene: Scene) -> None:
-    """Draw the nearest obstacle point of each robot that senses one, joined to the robot."""
+    """Draw the nearest obstacle point of each robot that senses one, connected with the robot."""
     points = canvas.camera.to_pixels(scene.now.seen.obstacle_points)
     centers = canvas.camera.to_pixels(scene.now.positions)
     is_sensed = np.isfinite(points).all(axis=1)

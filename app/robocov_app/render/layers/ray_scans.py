@@ -50,7 +50,7 @@ class _Scan(NamedTuple):
 
 
 def draw_dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
-    """Draw dots; where several have the same place, only one.
+    """Draw dots, one for all at the same quarter of a pixel.
 
     Parameters
     ----------

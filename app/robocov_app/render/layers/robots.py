@@ -229,7 +229,7 @@ def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
 
 
 def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions: list[list[float]]) -> None:
-    """Draw where a robot believes itself and its neighbors, joined to their true positions, px."""
+    """Draw the positions of a robot and its neighbors as it believes, connected with the true ones, px."""
     seen = scene.now.seen
     robots = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
     believed = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])

@@ -41,7 +41,9 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
 
 def _choose_grid_step(min_step: float) -> float:
     step = round_down(min_step)
-    return step if step >= min_step else round_down(_NEXT_ROUND_LENGTH * step)
+    if step >= min_step:
+        return step
+    return round_down(_NEXT_ROUND_LENGTH * step)
 
 
 def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordinate: float) -> None:

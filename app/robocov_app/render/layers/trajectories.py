@@ -31,7 +31,7 @@ _MIN_MOVE_PX = 1.0
 """Robots that have moved less have no trajectory yet."""
 
 Path: TypeAlias = list[list[float]]
-"""Corners of a trajectory, px; a path that is a single nan is that of an absent robot."""
+"""Corners of a trajectory, px; that of an absent robot is a single nan."""
 
 
 class _Section(NamedTuple):
@@ -84,8 +84,11 @@ class TrajectoriesLayer:
         self._extend_paths(_to_limited_pixels(canvas, trail[self._n_drawn_rows :]))
         self._n_drawn_rows = len(trail)
         self._last_row = trail[-1].copy()
-        sections = self._finish_sections(1 + SECTION_PX / MIN_STEP_PX if is_continued or is_fading else 2)
-        self._draw_sections(sections, pen, can_merge=not is_continued and not is_fading)
+        is_new_page = not is_continued and not is_fading
+        min_corners = 1 + SECTION_PX / MIN_STEP_PX
+        if is_new_page:
+            min_corners = 2
+        self._draw_sections(self._finish_sections(min_corners), pen, can_merge=is_new_page)
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
 
@@ -143,7 +146,7 @@ class TrajectoriesLayer:
                 last[has_moved] = row[has_moved]
 
     def _finish_sections(self, min_corners: float) -> list[_Section]:
-        """Return ended paths and those with a number of corners, which go on from their last corner."""
+        """Return ended paths, and those with a number of corners, which continue at their last corner."""
         sections = [section for section in self._ended if len(section.path) > 1]
         self._ended.clear()
         for robot, path in enumerate(self._open_paths):

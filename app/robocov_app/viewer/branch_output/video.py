@@ -116,7 +116,7 @@ class _FrameDrawer:
         frames: list[Frame] = []
         for pane, name in zip(run.panes, names, strict=True):
             painter = self._get_painter(run, pane)
-            frames.append(painter.frame(build_pane_scene(pane, self.costs, name)))
+            frames.append(painter.render_frame(build_pane_scene(pane, self.costs, name)))
         theme = self.settings.color_theme
         page = frames[0] if self.layout is None else self.layout.compose_page(frames, theme)
         size = (self.picture_size[0], self.caption_height)
@@ -144,7 +144,7 @@ class _FrameDrawer:
             size = self.layout.pane
             scale = self.layout.scale
         painter = Painter(run.scenario.environment, size, settings.color_theme, layers, scale)
-        painter.change(settings.shown_layers, settings.hidden_layers)
+        painter.change_visible(settings.shown_layers, settings.hidden_layers)
         return painter
 
 

@@ -14,7 +14,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density_text import format_cost, get_cost_name
-from robocov_app.render.distance_colors import choose_color_limit
+from robocov_app.render.distance_map.colors import choose_color_limit
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.painter import Painter
@@ -306,5 +306,5 @@ class ViewerCanvas:
         # A pane that was just added has no scene yet.
         pairs = zip(self._painters, self._scenes, strict=False)
         return merge_legends(
-            (painter.legend_entries(scene) for painter, scene in pairs), lambda entry: entry.key
+            (painter.list_legend_entries(scene) for painter, scene in pairs), lambda entry: entry.key
         )

@@ -4,8 +4,8 @@ import pygame
 
 from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import Theme
+from robocov_app.render.annotations.legend_strip import arrange_legend_rows, render_legend_strip
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.legend_strip import arrange_legend_rows, render_legend_strip
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.window.layout import Layout
 

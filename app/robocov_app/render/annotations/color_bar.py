@@ -4,9 +4,9 @@ import numpy as np
 import pygame
 
 from robocov_app.look.lengths import format_scale_length
-from robocov_app.render.annotations import STRIP_HEIGHT_PX
+from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.distance_colors import list_color_ticks
+from robocov_app.render.distance_map.colors import list_color_ticks
 from robocov_app.render.pixel_arrays import build_surface
 from robocov_app.render.scene import Scene
 

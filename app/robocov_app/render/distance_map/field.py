@@ -14,14 +14,14 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
-from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.distance_map.lattice import FieldLattice
 
 _MIN_BORDER_ANGLE = 0.05
 """Minimum angle between the directions to two robots, rad, so that borders stay thin."""
 _BLOCK_PX = 4
 """Side of the blocks of pixels that are evaluated at their middle first."""
 _MAX_CANDIDATES = 5
-"""Maximum number of paths among which a point chooses."""
+"""Maximum number of paths that are compared at a point."""
 _TOLERANCE_STEPS = 1e-9
 _MIN_LENGTH_M = 1e-12
 
@@ -120,7 +120,7 @@ class DistanceField:
         return _Candidates(indices, sites, is_free)
 
     def _compute_distances(self, sites: IntArray, x: Array, y: Array) -> Array:
-        """Return the lengths of the paths of sites, m, if they lead to other points instead."""
+        """Return the lengths of the paths of sites if they ended at other points instead, m."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._lengths_to_bend[sites])
@@ -149,7 +149,9 @@ class DistanceField:
     def max_distance(self) -> float:
         """The largest distance of a site that a robot can reach, m; nan if there is none."""
         reached = self.result.distances[self._owners >= 0]
-        return float(reached.max()) if len(reached) else float("nan")
+        if not len(reached):
+            return float("nan")
+        return float(reached.max())
 
     def compute_distances(self, x: Array, y: Array) -> Array:
         """Compute the distances of a grid of points.
@@ -277,7 +279,7 @@ class DistanceField:
         return BorderPixels(rows, columns, nearest_owners, gaps)
 
     def _compute_directions(self, sites: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the unit vectors, dx and dy, of the last parts of paths to points."""
+        """Return the unit vectors, dx and dy, of the last segments of paths to points."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
         lengths = np.maximum(np.hypot(dx, dy), _MIN_LENGTH_M)
