@@ -182,6 +182,8 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
         loader = _TextLoader(source.path, source.text)
         path = source.path
         modules = source.modules
+    if not modules:
+        _add_import_folder(Path(path).parent)
     # Each file gets its own name, so two files called mine.py do not replace each other.
     module_name = f"{_MODULE_PREFIX}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
@@ -191,6 +193,15 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
     with provide_modules(modules):
         spec.loader.exec_module(module)
     return module
+
+
+def _add_import_folder(folder: Path) -> None:
+    """Let a user's file import modules beside it, as Python does for scripts.
+
+    The folder is the last one on ``sys.path``, so that none of its modules replaces an installed one.
+    """
+    if folder.is_dir() and str(folder) not in sys.path:
+        sys.path.append(str(folder))
 
 
 def _list_own_classes(module: ModuleType) -> list[str]:

@@ -63,6 +63,22 @@ def test_all_modules_of_the_author_are_found_without_running_them(folder: Path) 
     assert pickle.loads(pickle.dumps(ControllerSource("mine.py", CONTROLLER, modules))).modules == modules
 
 
+def test_a_controller_imports_modules_beside_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "helper_d.py").write_text("SCALE = 2.0\n")
+    (tmp_path / "numpy.py").write_text("raise RuntimeError('an installed package was replaced')\n")
+    text = (
+        "from dataclasses import dataclass\nimport numpy\nfrom helper_d import SCALE\n"
+        "@dataclass(frozen=True)\nclass Mine:\n    def force(self, own): return SCALE * own.position\n"
+    )
+    (tmp_path / "mine.py").write_text(text)
+    controller_class = load_controller_class(f"{tmp_path}/mine.py:Mine")
+    assert vars(sys.modules[controller_class.__module__])["SCALE"] == 2.0
+    assert list(find_own_modules(text)) == ["helper_d"]
+
+
 def test_installed_packages_are_left_out(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "site-packages").mkdir()
     (folder / "site-packages" / "installed_c.py").touch()
