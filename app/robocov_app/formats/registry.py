@@ -234,7 +234,7 @@ def detect_format(path: str | Path) -> Importer:
         if importer.sniff(path, head):
             return importer
     with_suffix = [importer for importer in IMPORTERS.values() if path.suffix.lower() in importer.suffixes]
-    if len(with_suffix) == 1:  # its reader describes best what is missing
+    if len(with_suffix) == 1:  # its reader gives the most helpful message
         return with_suffix[0]
     expected = f"expected one of {', '.join(IMPORTERS)}"
     raise MapError(f"{to_one_line(path)}: unknown format ({describe_head(head)}), {expected}")

@@ -70,7 +70,7 @@ class ImportReport(_Report):
     moved_area : float, m²
         Area that the simplification made free or solid.
     moved : float, m
-        Largest distance by which it moved a wall: the Hausdorff distance of what remained.
+        Largest distance by which it moved a wall that was kept: a Hausdorff distance.
     removed, removed_area : int, float m²
         Hairs, that is slits and spurs thinner than the decimals of a map.
     others : tuple of (x, y), m

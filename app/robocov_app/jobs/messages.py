@@ -52,7 +52,7 @@ class Channel:
     """Channel of a service while it works: newer questions in, progress out."""
 
     def get_newer_questions(self) -> list[Any]:
-        """Return the questions that have arrived since the service began to work."""
+        """Return the questions that have arrived since the service started to work."""
         return []
 
     def report_progress(self, progress: object) -> None:

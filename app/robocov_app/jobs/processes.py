@@ -75,7 +75,9 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
     reply = receive(process.stdout)
     while reply == READY:
         reply = receive(process.stdout)
-    return reply if isinstance(reply, Reply) else None
+    if not isinstance(reply, Reply):
+        return None
+    return reply
 
 
 def end_process(process: subprocess.Popen[bytes]) -> int:

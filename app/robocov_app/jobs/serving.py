@@ -29,7 +29,7 @@ class _PipeChannel(Channel):
         self._number = 0
 
     def get_newer_questions(self) -> list[Any]:
-        """Return the questions that have arrived since the service began to work."""
+        """Return the questions that have arrived since the service started to work."""
         return [question for _, question in self._questions]
 
     def report_progress(self, progress: object) -> None:
@@ -64,7 +64,7 @@ class _PipeChannel(Channel):
 
 
 def serve(service: str) -> None:
-    """Answer questions until the standard input ends, which it does however the program ends.
+    """Answer questions until the standard input ends, as it does even if the program crashes.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _prepare_process() -> None:
 
 
 def _take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes, and let code that is called read nothing and print to standard error."""
+    """Return the pipes; the standard streams of other code are empty input and standard error."""
     source = os.fdopen(os.dup(0), "rb")
     target = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)

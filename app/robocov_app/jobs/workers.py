@@ -19,7 +19,7 @@ _Answer = TypeVar("_Answer")
 
 
 class LatestWorker(Generic[_Answer]):
-    """A service in a process of its own, which a question starts, also after it has died.
+    """A service in a process of its own; a question starts it if it is not running.
 
     Parameters
     ----------
@@ -72,7 +72,9 @@ class LatestWorker(Generic[_Answer]):
     def progress(self) -> Any:
         """Progress of the newest question, as the service reports it; None if it has not yet."""
         latest = self._progress
-        return latest.answer if latest is not None and latest.number == self._number else None
+        if latest is None or latest.number != self._number:
+            return None
+        return latest.answer
 
     def put(self, question: object) -> None:
         """Ask a question. Older questions without an answer are dropped.
@@ -123,8 +125,11 @@ class LatestWorker(Generic[_Answer]):
         """
         if self.process is None:
             return None
-        has_ended = self._has_ended  # before the replies are looked at: the last one may still be there
-        reply = self._replies.pop() if self._replies else None
+        # Read before the replies, because the last one may arrive just before the process ends.
+        has_ended = self._has_ended
+        reply = None
+        if self._replies:
+            reply = self._replies.pop()
         if reply is not None:
             self._answered_number = reply.number
             self.problem = reply.problem
@@ -133,13 +138,18 @@ class LatestWorker(Generic[_Answer]):
             self._answered_number = self._number
             self.problem = f"the process that {self._task} has ended{self._describe_end()}"
             return None
-        return None if reply is None else reply.answer
+        if reply is None:
+            return None
+        answer: _Answer | None = reply.answer
+        return answer
 
     def _describe_end(self) -> str:
         """Return how the process has ended, and whether that was while it started."""
         assert self.process is not None
         status = self.process.poll()
-        description = "" if status is None else f" ({describe_status(status)})"
+        description = ""
+        if status is not None:
+            description = f" ({describe_status(status)})"
         if not self._is_ready:
             description += " while starting"
         return description
@@ -189,7 +199,7 @@ class LatestWorker(Generic[_Answer]):
                         reply = Reply(reply.number, wire.decode(reply.answer), reply.problem)
                     self._replies.append(reply)
         except Exception:
-            # Nor must an answer that cannot be read be waited for.
+            # An answer that cannot be read must not be waited for either.
             traceback.print_exc()
         finally:
             self._has_ended = True
@@ -228,9 +238,12 @@ class DirectWorker(Generic[_Answer]):
 
     def poll(self) -> _Answer | None:
         """Return the answer to the last question, once; None if there is none."""
-        answer = self._answer
+        encoded = self._answer
         self._answer = None
-        return None if answer is None else self._wire.decode(answer)
+        if encoded is None:
+            return None
+        answer: _Answer = self._wire.decode(encoded)
+        return answer
 
     def close(self) -> None:
         """Do nothing, because there is no process to end."""

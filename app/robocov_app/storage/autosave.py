@@ -233,10 +233,13 @@ class Autosaver:
     def _write(self, path: Path | None, content: _Content | None) -> None:
         """Write a draft of a document in a file."""
         assert self._folder is not None
+        encoded_path = None
+        if path is not None:
+            encoded_path = _encode_path(path.absolute())
         record: dict[str, Any] = {
             "format": self._kind,
             "version": 1,
-            "path": None if path is None else _encode_path(path.absolute()),
+            "path": encoded_path,
             "when": datetime.now().astimezone().isoformat(timespec="seconds"),
         }
         if content is not None:
@@ -308,8 +311,11 @@ def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | 
         # A draft that is in use, or cannot be read, is left alone.
         with suppress(Exception):
             with lock_folder(draft_folder):
-                draft = read_draft(draft_folder, kind) if (draft_folder / _FILE_NAME).exists() else None
-                work = None if draft is None else read(draft)
+                draft: Draft | None = None
+                work: _Work | None = None
+                if (draft_folder / _FILE_NAME).exists():
+                    draft = read_draft(draft_folder, kind)
+                    work = read(draft)
             if draft is not None and work is not None:
                 dated_works.append((draft.when, work))
             elif time.time() - draft_folder.stat().st_mtime > _MIN_ABANDONED_AGE_S:
@@ -387,7 +393,9 @@ def read_draft(folder: Path, kind: str) -> Draft:
     header = ("format", "version", "path", "when")
     content = {name: record[name] for name in record if name not in header}
     try:
-        path = None if record["path"] is None else _decode_path(record["path"])
+        path = None
+        if record["path"] is not None:
+            path = _decode_path(record["path"])
         return Draft(folder, path, datetime.fromisoformat(record["when"]).astimezone(), content)
     except (TypeError, ValueError, KeyError, OverflowError, OSError) as error:
         raise MapError(f"{file}: not a complete {kind}: {error}") from None
@@ -404,7 +412,7 @@ def _encode_path(path: Path) -> str | dict[str, str]:
 
 
 def _decode_path(encoded: Any) -> Path:
-    """Return the path; raises TypeError, ValueError or KeyError if there is none."""
+    """Return a path from JSON content; raise TypeError, ValueError or KeyError if it is none."""
     if isinstance(encoded, dict):
         return Path(os.fsdecode(bytes.fromhex(encoded["bytes"])))
     return Path(encoded)

@@ -21,7 +21,9 @@ def find_settings_file(name: str = "window.json") -> Path | None:
     """Return the file of settings; None if there are none."""
     default_folder = str(user_config_path("robocov", appauthor=False))
     folder = os.environ.get(FOLDER_VARIABLE, default_folder)
-    return Path(folder) / name if folder else None
+    if not folder:
+        return None
+    return Path(folder) / name
 
 
 def load_settings(kind: type[SettingsType], file: Path | None) -> tuple[SettingsType, str]:

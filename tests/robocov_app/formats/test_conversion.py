@@ -212,8 +212,8 @@ def test_where_robots_do_not_get() -> None:
     rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
     _, report = build_environment(foreign(rooms), Shaping(), "plan")
     (note,) = report.notes
-    assert note.startswith("1 place of 6.8")
-    assert note.endswith("m² no robot of radius 0.1 m reaches from the largest one")
+    assert note.startswith("1 part of 6.8")
+    assert note.endswith("m² cannot be reached by a robot of radius 0.1 m from the largest one")
     assert build_environment(foreign(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
 
 
@@ -223,7 +223,7 @@ def test_where_robots_do_not_get() -> None:
         ((), {}, "plan: there is no free space"),
         ((Polygon([(0, 0), (1, 1), (2, 2)]),), {}, "plan: there is no free space"),
         ((box(0, 0, 9, 0.15),), {}, "(the widest is for one of 0.0735 m): is the scale right?"),
-        ((ROOM,), {"radius": 30.0}, "plan: no place is wide enough for a robot of radius 30 m"),
+        ((ROOM,), {"radius": 30.0}, "plan: no position has enough clearance for a robot of radius 30 m"),
         ((box(0, 0, 1e-4, 1e-4),), {}, "is the scale right?"),
         ((box(0, 0, 20_000, 9),), {}, "boundary: expected at most 10 km"),
         ((box(0, 0, 1, 1),), {"keep": "all", "specks": 5.0}, "1 m², expected one of at least 5 m²"),

@@ -343,7 +343,7 @@ def draw_many_entities(document: Any, space: Any) -> None:
         (b"0\nSECTION\n" + b"1\n\n" * 4_000_100, "expected at most 8000000"),
         (draw_recursive_block, "block 'a' is inserted into itself"),
         (draw_bomb, "expected at most 200000, got "),
-        (draw_many_entities, "entities to be drawn, blocks and all"),
+        (draw_many_entities, "entities to be drawn, including those in blocks"),
         (draw_nested_blocks, "blocks are nested deeper than 32"),
         (lambda d, m: m.add_line((0, 0), (1e300, 0)), "expected coordinates"),
         (lambda d, m: m.add_line((0, 0), (math.nan, 0)), "expected coordinates"),

@@ -162,10 +162,10 @@ def test_only_what_was_asked_for() -> None:
 
 def test_what_is_nothing_is_told() -> None:
     found = shapes(HALL, [[0, 0], [1, 0], [2, 0]], lines=[[[1, 1], [1, 1]]])
-    found.tally.add_heights(np.array([np.nan, 2.0, 3.5]))
+    found.omissions.add_heights(np.array([np.nan, 2.0, 3.5]))
     found.leave_out("text", count=2)
     found.leave_out("empty geometry", count=2)
-    found.tally.mended["ring", "closed"] += 2
+    found.repairs.counts["ring", "closed"] += 2
     foreign = taken(found)
     assert foreign.dropped == (
         "2 empty geometries",

@@ -122,7 +122,7 @@ def test_the_starts(tmp_path: Path) -> None:
         (plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "verts: expected an outline with an area"),
         (plan([[0, 0], [0, 0], [1, 1]]), "verts: expected at least 3"),
         (plan([[0, 0], [1, 1], [3, 3]]), "verts: expected an outline with an area"),
-        (plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no place is wide enough for a robot"),
+        (plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no position has enough clearance for a robot"),
         (plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
     ],
 )

@@ -221,7 +221,7 @@ def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
         ),
         (floats([[0.0, 255.0]]), "floating-point samples from 0 (black) to 1 (white), got 0 to 255"),
         (floats([[math.nan, math.inf]]), "samples from 0 (black) to 1 (white), got none that is a number"),
-        (save_picture(Image.new("I", (3, 3)), "TIFF"), "samples of up to 16 bits without a sign, got others"),
+        (save_picture(Image.new("I", (3, 3)), "TIFF"), "unsigned samples of up to 16 bits"),
     ],
     ids=["heights", "bytes", "nan", "whole"],
 )

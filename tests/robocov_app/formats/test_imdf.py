@@ -153,7 +153,7 @@ def test_without_openings_units_are_open_to_each_other(tmp_path: Path) -> None:
     foreign = read(as_folder(tmp_path / "mill", given))
     part = next(part for part in moved(foreign.free).geoms if part.contains(Point(1, 10)))
     assert part.contains(Point(5, 15)) and part.contains(Point(25, 16))
-    assert "no door or opening on this level: 3 rooms are open to what adjoins" in foreign.notes
+    assert "no door or opening on this level: 3 rooms are open to adjacent spaces" in foreign.notes
 
 
 def bomb() -> bytes:

@@ -121,7 +121,7 @@ obstacle:
         "10 obstacles that IR-SIM places at random",
         "1 obstacle that nothing collides with",
         "5 robots that IR-SIM places at random",
-        "2 shapes by chance",
+        "2 shapes of random form",
     )
     assert foreign.notes == ("1 obstacle with kinematics taken as standing where the file has them",)
     assert read(tmp_path, text, skip=("posts",)).free.equals(SPACE)

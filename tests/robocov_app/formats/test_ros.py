@@ -334,7 +334,7 @@ def test_options_of_other_formats(tmp_path: Path) -> None:
         ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"
     ):
         import_map(path, options=ReadOptions(trees="free"))
-    with pytest.raises(ParameterError, match=r"--threshold: of no use here: .*plan\.yaml is of mode trinary"):
+    with pytest.raises(ParameterError, match=r"--threshold: not applicable: .*plan\.yaml is of mode trinary"):
         import_map(path, options=ReadOptions(threshold=0.4))
     with pytest.raises(ParameterError, match="unknown format 'rose': did you mean 'ros'"):
         import_map(path, format="rose")

@@ -123,13 +123,14 @@ def test_robots_are_places_to_start_and_sensors_are_nothing(tmp_path: Path) -> N
     foreign = read(tmp_path, text)
     assert foreign.robots == ((2.0, -2.0), (-9.5, 4.5))
     assert foreign.free.area == pytest.approx(100)
-    assert foreign.dropped == ("1 laser", "1 model that nothing meets")
+    assert foreign.dropped == ("1 laser", "1 model that nothing collides with")
     environment, report, _ = import_map(tmp_path / "hall.world")
     # one of them stands in the triangle
     assert environment.starts["robots"] == PointsStart(((2.0, -2.0),))
     assert list(environment.starts)[-1] == "robots"
     assert (
-        'start "robots": 1 of 2 places of robots in the file; there is no room at the others' in report.notes
+        'start "robots": 1 of 2 positions of robots in the file; robots do not fit at the others'
+        in report.notes
     )
     # names are those of models and of their macros
     assert read(tmp_path, text, skip=("pioneer",)).robots == ()
@@ -158,7 +159,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("model (\n", ":1: expected a \\) after what begins here"),
+        ("model (\n", ":1: expected a \\) to close this bracket"),
         ("model ( )\n)", ":2: expected the name of a model"),
         ("model ( pose [1 2 0 0 )", ":1: expected a \\] after its values"),
         ("model ( pose [1 x 0 0] )", ":1: expected a value"),

@@ -98,14 +98,14 @@ def test_nested_outlines_are_free_and_solid_by_turns(tmp_path: Path) -> None:
     )
     foreign = read_shapes(tmp_path, boxes, outlines="nested")
     assert foreign.free.area == pytest.approx(60 - 32 + 12)
-    assert any("an odd number of outlines is free, 40 m²" in note for note in foreign.notes)
+    assert any("an odd number of outlines are free, 40 m²" in note for note in foreign.notes)
     # double lines: the walls between them are the smaller area
     double = '<rect width="10" height="6"/>' + "".join(
         f'<rect x="{x}" y="0.2" width="4.7" height="5.6"/>' for x in (0.2, 5.1)
     )
     walls = read_shapes(tmp_path, double, outlines="nested")
     assert walls.free.area == pytest.approx(2 * 4.7 * 5.6)
-    assert any("an even number of outlines is free" in note for note in walls.notes)
+    assert any("an even number of outlines are free" in note for note in walls.notes)
 
 
 def test_nested_outlines_within_a_named_boundary_begin_solid(tmp_path: Path) -> None:

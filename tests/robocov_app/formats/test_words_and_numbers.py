@@ -17,7 +17,7 @@ from robocov_app.formats.geometry.conversion.map_layout import build_boundary
 from robocov_app.formats.geometry.curves import flatten_beziers
 from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
-from robocov_app.formats.import_tally import format_plural
+from robocov_app.formats.omissions import format_plural
 from robocov_app.formats.preview.plotting import _format_number
 from robocov_app.formats.reports import format_area
 from robocov_app.formats.unsupported import describe_unsupported_file

@@ -98,7 +98,7 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
 
 
 def get_map_name(path: Path) -> str:
-    """Return the name of a map whose file does not name it."""
+    """Return a name for a map whose file contains none."""
     return to_one_line(path.stem)[:_MAX_NAME_CHARACTERS] or "map"
 
 

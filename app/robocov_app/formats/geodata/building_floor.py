@@ -134,7 +134,7 @@ def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, des
         raise MapError(f"{shapes.where}: expected spaces with an area on this level, got none")
     if not openings and spaces.walled:
         rooms = "a room is" if spaces.walled == 1 else f"{spaces.walled} rooms are"
-        shapes.notes.append(f"no door or opening on this level: {rooms} open to what adjoins")
+        shapes.notes.append(f"no door or opening on this level: {rooms} open to adjacent spaces")
         spaces.outlines = []
     edges = [ring for area in spaces.areas for ring in _get_rings(area)]
     CrossingCounter(shapes.where).add([*edges, *spaces.outlines])

@@ -395,7 +395,7 @@ def _format_shape(
 
 
 def _build_plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
-    """Return the plane about an origin, unless longitudes run all around on the map."""
+    """Return the plane about an origin; raise ParameterError if the map spans too many longitudes."""
     longitude, latitude = origin
     try:
         plane = LocalPlane(import_optional("pyproj", "geo"), longitude, latitude)
@@ -403,6 +403,6 @@ def _build_plane(environment: Environment, origin: tuple[float, float]) -> Local
         raise ParameterError(f"origin: degrees need more: {error}") from None
     corners = plane.to_degrees(np.array(environment.boundary, dtype=float))
     if np.ptp(corners[:, 0]) >= 180.0:
-        expected = "expected a place farther from the pole"
-        raise ParameterError(f"origin: {quote(origin)}: longitudes run all around on the map, {expected}")
+        problem = "the map would span half of all longitudes: expected a position farther from the pole"
+        raise ParameterError(f"origin: {quote(origin)}: {problem}")
     return plane

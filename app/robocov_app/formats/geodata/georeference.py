@@ -133,7 +133,7 @@ def _project(
     points = _join_points(geometries)
     if system not in _SYSTEMS_IN_DEGREES:
         points = _transform_to_degrees(pyproj, points, system, shapes.where)
-    is_on_globe = (np.abs(points) <= _MAX_DEGREES).all(axis=1)  # what cannot be projected is inf
+    is_on_globe = (np.abs(points) <= _MAX_DEGREES).all(axis=1)  # points that cannot be projected are inf
     if not is_on_globe.all():
         x, y = _join_points(geometries)[int(np.argmin(is_on_globe))].tolist()
         expected = f"coordinates of {system}"

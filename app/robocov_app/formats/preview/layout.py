@@ -40,7 +40,7 @@ class Caption(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """The place of an arena.
+    """The position of an arena.
 
     Attributes
     ----------

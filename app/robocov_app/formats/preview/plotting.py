@@ -101,7 +101,8 @@ def plot_import(
         for panel, caption in zip(layout.panels, captions, strict=True):
             _write_caption(layout.page, caption, panel.box[0], panel.box[1], panel.caption_width)
         boxes = [panel.box for panel in layout.panels]
-        before, after = (layout.page.add_map_axes(box, *comparison.bounds) for box in boxes)
+        before = layout.page.add_map_axes(boxes[0], *comparison.bounds)
+        after = layout.page.add_map_axes(boxes[1], *comparison.bounds)
         _draw_before(before, comparison, report, theme)
         draw_map(after, environment, theme)
         _draw_area(after, comparison.opened, theme.start, theme.start, _MARK_OPACITY)

@@ -25,10 +25,10 @@ from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 1.0
 """Side of a cell if no option gives it: the format has no unit."""
-_PASSABLE_LETTERS = b".GS"
-_SOLID_LETTERS = b"@O"
-_UNKNOWN_LETTER = 255
-"""Value in the table of letters for those that the format does not have."""
+_PASSABLE_CHARACTERS = b".GS"
+_SOLID_CHARACTERS = b"@O"
+_UNKNOWN_CHARACTER = 255
+"""Value in the table of characters for those that the format does not have."""
 _BLANKS = b" \t\r"
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MAX_HEADER_LINES = 19
@@ -72,13 +72,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
     content = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(_BYTE_ORDER_MARK)
     header = _parse_header(content, where)
-    letters = _parse_rows(header, where)
-    cells = _build_letter_table(options)[letters]
-    is_unknown = cells == _UNKNOWN_LETTER
+    characters = _parse_rows(header, where)
+    cells = _build_character_table(options)[characters]
+    is_unknown = cells == _UNKNOWN_CHARACTER
     if is_unknown.any():
         row, column = np.argwhere(is_unknown)[0].tolist()
         place = f"{where}: line {header.body_line + row}, column {column + 1}"
-        raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(letters[row, column]))}")
+        raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(characters[row, column]))}")
     cell = get_or_default(options.cell, DEFAULT_CELL_M)
     notes: tuple[str, ...] = ()
     if options.cell is None:
@@ -93,11 +93,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     )
 
 
-def _build_letter_table(options: ReadOptions) -> NDArray[np.uint8]:
-    """Return the kind of cell of each of the 256 letters."""
-    table = np.full(256, _UNKNOWN_LETTER, np.uint8)
-    table[list(_PASSABLE_LETTERS)] = FREE
-    table[list(_SOLID_LETTERS)] = BLOCKED
+def _build_character_table(options: ReadOptions) -> NDArray[np.uint8]:
+    """Return the kind of cell of each of the 256 characters."""
+    table = np.full(256, _UNKNOWN_CHARACTER, np.uint8)
+    table[list(_PASSABLE_CHARACTERS)] = FREE
+    table[list(_SOLID_CHARACTERS)] = BLOCKED
     table[[ord("T"), ord("W")]] = BLOCKED
     if options.trees == "free":
         table[ord("T")] = FREE
@@ -107,12 +107,14 @@ def _build_letter_table(options: ReadOptions) -> NDArray[np.uint8]:
 
 
 def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
-    """Return the letters of a grid, (rows, columns), the top row first."""
+    """Return the characters of a grid, (rows, columns), the top row first."""
     rows = header.rows
     columns = header.columns
     lines = header.body.replace(b"\r\n", b"\n").split(b"\n", rows)
     for k in range(rows):
-        width = len(lines[k].rstrip(_BLANKS)) if k < len(lines) else 0
+        width = 0
+        if k < len(lines):
+            width = len(lines[k].rstrip(_BLANKS))
         if width != columns:
             is_end = k >= len(lines) or (width == 0 and k == len(lines) - 1)
             actual = "end of file" if is_end else f"{width} characters"
@@ -177,12 +179,12 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     """
     grid = build_grid(environment, options.cell)
     free = find_free_cells(environment, grid)
-    letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
-    letters[:, :-1][free[::-1]] = ord(".")
-    letters[:, -1] = ord("\n")
+    characters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
+    characters[:, :-1][free[::-1]] = ord(".")
+    characters[:, -1] = ord("\n")
     header = f"type octile\nheight {grid.rows}\nwidth {grid.columns}\nmap\n"
     with replace_file(path) as temporary:
-        temporary.write_bytes(header.encode("ascii") + letters.tobytes())
+        temporary.write_bytes(header.encode("ascii") + characters.tobytes())
     x, y = grid.origin
     georeference = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
     report = build_grid_report("movingai", (path,), environment, grid, free)

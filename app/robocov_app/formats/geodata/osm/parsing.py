@@ -1,7 +1,7 @@
 """Reading the data of OpenStreetMap from XML or from the JSON of Overpass.
 
-XML is what openstreetmap.org, JOSM and osmium write: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is
-what Overpass answers to ``[out:json]``, also with ``out geom``, and what the API writes as ``map.json``:
+XML is written by openstreetmap.org, JOSM and osmium: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is the
+answer of Overpass to ``[out:json]``, also with ``out geom``, and the file ``map.json`` of the API:
 https://wiki.openstreetmap.org/wiki/OSM_JSON.
 """
 
@@ -79,7 +79,7 @@ class _XmlReader:
             self._refuse(f"<{name}>: {to_one_line(error)[:80]}")
 
     def _add(self, name: str, attributes: dict[str, str]) -> None:
-        """Add what an XML element says; raise KeyError or ValueError if an attribute is missing or wrong."""
+        """Add the content of an XML element; raise KeyError or ValueError for missing or wrong attributes."""
         if name == "bounds":
             self.data.bounds.append(_parse_bounds(attributes))
         elif self.depth == 2 and name in ("node", "way", "relation"):

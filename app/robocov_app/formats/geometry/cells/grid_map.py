@@ -83,7 +83,7 @@ def build_grid_map(
         The file, for messages.
     name, description : str
     unknown : "obstacle", "free" or "cut"
-        What unknown cells are; with "cut" the map ends around the known ones.
+        Meaning of unknown cells; with "cut" the map ends around the known ones.
     unknown_name : str
         Name of unknown cells in the report.
     noise_cells : float
@@ -102,8 +102,10 @@ def build_grid_map(
     free = cells[::-1] == FREE
     if unknown == "free":
         free |= is_unknown
+    if not free.any() and is_unknown.any():
+        _refuse_no_free_cell(where, unknown_name)
     if not free.any():
-        _refuse_no_free_cell(where, unknown_name if is_unknown.any() else "")
+        _refuse_no_free_cell(where)
     boundary = None
     dropped: tuple[str, ...] = ()
     if unknown == "cut" and is_unknown.any():
@@ -126,8 +128,8 @@ def build_grid_map(
     )
 
 
-def _refuse_no_free_cell(where: str, unknown_name: str) -> NoReturn:
-    """Raise the MapError of a grid without free cells; without unknown ones, their name is empty."""
+def _refuse_no_free_cell(where: str, unknown_name: str = "") -> NoReturn:
+    """Raise MapError for a grid without free cells; without unknown ones, their name is empty."""
     hint = f" (--unknown free takes {unknown_name} cells as free)" if unknown_name else ""
     raise MapError(f"{where}: no cell is free{hint}")
 

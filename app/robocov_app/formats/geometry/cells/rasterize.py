@@ -265,7 +265,7 @@ def _iterate_smaller_sizes(cell: float) -> Iterator[float]:
 
 
 def describe_unsupported(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
-    """Describe what of a map a format cannot store.
+    """Describe the properties of a map that a format cannot store.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str)
     cells : (rows, columns) array of bool
         At least one is true. The bottom row first.
     place : callable
-        Returns positions in the grid, (n, 2) in cells from its lower left corner, on the map, m.
+        Converts positions in the grid, (n, 2) in cells from its lower left corner, to positions in m.
     where : str
         The file, for messages.
 
@@ -96,12 +96,12 @@ def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
     Returns
     -------
     MultiPolygon
-        Every vertex is a true corner, and no two rings touch: necks join obstacles that do.
+        Every vertex is a true corner, and no two rings touch: obstacles that touch are joined by necks.
 
     Raises
     ------
     MapError
-        At more than `files.MAX_VERTICES`.
+        If there are more than `files.MAX_VERTICES` vertices.
     """
     corners = _find_corners(free, where)
     if not len(corners.row):
@@ -216,15 +216,18 @@ def _connect_rings(vertical: IntArray, is_outer: BoolArray) -> tuple[IntArray, I
     # Lists are faster than arrays for single elements.
     vertical_ends = vertical.tolist()
     leaves_horizontally = is_outer.tolist()
-    is_fresh = bytearray(b"\x01") * len(vertical_ends)
+    is_unvisited = bytearray(b"\x01") * len(vertical_ends)
     order: list[int] = []
     starts: list[int] = []
     for corner, is_horizontal in enumerate(leaves_horizontally):
-        if is_fresh[corner]:
+        if is_unvisited[corner]:
             starts.append(len(order))
-        while is_fresh[corner]:
-            is_fresh[corner] = 0
+        while is_unvisited[corner]:
+            is_unvisited[corner] = 0
             order.append(corner)
-            corner = corner ^ 1 if is_horizontal else vertical_ends[corner]
+            if is_horizontal:
+                corner = corner ^ 1
+            else:
+                corner = vertical_ends[corner]
             is_horizontal = not is_horizontal
     return np.array(order, dtype=np.intp), np.array(starts, dtype=np.intp)

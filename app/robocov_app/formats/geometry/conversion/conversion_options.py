@@ -117,8 +117,8 @@ class Conversion:
             return DEFAULT_TOLERANCE_M
         return min(self.foreign.cell, 2 * self.radius)
 
-    def require_at_most(self, maximum: int, count: int, what: str) -> None:
+    def require_at_most(self, maximum: int, count: int, noun: str) -> None:
         """Raise MapError if there are more than `maximum` obstacles or vertices."""
         if count > maximum:
             hint = "--specks AREA drops small obstacles, --simplify METERS draws walls with fewer vertices"
-            raise MapError(f"{self.where}: expected at most {maximum}, got {count} {what}: {hint}")
+            raise MapError(f"{self.where}: expected at most {maximum}, got {count} {noun}: {hint}")

@@ -216,9 +216,9 @@ def _report_unreachable(environment: Environment, conversion: Conversion) -> Non
         return
     areas = sorted((room.area for room in find_rooms(environment.free, conversion.radius)), reverse=True)
     if len(areas) > 1:
-        count = f"{format_count(len(areas) - 1, 'place')} of {format_area(sum(areas[1:]), 3)}"
+        count = f"{format_count(len(areas) - 1, 'part')} of {format_area(sum(areas[1:]), 3)}"
         conversion.notes.append(
-            f"{count} no robot of radius {conversion.radius:g} m reaches from the largest one"
+            f"{count} cannot be reached by a robot of radius {conversion.radius:g} m from the largest one"
         )
 
 

@@ -174,8 +174,8 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
         x, y = _choose_position_in(largest)
         conversion.notes.append(
-            f"the largest part of the free space, {paper}: taken as the paper around a plan, of which "
-            f"the largest enclosed part stays (--inside {x:.10g} {y:.10g}: the part along the edge)"
+            f"the largest part of the free space, {paper}: taken as the paper around a plan; the "
+            f"largest enclosed part is kept (--inside {x:.10g} {y:.10g}: the part along the edge)"
         )
         return enclosed[0]
     if _has_hollow_obstacle(largest, _HOLLOW_SHARE * page.area):

@@ -191,7 +191,7 @@ def _fill_notches(outline: Polygon, conversion: Conversion) -> Polygon:
 
 
 def _remove_slivers(solid: list[Polygon], solid_before: BaseGeometry, tolerance: float) -> list[Polygon]:
-    """Remove what lies between a boundary and a free space that ran along it.
+    """Remove slivers between a boundary and a free space along it.
 
     The walls of the two have moved apart there: a sliver is thinner than walls may move, and was not solid
     before.

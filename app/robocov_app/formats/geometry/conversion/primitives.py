@@ -72,7 +72,7 @@ def restore_primitives(
         if next_to_pockets:
             rejected |= next_to_pockets
             continue
-        # Removes the vertices at which polygons started that are gone.
+        # Removes the vertices at which removed polygons started.
         boundary = round_polygons(candidate.boundary.simplify(0.0), conversion.digits).geoms[0]
         deviation = measure_deviation(before, candidate.compute_free())
         # A circle stays within its sagitta, for any number of sides.

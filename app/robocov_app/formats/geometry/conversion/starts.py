@@ -88,7 +88,7 @@ def find_roomiest_point(
 
 
 def _limit_squares(free: Polygon, sides: Array) -> int:
-    """Return a number of squares whose centers are soon known to be inside or outside."""
+    """Return a number of squares whose centers can be quickly tested for being inside."""
     _, low_y, _, high_y = free.bounds
     crossings = count_ray_crossings(sides, np.linspace(low_y, high_y, _MAX_SQUARES))
     return max(min(_MAX_SQUARES, _MAX_SQUARES * _MAX_RAY_CROSSINGS // max(crossings, 1)), 16)
@@ -116,7 +116,7 @@ def require_room(parts: list[Polygon], conversion: Conversion) -> None:
             return
     radius = clearance / (1 + MIN_START_GAP_RADII)
     max_radius = widest / (1 + MIN_START_GAP_RADII)
-    reason = f"no place is wide enough for a robot of radius {radius:g} m"
+    reason = f"no position has enough clearance for a robot of radius {radius:g} m"
     raise MapError(
         f"{conversion.where}: {reason} (the widest is for one of {max_radius:.3g} m): is the scale right?"
     )
@@ -155,7 +155,9 @@ def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Array
     for k in np.flatnonzero(fits).tolist():
         previous = positions[:k][fits[:k]]
         fits[k] = (np.hypot(*(previous - positions[k]).T) >= 2 * clearance).all()
-    rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
-    count = f"{int(fits.sum())} of {format_count(len(robots), 'place')}"
-    conversion.notes.append(f'start "robots": {count} of robots in the file{rest}')
+    count = f"{int(fits.sum())} of {format_count(len(robots), 'position')}"
+    note = f'start "robots": {count} of robots in the file'
+    if fits.sum() < len(robots):
+        note = f"{note}; robots do not fit at the others"
+    conversion.notes.append(note)
     return np.asarray(positions[fits])

@@ -74,8 +74,8 @@ def _round_to_zero(coordinates: np.ndarray) -> np.ndarray:
 def _describe_invalidity(geometry: BaseGeometry) -> str:
     """Return why a geometry is invalid, and where."""
     reason: str = shapely.is_valid_reason(geometry)
-    what, _, position = reason.partition("[")
+    problem, _, position = reason.partition("[")
     x, _, y = position.rstrip("]").partition(" ")
     if not y:
-        return what.lower()
-    return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]"
+        return problem.lower()
+    return f"{problem.lower()} at [{float(x):.6g}, {float(y):.6g}]"

@@ -29,7 +29,7 @@ _MAX_AREA_RATIO = 0.999
 
 
 def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary | None:
-    """Find the boundary of a drawing by its format, by its name, or by what lies in it.
+    """Find the boundary of a drawing by its format, by its name, or by the shapes in it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
     everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
     x, y, right, top = shapely.total_bounds(everything)
     box = shapely.box(x - around, y - around, right + around, top + around)
-    source = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
+    source = f"a rectangle {around:g} m around everything (--around): no shape contains the others"
     return Boundary(MultiPolygon([box]), source, is_guess=True)
 
 
@@ -126,7 +126,7 @@ def _has_label(labels: Sequence[str], name: str) -> bool:
 
 
 def _find_largest_outline(drawing: Drawing) -> Boundary | None:
-    """Return the largest outline, and what continues it, if most other shapes lie in it."""
+    """Return the largest outline with its continuation, if most other shapes lie in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
     # Walls drawn as a single shape have rooms as holes.
     if largest.area.area < _MAJORITY * largest.filled_area:
@@ -220,7 +220,7 @@ def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[Closed
     # In the order of the file, as the order of a set differs from run to run.
     areas = [outline.area for outline in drawing.outlines if outline in members]
     joined = close_gaps(areas, drawing.snap)
-    source = f"{len(members)} closed outlines that hold the others, together {joined.area.area:.4g} m²"
+    source = f"{len(members)} closed outlines that contain the others, together {joined.area.area:.4g} m²"
     gaps = joined.describe() if joined.number else ""
     return Boundary(joined.area, source, frozenset(members), gaps=gaps)
 

@@ -28,8 +28,9 @@ from robocov_app.formats.geometry.shapes.shape_types import (
     WallLine,
     get_obstacle_name,
 )
-from robocov_app.formats.import_tally import ImportTally
+from robocov_app.formats.omissions import Omissions
 from robocov_app.formats.options import ReadOptions, get_or_default
+from robocov_app.formats.repairs import Repairs
 
 __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
 DEFAULT_THICKNESS_M = 0.1
@@ -56,7 +57,8 @@ class Shapes:
     pillars : list of CircleObstacle
         Obstacles, also if outlines are free.
     labels : LabelFilter
-    tally : ImportTally
+    omissions : Omissions
+    repairs : Repairs
     vertices : int
         Number of vertices read.
     thickness : float, m
@@ -72,7 +74,8 @@ class Shapes:
         self.lines: list[WallLine] = []
         self.pillars: list[CircleObstacle] = []
         self.labels = LabelFilter(where, options)
-        self.tally = ImportTally()
+        self.omissions = Omissions()
+        self.repairs = Repairs()
         self.vertices = 0
         self.thickness = get_or_default(options.thickness, DEFAULT_THICKNESS_M)
         self.robots: list[tuple[float, float]] = []
@@ -150,7 +153,7 @@ class Shapes:
         for reason, count in enclosed.lost_holes.items():
             self.leave_out("hole", reason, count)
         if enclosed.invalidity is not None:
-            self.tally.add_self_crossing(enclosed.invalidity, at)
+            self.repairs.add_self_crossing(enclosed.invalidity, at)
         if enclosed.area.is_empty:
             if thing:
                 self.leave_out(thing, "without an area")
@@ -194,7 +197,7 @@ class Shapes:
         place = ": ".join(filter(None, (self.where, at, "width")))
         files.require_length(width, place, 0.0)
         if width < MIN_SIZE_M:
-            self.tally.mended["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
+            self.repairs.counts["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
             width = MIN_SIZE_M
         if not (points[1:] != points[:-1]).any():
             self.leave_out("line", "without a length")
@@ -240,17 +243,17 @@ class Shapes:
         rings = tuple(rings)
         unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
         if unclosed:
-            self.tally.mended["ring", "closed: the last point was not the first"] += unclosed
+            self.repairs.counts["ring", "closed: the last point was not the first"] += unclosed
         return SourceGeometry("polygon", rings, labels, at, whole=whole)
 
     def drop_heights(self, points: Array) -> Array:
         """Return points without their third coordinates, (k, 2), and count these."""
-        self.tally.add_heights(points[:, 2:3])
+        self.omissions.add_heights(points[:, 2:3])
         return points[:, :2]
 
     def leave_out(self, kind: str, reason: str = "", count: int = 1) -> None:
         """Count shapes that are left out of the map, for the report."""
-        self.tally.left_out[kind, reason] += count
+        self.omissions.counts[kind, reason] += count
 
     @property
     def geometries(self) -> list[BaseGeometry]:
@@ -270,7 +273,9 @@ class Shapes:
             is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
             if not is_valid.all():
                 x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
-                place = f"{self.where}: {at}" if at else self.where
+                place = self.where
+                if at:
+                    place = f"{place}: {at}"
                 expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
                 raise MapError(f"{place}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
@@ -306,10 +311,11 @@ class Shapes:
         """
         self.labels.require_known_names()
         if world is None and not self.outlines and not self.lines:
-            omissions = "; ".join(self.tally.describe_omissions())
-            left_out = f" ({omissions} left out)" if omissions else ""
-            reason = f"no closed outline and no line{left_out}, expected a drawing"
-            raise MapError(f"{self.where}: {reason}")
+            reason = "no closed outline and no line"
+            omissions = "; ".join(self.omissions.describe())
+            if omissions:
+                reason = f"{reason} ({omissions} left out)"
+            raise MapError(f"{self.where}: {reason}, expected a drawing")
         result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
         if result.outside:
             self.leave_out("shape", "outside of the boundary", result.outside)
@@ -324,8 +330,8 @@ class Shapes:
             cell=self.cell,
             primitives=result.primitives,
             robots=tuple(self.robots),
-            repaired=(*self.tally.describe_repairs(), *result.repaired),
-            dropped=self.tally.describe_omissions(),
+            repaired=(*self.repairs.describe(), *result.repaired),
+            dropped=self.omissions.describe(),
             notes=(*self.notes, *result.notes),
             page=result.page,
             painted=_list_paint(self),

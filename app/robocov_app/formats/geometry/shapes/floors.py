@@ -95,7 +95,7 @@ def find_nested_areas(
         return None
     odd, even = split_alternating(areas)
     if boundary is not None:
-        report.notes.append("what lies in an odd number of outlines within the boundary is solid")
+        report.notes.append("areas in an odd number of outlines within the boundary are solid")
         return NestedAreas(boundary, PaintLayer(odd, -1))
     if odd.area >= even.area:
         number = "an odd number"
@@ -107,7 +107,7 @@ def find_nested_areas(
         solid = odd
     whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
     size = format_area(free.area, 3)
-    report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
+    report.notes.append(f"areas in {number} of outlines are free, {size}, as the larger area")
     return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
 
 

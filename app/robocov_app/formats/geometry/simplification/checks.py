@@ -64,10 +64,10 @@ class SimplificationCheck:
         drawing = self.drawing
         ring = self.outline.ring
         order = np.argsort(drawing.source, kind="stable")
-        place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
-        # Before the first vertex of a ring comes its last one.
+        index = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
+        # The vertex before the first one of a ring is its last one.
         last = drawing.starts + drawing.size - 1
-        return np.asarray(order[np.where(place < drawing.starts[ring], last[ring], place)])
+        return np.asarray(order[np.where(index < drawing.starts[ring], last[ring], index)])
 
     def find_misdrawn(self) -> tuple[BoolArray, BoolArray]:
         """Find rings whose area has changed too much, and vertices that are too far from the drawing.
@@ -180,7 +180,7 @@ class SimplificationCheck:
         wrong |= wrong[outline.after]
         wrong &= allowed > 0.0
         if (allowed[wrong] == self.tolerance).any():
-            self.problems["place"] += int(np.count_nonzero(is_crossing))
+            self.problems["point"] += int(np.count_nonzero(is_crossing))
         if not wrong.any():
             # A ring lies where it must not, without crossing anything.
             wrong = allowed > 0.0
@@ -215,7 +215,7 @@ class SimplificationCheck:
             around = [vertices_by_side[side] for side in pair]
             around.append(first[drawing.after[pair]])
             wrong[self._choose_loose(np.concatenate(around), middle)] = True
-        self.problems["narrow place"] += len(closed[0])
+        self.problems["narrow passage"] += len(closed[0])
         return wrong
 
     def _build_paths(self, first: IntArray, last: IntArray) -> Array:
@@ -232,5 +232,7 @@ class SimplificationCheck:
         """Return the vertices around a gap that may still move, those near its middle if there are any."""
         loose = vertices[self.allowed[vertices] > 0.0]
         distance = np.hypot(*(self.outline.points[loose] - middle).T)
-        near = loose[distance <= self.width + 3 * self.tolerance]
-        return near if len(near) else loose
+        nearby: IntArray = loose[distance <= self.width + 3 * self.tolerance]
+        if not len(nearby):
+            return loose
+        return nearby

@@ -33,7 +33,7 @@ DEFAULT_TOLERANCE_M = 0.02
 _MIN_CELLS = 16
 """Rings of fewer cells stay as they are: the cells are the best description of them."""
 _MAX_HALVINGS = 3
-"""Number of times that the tolerance around a place is halved before everything stays there."""
+"""Number of times that the tolerance around a point is halved before all vertices near it are kept."""
 _PATIENT_ROUNDS = 24
 """Number of rounds after which whole walls stay instead of single vertices."""
 _MAX_ROUNDS = 60
@@ -132,12 +132,12 @@ def _tighten(
 
 
 def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]:
-    """Return the lines of the import report about where less was simplified."""
+    """Return the lines of the import report about walls that were simplified less."""
     reasons = {
-        "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
+        "narrow passage": f"so that a robot of radius {radius:g} m passes where it passed",
         "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
         "outline": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
-        "place": "where walls would have met",
+        "point": "where walls would have met",
     }
     lines = []
     for kind, reason in reasons.items():

@@ -79,7 +79,7 @@ def fit_walls(path: RingVertices, kept: IntArray, drawing: RingVertices, toleran
     move[np.hypot(*move.T) > 2 * tolerance] = 0.0
     corners = _find_cut_corners(drawing, stairs, tolerance)
     move[corners.is_cut] = corners.positions[corners.is_cut] - points[corners.is_cut]
-    # The second end of a cut corner goes.
+    # The second end of a cut corner is dropped.
     is_kept = ~corners.is_cut[drawing.before]
     starts = np.searchsorted(drawing.ring[is_kept], np.arange(len(drawing.starts)))
     return RingVertices((points + move)[is_kept], starts, drawing.source[is_kept])
@@ -138,7 +138,7 @@ def _move_to_stairs(drawing: RingVertices, lines: _StairLines) -> Array:
     previous_origins = lines.origins[before]
     previous_directions = lines.directions[before]
     meeting, sine = intersect_lines(previous_origins, previous_directions, lines.origins, lines.directions)
-    # Almost parallel lines have no accurate intersection; the vertex goes half-way between them.
+    # Almost parallel lines have no accurate intersection; the vertex is placed half-way between them.
     first_foot = project_onto_lines(drawing.points, previous_origins, previous_directions)
     second_foot = project_onto_lines(drawing.points, lines.origins, lines.directions)
     middle = (first_foot + second_foot) / 2

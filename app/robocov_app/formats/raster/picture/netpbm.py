@@ -1,7 +1,7 @@
 """Decoding PGM and PPM: https://netpbm.sourceforge.net/doc/pgm.html.
 
-Pillow is not used for them: it scales other maximum values than 255 to it by rounding, which changes what the
-thresholds of ROS give, and takes half a second for a million pixels.
+Pillow is not used for them: it rescales pixels with a maximum other than 255 by rounding, which changes the
+result of ROS's thresholds, and takes half a second for a million pixels.
 """
 
 import re

@@ -135,7 +135,7 @@ def _convert(image: Image, key: ColorKey) -> Brightness:
     if image.mode == "F":
         return _convert_float_samples(image, key)
     if image.mode == "I" and tiff_tags:
-        raise _UnclearSamplesError("expected samples of up to 16 bits without a sign, got others")
+        raise _UnclearSamplesError("expected unsigned samples of up to 16 bits")
     if image.mode.startswith("I") and not is_transparent:
         return _convert_deep_samples(image, tiff_tags, key)
     has_alpha = is_transparent or image.mode in _MODES_WITH_ALPHA

@@ -55,7 +55,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
             threshold=threshold,
         )
     if options.threshold is not None:
-        raise ParameterError(f"--threshold: of no use here: {where} is of mode trinary")
+        raise ParameterError(f"--threshold: not applicable: {where} is of mode trinary")
     return classify_trinary(picture, negate=metadata.negate, free=metadata.free, occupied=metadata.occupied)
 
 

@@ -127,8 +127,10 @@ class _MetadataParser:
         origin = self._document.get("origin", ["0", "0", "0"])
         if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
             raise MapError(f"{where}: expected [x, y, yaw], got {quote(origin)}")
-        texts = [*origin, "0"][:3]
-        x, y, yaw = (_parse_number(text, f"{where}[{k}]") for k, text in enumerate(texts))
+        texts = [*origin, "0"]
+        x = _parse_number(texts[0], f"{where}[0]")
+        y = _parse_number(texts[1], f"{where}[1]")
+        yaw = _parse_number(texts[2], f"{where}[2]")
         files.require_coordinate(x, f"{where}[0]")
         files.require_coordinate(y, f"{where}[1]")
         return x, y, yaw

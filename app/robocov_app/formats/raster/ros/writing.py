@@ -91,7 +91,7 @@ def _quote_image_name(path: Path, image: Path) -> str:
     try:
         image.name.encode()
     except UnicodeEncodeError:
-        raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: no name that UTF-8 can hold") from None
+        raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: expected a name in UTF-8") from None
     return image.name if _PLAIN_NAME.fullmatch(image.name) else json.dumps(image.name)
 
 

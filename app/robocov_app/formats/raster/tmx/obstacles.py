@@ -122,7 +122,7 @@ class ObstacleReader:
         remaining = np.flatnonzero(~fills_cell)
         part_counts = np.array([len(parts) for parts in parts_of_gids], dtype=int)
         self._require_few_parts(int(part_counts[gid_index[remaining]].sum()))
-        # By global IDs, and those of the same one row by row.
+        # Sorted by global IDs; tiles with the same ID are row by row.
         for k in remaining[np.argsort(gid_index[remaining], kind="stable")].tolist():
             gid = int(gids[gid_index[k]])
             row, column = cells[k].tolist()

@@ -42,7 +42,7 @@ class ShapeReader:
         name = shape["name"].get_text("circle").lower()
         shift = np.array([shape["wheelbase"].parse_number(0.0) / 2, 0.0])
         if shape["random_shape"].is_true():
-            self._shapes.leave_out("shape", "by chance")
+            self._shapes.leave_out("shape", "of random form")
         elif name == "circle":
             self._add_circle(shape, frame, labels, shift)
         elif name == "rectangle":

@@ -135,7 +135,7 @@ class _EntityParser:
             else:
                 entity.properties[token.text] = self._parse_values(token)
         if depth:
-            Token("", "the end of the file", entity.at).refuse("a ) after what begins here")
+            Token("", "the end of the file", entity.at).refuse("a ) to close this bracket")
 
     def _peek_kind(self, index: int) -> str:
         """Return the kind of a following token, or an empty text beyond the end."""

@@ -124,7 +124,7 @@ class ModelPlacer:
                 if _is_solid(entity):
                     self._add_model(entity, model_frame @ self._parse_pose(entity, "origin"), labels)
                 else:
-                    self._shapes.leave_out("model", "that nothing meets")
+                    self._shapes.leave_out("model", "that nothing collides with")
                 self._place(entity.children, model_frame, depth + 1)
 
     def _expand_macros(self, entity: Entity) -> tuple[Entity, tuple[str, ...]]:

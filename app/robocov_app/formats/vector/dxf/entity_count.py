@@ -28,7 +28,7 @@ def require_few_entities(document: Any, where: str) -> None:
     """
     count = _EntityCounter(document, where).count(document.modelspace())
     if count > MAX_DRAWN_ENTITIES:
-        actual = f"{min(count, _MAX_PRINTED_COUNT):.3g} entities to be drawn, blocks and all"
+        actual = f"{min(count, _MAX_PRINTED_COUNT):.3g} entities to be drawn, including those in blocks"
         raise MapError(f"{where}: expected at most {MAX_DRAWN_ENTITIES}, got {actual}")
 
 

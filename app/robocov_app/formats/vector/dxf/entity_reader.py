@@ -251,7 +251,7 @@ class EntityReader:
     def _to_meters(self, vectors: Sequence[Any]) -> Array:
         """Return ezdxf vectors as points, (k, 2) m; third coordinates are counted."""
         heights = np.array([vector[2] if len(vector) > 2 else 0.0 for vector in vectors])
-        self._shapes.tally.add_heights(heights[heights != 0.0])
+        self._shapes.omissions.add_heights(heights[heights != 0.0])
         return to_plane(vectors) * self._scale
 
     def _get_radius(self, entity: Any) -> float:

@@ -32,7 +32,7 @@ def parse_view_box(attributes: dict[str, str]) -> tuple[float, float, float, flo
 def list_labels(
     element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Return the labels of an element between others, the innermost first, each once."""
+    """Return the labels of an element after inner and before outer ones, without repetition."""
     attributes = element.attributes
     names = (attributes.get("id", ""), attributes.get("label", ""), *attributes.get("class", "").split())
     own = [name.strip() for name in names if name.strip()]

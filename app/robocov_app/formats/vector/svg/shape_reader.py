@@ -102,17 +102,17 @@ class ShapeReader:
         elif not has_area:
             self.shapes.leave_out("shape", "without an area")
 
-    def _is_ignored(self, paint: Paint, what: str) -> bool:
+    def _is_ignored(self, paint: Paint, kind: str) -> bool:
         """Return whether a color is declared to be ignored; then the fill or stroke is counted."""
         if paint.role != "ignore":
             return False
-        self.shapes.leave_out(what, "of a color that is left out (--ignore-color)")
+        self.shapes.leave_out(kind, "of a color that is left out (--ignore-color)")
         return True
 
-    def _find_paint(self, state: ElementState, what: Literal["fill", "stroke"]) -> Paint:
+    def _find_paint(self, state: ElementState, kind: Literal["fill", "stroke"]) -> Paint:
         """Return the color of a fill or a stroke; of a gradient, the first one."""
-        visible = compute_visible_color(state.style, what, state.opacity, self._get_gradient_color)
-        written = parse_css_color_on_white(state.style[what])
+        visible = compute_visible_color(state.style, kind, state.opacity, self._get_gradient_color)
+        written = parse_css_color_on_white(state.style[kind])
         return Paint(visible, self.key.find_role(written) or self.key.find_role(visible))
 
     def _get_gradient_color(self, name: str) -> str | None:

@@ -195,17 +195,17 @@ def inherit_style(parent: Style, own: Style) -> dict[str, str]:
     return style
 
 
-def is_painted(style: Style, what: Literal["fill", "stroke"]) -> bool:
+def is_painted(style: Style, kind: Literal["fill", "stroke"]) -> bool:
     """Return whether a fill or a stroke is visible."""
-    if style[what].lower() in ("none", "transparent") or _is_zero(style[f"{what}-opacity"]):
+    if style[kind].lower() in ("none", "transparent") or _is_zero(style[f"{kind}-opacity"]):
         return False
-    paint = parse_css_color(style[what])
+    paint = parse_css_color(style[kind])
     return paint is None or paint[1] > 0.0
 
 
 def compute_visible_color(
     style: Style,
-    what: Literal["fill", "stroke"],
+    kind: Literal["fill", "stroke"],
     opacity: float,
     get_gradient_color: Callable[[str], str | None],
 ) -> Color | None:
@@ -214,7 +214,7 @@ def compute_visible_color(
     Parameters
     ----------
     style : Style
-    what : "fill" or "stroke"
+    kind : "fill" or "stroke"
     opacity : float
         Opacity of the element and of the groups around it.
     get_gradient_color : callable
@@ -225,7 +225,7 @@ def compute_visible_color(
     Color or None
         None where it is not known, as of a pattern.
     """
-    written = style[what]
+    written = style[kind]
     match = _REFERENCE.match(written)
     if match:
         written = get_gradient_color(match[1]) or written[match.end() :].strip()
@@ -235,7 +235,7 @@ def compute_visible_color(
     if paint is None:
         return None
     color, alpha = paint
-    return mix_with_white(color, alpha * opacity * parse_opacity(style[f"{what}-opacity"]))
+    return mix_with_white(color, alpha * opacity * parse_opacity(style[f"{kind}-opacity"]))
 
 
 def parse_opacity(text: str) -> float:

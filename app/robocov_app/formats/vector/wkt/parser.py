@@ -250,15 +250,17 @@ class WktParser:
         dimensions = points.shape[1]
         has_heights = dimensions > 2 and not (geometry.is_measured and dimensions == 3)
         if has_heights:
-            self._shapes.tally.add_heights(points[:, 2])
+            self._shapes.omissions.add_heights(points[:, 2])
         return points[:, :2]
 
     def _refuse_points(self) -> NoReturn:
-        """Raise the MapError of what follows, which is no list of points in brackets."""
+        """Raise MapError for the text that follows, which is not a list of points in brackets."""
         scanner = self._scanner
         scanner.expect("(")
-        strange = _NOT_IN_POINT.search(scanner.text, scanner.position)
-        end = strange.start() if strange else len(scanner.text)
+        end = len(scanner.text)
+        match = _NOT_IN_POINT.search(scanner.text, scanner.position)
+        if match is not None:
+            end = match.start()
         if scanner.text[end : end + 1] in ("", "("):
             scanner.position = end
             scanner.refuse(f"expected a point or ), got {scanner.quote_next()}")

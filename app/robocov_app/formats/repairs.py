@@ -1,0 +1,44 @@
+"""Counts of shapes that an import repairs, for its report."""
+
+from collections import Counter
+
+from robocov.errors import format_count
+
+
+class Repairs:
+    """Counts of shapes that are repaired.
+
+    Attributes
+    ----------
+    counts : Counter of (str, str)
+        Number of shapes by their kind and the repair.
+    """
+
+    def __init__(self) -> None:
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self._self_crossings: list[str] = []
+
+    def add_self_crossing(self, reason: str, at: str) -> None:
+        """Count an outline that meets itself.
+
+        Parameters
+        ----------
+        reason : str
+        at : str
+            Position in the file; may be empty.
+        """
+        if at:
+            reason = f"{at}: {reason}"
+        self._self_crossings.append(reason)
+
+    def describe(self) -> tuple[str, ...]:
+        """Return the lines of the report about repairs."""
+        lines = []
+        for (kind, repair), count in sorted(self.counts.items()):
+            lines.append(f"{format_count(count, kind)} {repair}")
+        crossings = self._self_crossings
+        if len(crossings) == 1:
+            lines.append(f"the outline met itself: {crossings[0]}")
+        elif crossings:
+            lines.append(f"{len(crossings)} outlines met themselves, the first: {crossings[0]}")
+        return tuple(lines)
