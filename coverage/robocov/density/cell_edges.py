@@ -9,7 +9,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
-"""Stands for the cell beyond an edge that is part of the region's boundary."""
+"""Stands for the cell on the other side of an edge that lies on the region's boundary."""
 
 MASS = 0
 """Column of the moments of cells: the integral of φ, m²."""
@@ -36,14 +36,14 @@ class CellEdges:
         keeps its full precision.
     cell : (s,) int array
         Cell of each edge, ascending.
-    beyond : (s,) int array
+    other_cell : (s,) int array
         The cell on the other side of each edge, or `REGION`.
     """
 
     start: Array
     end: Array
     cell: IntArray
-    beyond: IntArray
+    other_cell: IntArray
 
     def build_polygons(self, generators: Array) -> list[Array]:
         """Build the polygon of each cell.
@@ -87,9 +87,9 @@ class CellEdges:
         (m, 2) int array
             Pairs (i, j) with i < j, in ascending order.
         """
-        is_shared = (self.beyond != REGION) & self._has_length()
+        is_shared = (self.other_cell != REGION) & self._has_length()
         first_cell = self.cell[is_shared]
-        second_cell = self.beyond[is_shared]
+        second_cell = self.other_cell[is_shared]
         cell_count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
         # Each pair is encoded as one number, because sorting pairs takes several times as long.
         low = np.minimum(first_cell, second_cell)
@@ -109,14 +109,17 @@ def _sum_moments(start: Array, end: Array, cell: IntArray, cell_count: int) -> A
     """Return the sums of the moments of the triangles between the edges and the generators."""
     sums = np.zeros((cell_count, 4))
     for k in range(len(cell)):
-        x = start[k, 0]
-        y = start[k, 1]
-        u = end[k, 0]
-        v = end[k, 1]
+        start_x = start[k, 0]
+        start_y = start[k, 1]
+        end_x = end[k, 0]
+        end_y = end[k, 1]
         c = cell[k]
-        cross = x * v - u * y
+        cross = start_x * end_y - end_x * start_y
+        sum_x = start_x + end_x
+        sum_y = start_y + end_y
         sums[c, MASS] += cross / 2.0
-        sums[c, MOMENT_X] += cross * (x + u) / 6.0
-        sums[c, MOMENT_Y] += cross * (y + v) / 6.0
-        sums[c, POLAR_MOMENT] += cross * (x * (x + u) + u * u + y * (y + v) + v * v) / 12.0
+        sums[c, MOMENT_X] += cross * sum_x / 6.0
+        sums[c, MOMENT_Y] += cross * sum_y / 6.0
+        squares = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
+        sums[c, POLAR_MOMENT] += cross * squares / 12.0
     return sums

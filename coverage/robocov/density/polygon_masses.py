@@ -61,17 +61,17 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
     corners = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     next_corners = np.roll(corners, -1, axis=0)
     masses = np.empty(len(centers))
-    for first in range(0, len(centers), _SQUARES_PER_BATCH):
-        batch = centers[first : first + _SQUARES_PER_BATCH]
+    for batch_start in range(0, len(centers), _SQUARES_PER_BATCH):
+        batch = centers[batch_start : batch_start + _SQUARES_PER_BATCH]
         start = np.tile(corners, (len(batch), 1))
         end = np.tile(next_corners, (len(batch), 1))
         edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
-        masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
+        masses[batch_start : batch_start + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
     # Rounding must not produce values outside the range of the density, such as negative ones.
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 
 
 def _build_edges(start: Array, end: Array, cell: IntArray) -> CellEdges:
     """Return edges of polygons without neighbors."""
-    beyond = np.full(len(cell), REGION)
-    return CellEdges(start, end, cell.astype(np.intp, copy=False), beyond)
+    other_cell = np.full(len(cell), REGION)
+    return CellEdges(start, end, cell.astype(np.intp, copy=False), other_cell)

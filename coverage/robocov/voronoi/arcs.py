@@ -27,18 +27,20 @@ HALF_ANGLE = 4
 """Column of a piece: half of the angle that it spans about the center of its circle, rad."""
 CELL = 5
 """Column of a piece: the cell that it bounds."""
-BEYOND = 6
-"""Column of a piece: the robot on the other side, or `robocov.density.cell_edges.REGION`."""
+OTHER_CELL = 6
+"""Column of a piece: the cell on the other side, or `robocov.density.cell_edges.REGION`."""
 PIECE_COLUMNS = 7
 
 _MAX_SERIES_SQUARED_SINE = 0.04
 """sin² of the half angle up to which the series is used, because the closed form loses precision there."""
 
-_SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
+_SERIES_TERMS = 13
+"""Number of terms of the series, which leave less than a rounding error."""
+_SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(_SERIES_TERMS, 0, -1)])
 """Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
-_MIN_LENGTH_M = 1e-300
-"""Smallest length used as a divisor, which prevents division by zero."""
+_MIN_DIVISOR = 1e-300
+"""Lower limit of sines and radii where they are divisors, which prevents division by zero."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
@@ -65,32 +67,39 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
     """Return the areas, first moments in x and y, and polar moments of the cells, (n, 4)."""
     moments = np.zeros((cell_count, 4))
     for k in range(len(pieces)):
-        x = pieces[k, START_X]
-        y = pieces[k, START_Y]
-        u = pieces[k, END_X]
-        v = pieces[k, END_Y]
-        cross = x * v - u * y
-        middle_x = 0.5 * (x + u)
-        middle_y = 0.5 * (y + v)
+        start_x = pieces[k, START_X]
+        start_y = pieces[k, START_Y]
+        end_x = pieces[k, END_X]
+        end_y = pieces[k, END_Y]
+        cross = start_x * end_y - end_x * start_y
+        sum_x = start_x + end_x
+        sum_y = start_y + end_y
+        middle_x = 0.5 * sum_x
+        middle_y = 0.5 * sum_y
         # The normal points to the right of the chord, and has the same length.
-        normal_x = v - y
-        normal_y = x - u
+        normal_x = end_y - start_y
+        normal_y = start_x - end_x
         squared_length = normal_x * normal_x + normal_y * normal_y
-        # The moments of the circular segment. `first` still lacks one factor of length, which comes from the
-        # multiplication by the normal below.
-        unit_area, unit_first, unit_polar = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
+        # The moments of the circular segment. The first moment still lacks one factor of length, which comes
+        # from the multiplication by the normal below.
+        unit_area, unit_first_moment, unit_polar_moment = _compute_segment_moments(
+            pieces[k, HALF_ANGLE], series
+        )
         area = unit_area * squared_length
-        first = unit_first * squared_length
-        polar = unit_polar * squared_length * squared_length
+        first_moment = unit_first_moment * squared_length
+        polar_moment = unit_polar_moment * squared_length * squared_length
         i = int(pieces[k, CELL])
         moments[i, MASS] += 0.5 * cross + area
-        moments[i, MOMENT_X] += middle_x * (cross / 3.0 + area) + first * normal_x
-        moments[i, MOMENT_Y] += middle_y * (cross / 3.0 + area) + first * normal_y
-        # The polar moment of the triangle, and that of the segment by the parallel axis theorem.
-        squares = x * (x + u) + u * u + y * (y + v) + v * v
-        mixed = first * (middle_x * normal_x + middle_y * normal_y)
+        moments[i, MOMENT_X] += middle_x * (cross / 3.0 + area) + first_moment * normal_x
+        moments[i, MOMENT_Y] += middle_y * (cross / 3.0 + area) + first_moment * normal_y
+        # The polar moment is that of the triangle, cross * squares / 12, plus that of the segment, which the
+        # parallel axis theorem shifts from the middle of the chord to the generator.
+        squares = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
+        shift = first_moment * (middle_x * normal_x + middle_y * normal_y)
         squared_middle = middle_x * middle_x + middle_y * middle_y
-        moments[i, POLAR_MOMENT] += cross * squares / 12.0 + polar + 2.0 * mixed + area * squared_middle
+        moments[i, POLAR_MOMENT] += (
+            cross * squares / 12.0 + polar_moment + 2.0 * shift + area * squared_middle
+        )
     return moments
 
 
@@ -112,9 +121,9 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
         for coefficient in series:
             h = h * squared_sine + coefficient
     area = s * (2.0 / 3.0 + squared_sine * h) / 4.0
-    first = squared_sine * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
-    polar = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - squared_sine) * h) / 16.0
-    return area, first, polar
+    first_moment = squared_sine * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
+    polar_moment = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - squared_sine) * h) / 16.0
+    return area, first_moment, polar_moment
 
 
 def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
@@ -137,30 +146,33 @@ def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
 
 def _split_piece(piece: list[float], max_deviation: float) -> Array:
     """Return the vertices of the chords of one piece."""
-    x, y, u, v, half_angle = piece
-    chord_count = _count_chords(np.hypot(u - x, v - y), half_angle, max_deviation)
+    start_x, start_y, end_x, end_y, half_angle = piece
+    dx = end_x - start_x
+    dy = end_y - start_y
+    chord_count = _count_chords(np.hypot(dx, dy), half_angle, max_deviation)
     if chord_count == 1:
-        return np.array([[x, y], [u, v]])
+        return np.array([[start_x, start_y], [end_x, end_y]])
     angle = half_angle * np.linspace(-1.0, 1.0, chord_count + 1)
     # Coordinates along the line between the ends, and to the right of it, as fractions of its length.
     along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
     rightward = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
-    vertex_x = x + along * (u - x) + rightward * (v - y)
-    vertex_y = y + along * (v - y) + rightward * (x - u)
+    vertex_x = start_x + along * dx + rightward * dy
+    vertex_y = start_y + along * dy - rightward * dx
     vertices = np.column_stack([vertex_x, vertex_y])
     # The ends are exact, so that adjacent pieces meet.
-    vertices[0] = x, y
-    vertices[-1] = u, v
+    vertices[0] = start_x, start_y
+    vertices[-1] = end_x, end_y
     return vertices
 
 
 def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
     """Return the number of chords that replace an arc whose ends are `length` meters apart."""
-    radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_LENGTH_M)
+    radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_DIVISOR)
     # A chord of half angle x deviates from its arc by r (1 - cos x), which is at most r x² / 2.
     if radius * half_angle**2 < 2.0 * max_deviation:
         return 1
-    ratio = min(max_deviation / max(radius, _MIN_LENGTH_M), 0.5)
+    # The half angle of a chord is at most 1 rad, however small the arc is.
+    ratio = min(max_deviation / max(radius, _MIN_DIVISOR), 0.5)
     max_half_angle = np.sqrt(2.0 * ratio)
     return int(np.ceil(abs(half_angle) / max(max_half_angle, _MIN_CHORD_HALF_ANGLE)))
 
@@ -193,6 +205,7 @@ def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
             gap_to_first = compute_lengths(starts[first] - ends[last])
             gaps = compute_lengths(starts[remaining] - ends[last])
             if gap_to_first <= gaps.min():
+                # The ring is closed.
                 break
             last = remaining.pop(int(gaps.argmin()))
             ring.append(lines[last][:-1])

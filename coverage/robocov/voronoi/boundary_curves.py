@@ -21,16 +21,25 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
+from robocov.density.cell_edges import REGION
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET
 from robocov.voronoi.arcs import (
-    BEYOND,
     CELL,
     END_X,
     END_Y,
     HALF_ANGLE,
+    OTHER_CELL,
     PIECE_COLUMNS,
     START_X,
     START_Y,
+)
+from robocov.voronoi.clipping import (
+    EDGE_CELL,
+    EDGE_END_X,
+    EDGE_END_Y,
+    EDGE_OTHER_CELL,
+    EDGE_START_X,
+    EDGE_START_Y,
 )
 
 _NORMAL_X = 0
@@ -40,7 +49,7 @@ _COEFFICIENT = 3  # a, 1/m
 _BEGIN = 4  # the values of t between which the curve may bound the cell, m
 _END = 5
 _CURVE_CELL = 6
-_CURVE_BEYOND = 7
+_CURVE_OTHER_CELL = 7
 _CURVE_COLUMNS = 8
 
 PAIR_ROBOT = 0
@@ -59,17 +68,6 @@ PAIR_OTHER_SPEED = 5
 _ENTER = 0
 _LEAVE = 1
 """Columns of a crossing: values of t at which a curve enters and leaves the cell's side of another one."""
-
-_EDGE_START_X = 0
-_EDGE_START_Y = 1
-_EDGE_END_X = 2
-_EDGE_END_Y = 3
-_EDGE_CELL = 4
-_EDGE_BEYOND = 5  # the robot on the other side; negative for a side of the region
-
-_FIRST_IS_OUTSIDE = 1
-_SECOND_IS_OUTSIDE = 2
-"""Flags: the first, or the second, of two curves is nowhere on the cell's side of the other one."""
 
 _SPARE_PIECES = 64
 """Initial room for pieces, in addition to one for each edge."""
@@ -97,8 +95,8 @@ def trace_boundaries(
     pairs : (m, 6) array
         Pairs of a robot and a neighbor, sorted by robot. For the columns, see the constants `PAIR_...`.
     edges : (e, 6) array
-        Edges of the cells of equally fast robots, sorted by cell: x, y, u, v of the ends relative to the
-        generator (m), the cell, and the robot beyond.
+        Edges of the cells of equally fast robots, sorted by cell. For the columns, see the constants
+        `EDGE_...` of `robocov.voronoi.clipping`.
     is_straight : (n,) bool array
         Overwritten: whether a cell is bounded by these edges alone.
 
@@ -116,10 +114,13 @@ def trace_boundaries(
         first_edge = end_edge
         while end_pair < len(pairs) and pairs[end_pair, PAIR_ROBOT] == i:
             end_pair += 1
-        while end_edge < len(edges) and edges[end_edge, _EDGE_CELL] == i:
+        while end_edge < len(edges) and edges[end_edge, EDGE_CELL] == i:
             end_edge += 1
         own_pairs = pairs[first_pair:end_pair]
         own_edges = edges[first_edge:end_edge]
+        if _is_empty(own_pairs):
+            is_straight[i] = False
+            continue
         line_count = len(own_edges)
         curves = np.empty((line_count + len(own_pairs), _CURVE_COLUMNS))
         curve_count = _write_circles(curves, own_pairs, own_edges)
@@ -128,7 +129,7 @@ def trace_boundaries(
         if is_straight[i]:
             pieces = _make_room(pieces, piece_count, line_count)
             piece_count = _add_edges(own_edges, pieces, piece_count)
-        elif curve_count > 0:
+        else:
             _write_lines(curves, own_pairs, own_edges, sides, points[i])
             crossings = np.empty((curve_count, curve_count, 2))
             _find_crossings(curves[:curve_count], line_count, crossings)
@@ -153,27 +154,34 @@ def _make_room(pieces: Array, piece_count: int, room: int) -> Array:
 def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
     """Add straight edges to the pieces; return the new number of pieces."""
     for e in range(len(edges)):
-        pieces[piece_count, START_X] = edges[e, _EDGE_START_X]
-        pieces[piece_count, START_Y] = edges[e, _EDGE_START_Y]
-        pieces[piece_count, END_X] = edges[e, _EDGE_END_X]
-        pieces[piece_count, END_Y] = edges[e, _EDGE_END_Y]
+        pieces[piece_count, START_X] = edges[e, EDGE_START_X]
+        pieces[piece_count, START_Y] = edges[e, EDGE_START_Y]
+        pieces[piece_count, END_X] = edges[e, EDGE_END_X]
+        pieces[piece_count, END_Y] = edges[e, EDGE_END_Y]
         pieces[piece_count, HALF_ANGLE] = 0.0
-        pieces[piece_count, CELL] = edges[e, _EDGE_CELL]
-        pieces[piece_count, BEYOND] = edges[e, _EDGE_BEYOND]
+        pieces[piece_count, CELL] = edges[e, EDGE_CELL]
+        pieces[piece_count, OTHER_CELL] = edges[e, EDGE_OTHER_CELL]
         piece_count += 1
     return piece_count
+
+
+@kernel
+def _is_empty(pairs: Array) -> bool:
+    """Return whether a cell is empty because a faster robot is at the position of its robot."""
+    for k in range(len(pairs)):
+        squared_distance = pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2
+        if squared_distance == 0.0 and pairs[k, PAIR_OTHER_SPEED] > pairs[k, PAIR_OWN_SPEED]:
+            return True
+    return False
 
 
 @kernel
 def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
     """Write the circles that may bound a cell to `curves`, after the rows of its lines.
 
-    Return the number of lines and circles, or -1 if the cell is empty because a faster robot is at the same
-    position.
+    Return the number of lines and circles.
     """
     reach = _compute_reach(pairs, edges)
-    if reach < 0.0:
-        return -1
     curve_count = len(edges)
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
@@ -191,24 +199,22 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
             curves[curve_count, _BEGIN] = -np.inf
             curves[curve_count, _END] = np.inf
             curves[curve_count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
-            curves[curve_count, _CURVE_BEYOND] = pairs[k, PAIR_NEIGHBOR]
+            curves[curve_count, _CURVE_OTHER_CELL] = pairs[k, PAIR_NEIGHBOR]
             curve_count += 1
     return curve_count
 
 
 @kernel
 def _compute_reach(pairs: Array, edges: Array) -> float:
-    """Return an upper bound on the distance of a cell's points from its generator, m; -1 if it is empty."""
+    """Return an upper bound on the distance of a cell's points from its generator, m."""
     reach = 0.0
     for e in range(len(edges)):
-        reach = max(reach, np.sqrt(edges[e, _EDGE_START_X] ** 2 + edges[e, _EDGE_START_Y] ** 2))
+        reach = max(reach, np.sqrt(edges[e, EDGE_START_X] ** 2 + edges[e, EDGE_START_Y] ** 2))
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
         other_speed = pairs[k, PAIR_OTHER_SPEED]
         if other_speed > own_speed:
             distance = np.sqrt(pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2)
-            if distance == 0.0:
-                return -1.0
             # The farthest point of a circle around the cell is on the side away from the faster robot.
             reach = min(reach, distance * own_speed / (other_speed - own_speed))
     return reach
@@ -218,18 +224,18 @@ def _compute_reach(pairs: Array, edges: Array) -> float:
 def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point: Array) -> None:
     """Write the edges of a cell as straight curves that begin and end at their vertices."""
     for e in range(len(edges)):
-        if edges[e, _EDGE_BEYOND] >= 0.0:
-            _write_bisector(curves[e], pairs, edges[e, _EDGE_BEYOND])
+        if edges[e, EDGE_OTHER_CELL] != REGION:
+            _write_bisector(curves[e], pairs, edges[e, EDGE_OTHER_CELL])
         else:
             _write_side(curves[e], edges[e], sides, point)
         normal_x = curves[e, _NORMAL_X]
         normal_y = curves[e, _NORMAL_Y]
         curves[e, _COEFFICIENT] = 0.0
         # On a line, t is half the signed distance along it from the point nearest to the generator.
-        curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, _EDGE_START_Y] - normal_y * edges[e, _EDGE_START_X])
-        curves[e, _END] = 0.5 * (normal_x * edges[e, _EDGE_END_Y] - normal_y * edges[e, _EDGE_END_X])
-        curves[e, _CURVE_CELL] = edges[e, _EDGE_CELL]
-        curves[e, _CURVE_BEYOND] = edges[e, _EDGE_BEYOND]
+        curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, EDGE_START_Y] - normal_y * edges[e, EDGE_START_X])
+        curves[e, _END] = 0.5 * (normal_x * edges[e, EDGE_END_Y] - normal_y * edges[e, EDGE_END_X])
+        curves[e, _CURVE_CELL] = edges[e, EDGE_CELL]
+        curves[e, _CURVE_OTHER_CELL] = edges[e, EDGE_OTHER_CELL]
 
 
 @kernel
@@ -249,8 +255,8 @@ def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
 @kernel
 def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
     """Find the side of the region on which an edge lies; write its normal and distance from the generator."""
-    middle_x = 0.5 * (edge[_EDGE_START_X] + edge[_EDGE_END_X])
-    middle_y = 0.5 * (edge[_EDGE_START_Y] + edge[_EDGE_END_Y])
+    middle_x = 0.5 * (edge[EDGE_START_X] + edge[EDGE_END_X])
+    middle_y = 0.5 * (edge[EDGE_START_Y] + edge[EDGE_END_Y])
     min_offset = np.inf
     for s in range(len(sides)):
         normal_x = sides[s, SIDE_NORMAL_X]
@@ -261,6 +267,7 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
             min_offset = offset
             curve[_NORMAL_X] = normal_x
             curve[_NORMAL_Y] = normal_y
+            # This is the distance of the edge, whose ends are rounded, and not that of the side.
             curve[_DISTANCE] = normal_x * middle_x + normal_y * middle_y
 
 
@@ -279,12 +286,13 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
         for other in range(one + 1, count):
             enter = np.nan
             leave = np.nan
-            flags = 0
+            is_one_outside = False
+            is_other_outside = False
             if other >= line_count:
-                enter, leave, flags = _intersect(curves[one], curves[other])
-            if flags & _FIRST_IS_OUTSIDE:
+                enter, leave, is_one_outside, is_other_outside = _intersect(curves[one], curves[other])
+            if is_one_outside:
                 curves[one, _END] = -np.inf
-            if flags & _SECOND_IS_OUTSIDE:
+            if is_other_outside:
                 curves[other, _END] = -np.inf
             crossings[one, other, _ENTER] = enter
             crossings[one, other, _LEAVE] = leave
@@ -296,11 +304,11 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
 
 
 @kernel
-def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
+def _intersect(one: Array, other: Array) -> tuple[float, float, bool, bool]:
     """Find where a curve enters and leaves the cell's side of another one.
 
-    Return both values of t, nan if the curves do not intersect, and the flags `_FIRST_IS_OUTSIDE` and
-    `_SECOND_IS_OUTSIDE`.
+    Return both values of t, nan if the curves do not intersect, and for each curve whether it is nowhere on
+    the cell's side of the other one.
     """
     a1 = one[_COEFFICIENT]
     b1x, b1y, c1 = _compute_b_and_c(one)
@@ -313,9 +321,10 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
     leftward = b2y * normal_x - b2x * normal_y + 0.0  # The sum turns a negative zero into a positive one.
     r1 = one[_DISTANCE]
     k = 2.0 * a1
-    bend = 2.0 - r1 * k
-    # On the first curve the condition of the other one is quadratic t² + 2 leftward t + constant <= 0.
-    quadratic = a2 * bend * bend - k * outward * bend - c2 * k * k
+    # On the first curve, |q|² = r² + (2 - r k)² t² / (1 + k² t²). Multiplied by this divisor, the condition
+    # of the other curve is quadratic t² + 2 leftward t + constant <= 0.
+    factor = 2.0 - r1 * k
+    quadratic = a2 * factor * factor - k * outward * factor - c2 * k * k
     constant = a2 * r1 * r1 + r1 * outward - c2
     # 1 - g² as a sum of minors: at small angles, subtracting g² from 1 would leave only rounding errors.
     b_cross = b1x * b2y - b1y * b2x
@@ -325,22 +334,18 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
         (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
     )
     if squared_sine > _MIN_SQUARED_SINE:
-        # The two roots of the quadratic function, in the form that avoids cancellation.
+        # The two roots of the quadratic function, in the form that avoids cancellation. The curve enters at
+        # (-leftward - sqrt) / quadratic, where the function falls, and leaves where it rises.
         large = -leftward - np.copysign(np.sqrt(squared_sine), leftward)
         if leftward >= 0.0:
-            return large / quadratic, constant / large, 0
-        return constant / large, large / quadratic, 0
+            return large / quadratic, constant / large, False, False
+        return constant / large, large / quadratic, False, False
     # The curves do not intersect: the function has the same sign on the whole first curve. If g >= 1, one of
     # the curves is on the cell's side of the other one; if g <= -1, both are, or neither is.
-    flags = 0
-    is_first_outside = quadratic + constant > 0.0
-    if is_first_outside:
-        flags |= _FIRST_IS_OUTSIDE
+    is_one_outside = quadratic + constant > 0.0
     g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
-    is_second_outside = is_first_outside if g < 0.0 else not is_first_outside
-    if is_second_outside:
-        flags |= _SECOND_IS_OUTSIDE
-    return np.nan, np.nan, flags
+    is_other_outside = is_one_outside if g < 0.0 else not is_one_outside
+    return np.nan, np.nan, is_one_outside, is_other_outside
 
 
 @kernel
@@ -406,7 +411,7 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_cou
         pieces[piece_count, END_X], pieces[piece_count, END_Y] = _evaluate(curve, stop)
         pieces[piece_count, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * start)
         pieces[piece_count, CELL] = curve[_CURVE_CELL]
-        pieces[piece_count, BEYOND] = curve[_CURVE_BEYOND]
+        pieces[piece_count, OTHER_CELL] = curve[_CURVE_OTHER_CELL]
         start = stop
         piece_count += 1
     return piece_count
@@ -432,7 +437,8 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
 
 @kernel
 def _find_parameter(curve: Array, x: float, y: float) -> float:
-    """Return the t of the point q(t) nearest to a point that is close to the curve."""
+    """Return t of the point q(t) for a point on the curve, which may be off by rounding."""
+    # With the formula of q(t), both quotients below are equal to t. The larger divisor is more accurate.
     k = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]

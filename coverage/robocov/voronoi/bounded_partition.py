@@ -16,9 +16,9 @@ from robocov.observation import Cells
 from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi.clipped_cells import compute_clipped_cells
-from robocov.voronoi.clipping import EDGE_BEYOND, EDGE_CELL, EDGE_COLUMNS, EDGE_END_X, CellArrays
-from robocov.voronoi.delaunay import CORNER, ENTRIES_PER_TRIANGLE, Mesh
-from robocov.voronoi.triangulated_cells import compute_triangulated_cells
+from robocov.voronoi.clipping import EDGE_CELL, EDGE_COLUMNS, EDGE_END_X, EDGE_OTHER_CELL, CellArrays
+from robocov.voronoi.delaunay import CORNER, ENTRIES_PER_TRIANGLE, NOT_TRIANGULATED, Mesh
+from robocov.voronoi.triangulated_cells import FAILED, compute_triangulated_cells
 
 _MIN_TRIANGULATED_ROBOTS = 16
 """Team size from which a triangulation is faster than clipping each cell by all other robots."""
@@ -26,6 +26,8 @@ _MIN_TRIANGULATED_ROBOTS = 16
 _NO_EDGES = np.empty((0, EDGE_COLUMNS))
 _NO_MESH = np.empty((2, 0), dtype=np.int32)
 """Replaces the triangulation if cells are clipped."""
+_NOT_FINITE = -1
+"""Returned instead of a number of edges if the coordinates of a generator are not finite."""
 
 _AnyCells = TypeVar("_AnyCells", bound=Cells)
 
@@ -149,10 +151,10 @@ def partition(
     mesh = _create_mesh(len(points), triangulation, is_complete=neighbors.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
     edge_count = _compute_cells(points, region.sides, neighbor_positions, mesh, cells)
-    if edge_count < 0:
-        robot = -1 - edge_count
+    if edge_count == _NOT_FINITE:
+        robot = int(np.isfinite(points).all(axis=1).argmin())
         raise InputError(f"generators[{robot}]: expected finite numbers, got {quote(points[robot].tolist())}")
-    triangulation_failed = mesh.shape[1] > 0 and mesh[CORNER, 0] < 0
+    triangulation_failed = mesh.shape[1] > 0 and mesh[CORNER, 0] == NOT_TRIANGULATED
     if triangulation_failed:
         mesh = _NO_MESH.copy()
     mesh.setflags(write=False)
@@ -252,7 +254,7 @@ def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) 
     shape = (2, ENTRIES_PER_TRIANGLE * triangle_count)
     if previous is not None and previous.shape == shape:
         return previous.copy()
-    return np.full(shape, -1, dtype=np.int32)
+    return np.full(shape, NOT_TRIANGULATED, dtype=np.int32)
 
 
 def _compute_edges(
@@ -267,7 +269,7 @@ def _compute_edges(
         start=edges[:, :EDGE_END_X].copy(),
         end=edges[:, EDGE_END_X:EDGE_CELL].copy(),
         cell=edges[:, EDGE_CELL].astype(np.intp),
-        beyond=edges[:, EDGE_BEYOND].astype(np.intp),
+        other_cell=edges[:, EDGE_OTHER_CELL].astype(np.intp),
     )
 
 
@@ -275,16 +277,17 @@ def _compute_edges(
 def _compute_cells(
     points: Array, sides: Array, neighbors: NeighborPositions, mesh: Mesh, cells: CellArrays
 ) -> int:
-    """Compute all cells; return the number of edges, or -1 - i if generator i is not finite.
+    """Compute all cells; return the number of edges, or `_NOT_FINITE`.
 
-    A mesh with columns requires a complete graph. If the triangulation fails, its first entry becomes -1.
+    A mesh with columns requires a complete graph. If the triangulation fails, its first corner becomes
+    `NOT_TRIANGULATED`.
     """
     for i in range(len(points)):
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):
-            return -1 - i
-    if mesh.shape[1]:
+            return _NOT_FINITE
+    if mesh.shape[1] > 0:
         edge_count = compute_triangulated_cells(points, sides, mesh, cells)
-        if edge_count >= 0:
+        if edge_count != FAILED:
             return edge_count
-        mesh[CORNER, 0] = -1
+        mesh[CORNER, 0] = NOT_TRIANGULATED
     return compute_clipped_cells(points, sides, neighbors, cells)

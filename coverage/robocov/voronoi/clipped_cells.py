@@ -37,6 +37,7 @@ def compute_clipped_cells(
     workspace = create_workspace(len(points), len(sides))
     edge_count = 0
     for i in range(len(points)):
+        # If communication is not limited, there are no lists of neighbors.
         if len(neighbors.indptr) > 0:
             neighbor_count = _add_listed_neighbors(workspace, points, neighbors, i)
         else:

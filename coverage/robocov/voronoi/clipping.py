@@ -17,8 +17,8 @@ X = 0
 """Column of a vertex: its offset from the generator in x, m."""
 Y = 1
 """Column of a vertex: its offset from the generator in y, m."""
-BEYOND = 2
-"""Column of a vertex: the robot on the other side of the edge that begins there, or `REGION`."""
+OTHER_CELL = 2
+"""Column of a vertex: the cell on the other side of the edge that begins there, or `REGION`."""
 _EXCESS = 3
 """Column of a vertex: its excess q · d - |d|²/2 over the current bisector, with d the offset of the
 neighbor, m²; positive beyond the bisector."""
@@ -40,10 +40,15 @@ EDGE_END_X = 2
 EDGE_END_Y = 3
 """Columns of an edge: its ends relative to the generator, m."""
 EDGE_CELL = 4
-"""Column of an edge: the robot to whose cell it belongs."""
-EDGE_BEYOND = 5
-"""Column of an edge: the robot on the other side, or `REGION`."""
+"""Column of an edge: the cell that it bounds, by the number of its robot."""
+EDGE_OTHER_CELL = 5
+"""Column of an edge: the cell on the other side, or `REGION`."""
 EDGE_COLUMNS = 6
+
+_NO_VERTEX = -1
+"""Returned instead of a vertex if no vertex is beyond a bisector."""
+_NOT_CUT = -1
+"""Returned instead of a number of vertices if a bisector does not cut a polygon."""
 
 _SORTED_NEIGHBORS = 6
 """Number of neighbors that cut a cell in order of distance. After them, few others can still cut it."""
@@ -53,7 +58,7 @@ class Workspace(NamedTuple):
     """Working memory for the computation of one cell after another."""
 
     rings: Array
-    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and `_EXCESS`."""
+    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
     neighbors: Array
     """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
@@ -93,7 +98,7 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
     -------
     Workspace
     """
-    # A cut adds at most one vertex. There is room for two more.
+    # A cut adds at most one vertex. Two more are spare.
     max_vertices = side_count + robot_count + 2
     return Workspace(
         rings=np.empty((2, max_vertices, _VERTEX_COLUMNS)),
@@ -158,7 +163,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     for k in range(count):
         rings[ring, k, X] = sides[k, SIDE_X] - points[i, 0]
         rings[ring, k, Y] = sides[k, SIDE_Y] - points[i, 1]
-        rings[ring, k, BEYOND] = REGION
+        rings[ring, k, OTHER_CELL] = REGION
     squared_range = _compute_squared_range(rings, ring, count)
     for row in range(neighbor_count):
         is_sorted = row < _SORTED_NEIGHBORS
@@ -166,7 +171,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
             _move_nearest(neighbor_rows, row, neighbor_count)
         if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
             new_count = _cut_polygon(rings, ring, count, neighbor_rows, row)
-            if new_count >= 0:
+            if new_count != _NOT_CUT:
                 ring = 1 - ring
                 count = new_count
                 squared_range = _compute_squared_range(rings, ring, count)
@@ -208,11 +213,11 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
     """Cut the polygon in a ring by the bisector to a neighbor; write the generator's side to the other ring.
 
-    Return its number of vertices, or -1, without writing anything, if the bisector does not cut the polygon.
+    Return its number of vertices, or `_NOT_CUT` without writing anything.
     """
     farthest = _compute_excess(rings, ring, count, neighbor_rows, row)
-    if farthest < 0:
-        return -1
+    if farthest == _NO_VERTEX:
+        return _NOT_CUT
     # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
     # are those from `first_cut` to `last_cut`; `after` is the vertex after them, and `before` the one before.
     last_cut = farthest
@@ -235,20 +240,20 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
     new_count = 0
     k = after
     while k != first_cut:
-        for column in (X, Y, BEYOND):
+        for column in (X, Y, OTHER_CELL):
             rings[other_ring, new_count, column] = rings[ring, k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
     robot = neighbor_rows[row, ROBOT]
     if rings[ring, before, _EXCESS] == 0.0:
         # The bisector passes through `before`, where the new edge begins.
-        rings[other_ring, new_count - 1, BEYOND] = robot
+        rings[other_ring, new_count - 1, OTHER_CELL] = robot
     else:
         _add_crossing(rings, ring, new_count, before, first_cut, robot)
         new_count += 1
     if rings[ring, after, _EXCESS] < 0.0:
-        # The rest of the edge from `last_cut` to `after` still borders on the same robot.
-        _add_crossing(rings, ring, new_count, after, last_cut, rings[ring, last_cut, BEYOND])
+        # The rest of the edge from `last_cut` to `after` still borders on the same cell.
+        _add_crossing(rings, ring, new_count, after, last_cut, rings[ring, last_cut, OTHER_CELL])
         new_count += 1
     return new_count
 
@@ -267,11 +272,14 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 @inlined_kernel
 def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
-    """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
+    """Compute the excess of each vertex over a bisector.
+
+    Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX`.
+    """
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
     level = 0.5 * neighbor_rows[row, SQUARED_DISTANCE]
-    farthest = -1
+    farthest = _NO_VERTEX
     max_excess = 0.0
     for k in range(count):
         excess = rings[ring, k, X] * dx + rings[ring, k, Y] * dy - level
@@ -283,11 +291,13 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
 
 
 @inlined_kernel
-def _add_crossing(rings: Array, ring: int, new_vertex: int, inner: int, outer: int, beyond: float) -> None:
+def _add_crossing(
+    rings: Array, ring: int, new_vertex: int, inner: int, outer: int, other_cell: float
+) -> None:
     """Write the point where an edge crosses the bisector to the other ring, as its vertex `new_vertex`.
 
     The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
-    the other side. `beyond` is the robot on the other side of the edge that begins at the new vertex.
+    the other side. `other_cell` is the cell on the other side of the edge that begins at the new vertex.
     """
     other_ring = 1 - ring
     inner_excess = rings[ring, inner, _EXCESS]
@@ -295,7 +305,7 @@ def _add_crossing(rings: Array, ring: int, new_vertex: int, inner: int, outer: i
     for column in (X, Y):
         step = rings[ring, outer, column] - rings[ring, inner, column]
         rings[other_ring, new_vertex, column] = rings[ring, inner, column] + fraction * step
-    rings[other_ring, new_vertex, BEYOND] = beyond
+    rings[other_ring, new_vertex, OTHER_CELL] = other_cell
 
 
 @inlined_kernel
@@ -324,30 +334,31 @@ def write_cell(
     """
     rings = workspace.rings
     edges = cells.edges
+    # Twice the area, and six times the first moments.
     doubled_area = 0.0
-    moment_x = 0.0
-    moment_y = 0.0
+    moment_sum_x = 0.0
+    moment_sum_y = 0.0
     k = polygon.start
     for edge in range(edge_count, edge_count + polygon.vertex_count):
         after = _get_next_vertex(k, polygon.vertex_count)
-        x = rings[polygon.ring, k, X]
-        y = rings[polygon.ring, k, Y]
-        u = rings[polygon.ring, after, X]
-        v = rings[polygon.ring, after, Y]
-        cross = x * v - u * y
+        start_x = rings[polygon.ring, k, X]
+        start_y = rings[polygon.ring, k, Y]
+        end_x = rings[polygon.ring, after, X]
+        end_y = rings[polygon.ring, after, Y]
+        cross = start_x * end_y - end_x * start_y
         doubled_area += cross
-        moment_x += cross * (x + u)
-        moment_y += cross * (y + v)
+        moment_sum_x += cross * (start_x + end_x)
+        moment_sum_y += cross * (start_y + end_y)
         if edge < len(edges):
-            edges[edge, EDGE_START_X] = x
-            edges[edge, EDGE_START_Y] = y
-            edges[edge, EDGE_END_X] = u
-            edges[edge, EDGE_END_Y] = v
+            edges[edge, EDGE_START_X] = start_x
+            edges[edge, EDGE_START_Y] = start_y
+            edges[edge, EDGE_END_X] = end_x
+            edges[edge, EDGE_END_Y] = end_y
             edges[edge, EDGE_CELL] = i
-            edges[edge, EDGE_BEYOND] = rings[polygon.ring, k, BEYOND]
+            edges[edge, EDGE_OTHER_CELL] = rings[polygon.ring, k, OTHER_CELL]
         k = after
     factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
     cells.mass[i] = max(0.5 * doubled_area, 0.0)
-    cells.centroid[i, 0] = points[i, 0] + moment_x * factor
-    cells.centroid[i, 1] = points[i, 1] + moment_y * factor
+    cells.centroid[i, 0] = points[i, 0] + moment_sum_x * factor
+    cells.centroid[i, 1] = points[i, 1] + moment_sum_y * factor
     return edge_count + polygon.vertex_count

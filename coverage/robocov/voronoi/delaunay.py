@@ -1,14 +1,17 @@
 """The Delaunay triangulation of moving points, reused from step to step and repaired by flips.
 
-A mesh stores three half-edges for each triangle, counter-clockwise. Half-edge h begins at the point
-``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighboring triangle along the same
-edge, or -1. One entry after each triangle is unused, so that ``h & 3`` is the position of h within its
-triangle and ``h & -4`` the first half-edge of that triangle. Three distant sentinels enclose the n points,
-and follow them in arrays of points. There are therefore 2 n + 1 triangles, and 8 n + 4 entries.
+A mesh stores the sides of each triangle, counter-clockwise. They are called half-edges, because the edge
+between two triangles is stored twice, once for each of them: the two half-edges are *twins*, and run in
+opposite directions. Half-edge h begins at the point ``mesh[CORNER, h]``, and its twin is ``mesh[TWIN, h]``,
+or `NO_TWIN` on the outline of the mesh. The indices of the half-edges of a triangle are 4 k, 4 k + 1 and
+4 k + 2, and entry 4 k + 3 is unused, so that the lowest two bits of h are its position within the triangle.
+Three distant points, the *sentinels*, form a triangle around the n points, and follow them in arrays of
+points. There are therefore 2 n + 1 triangles, and 8 n + 4 entries.
 
 An edge is Delaunay if the two angles opposite to it add up to at most half a turn, that is, if their
-cotangents add up to at least 0. The cotangents also give the positions of the Voronoi vertices on the edge's
-bisector.
+cotangents add up to at least 0. Otherwise it is *flipped*: replaced by the other diagonal of the
+quadrilateral that its two triangles form. The cotangents also give the positions of the Voronoi vertices on
+the edge's bisector.
 """
 
 from typing import TypeAlias
@@ -25,9 +28,20 @@ Mesh: TypeAlias = NDArray[np.int32]
 CORNER = 0
 """Row of a mesh: the point at which each half-edge begins."""
 TWIN = 1
-"""Row of a mesh: the half-edge of the neighboring triangle along the same edge; -1 where there is none."""
+"""Row of a mesh: the half-edge of the neighboring triangle along the same edge, or `NO_TWIN`."""
+NO_TWIN = -1
+"""Stands for the twin of a half-edge on the outline of a mesh."""
+NOT_TRIANGULATED = -1
+"""First corner of a mesh that does not contain a triangulation."""
 ENTRIES_PER_TRIANGLE = 4
 """Number of entries of a mesh per triangle: three half-edges, and an unused one."""
+
+_POSITION_BITS = 3
+"""Bit mask for the position of a half-edge within its triangle."""
+_FAILED = -1
+"""Returned instead of a triangle or of a number of flips if rounding makes the triangulation fail."""
+_NO_HALF_EDGE = -1
+"""Returned instead of a half-edge if a point is on the right of none."""
 
 _TOLERANCE = 1e-14
 """An edge is not flipped if the sum of its two cotangents is negative by at most this fraction of the sum of
@@ -45,7 +59,7 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
     Parameters
     ----------
     mesh : (2, 8 n + 4) int32 array
-        Changed in place. ``mesh[CORNER, 0]`` is -1 if there is no triangulation yet.
+        Changed in place. ``mesh[CORNER, 0]`` is `NOT_TRIANGULATED` if there is no triangulation yet.
     points : (n + 3, 2) array, m
         The last three are sentinels, whose triangle contains all others.
     cotangents : (8 n + 4,) array
@@ -58,7 +72,7 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
     bool
         Whether it succeeded.
     """
-    if mesh[CORNER, 0] >= 0 and _repair(mesh, points, cotangents, stack):
+    if mesh[CORNER, 0] != NOT_TRIANGULATED and _repair(mesh, points, cotangents, stack):
         return True
     return _build(mesh, points, cotangents, stack)
 
@@ -75,11 +89,11 @@ def is_half_edge(h: int) -> bool:
     -------
     bool
     """
-    return (h & 3) < 3
+    return (h & _POSITION_BITS) < 3
 
 
 @inlined_kernel
-def get_next(h: int) -> int:
+def get_next_half_edge(h: int) -> int:
     """Return the half-edge that follows another one in its triangle.
 
     Parameters
@@ -90,11 +104,11 @@ def get_next(h: int) -> int:
     -------
     int
     """
-    return h + 1 if (h & 3) < 2 else h - 2
+    return h + 1 if (h & _POSITION_BITS) < 2 else h - 2
 
 
 @inlined_kernel
-def get_first(h: int) -> int:
+def get_first_half_edge(h: int) -> int:
     """Return the first half-edge of the triangle that contains a half-edge.
 
     Parameters
@@ -105,12 +119,11 @@ def get_first(h: int) -> int:
     -------
     int
     """
-    # Clear the two bits that hold the position within the triangle.
-    return h & -4
+    return h & ~_POSITION_BITS
 
 
 @inlined_kernel
-def get_previous(h: int) -> int:
+def get_previous_half_edge(h: int) -> int:
     """Return the half-edge that precedes another one in its triangle.
 
     Parameters
@@ -121,7 +134,7 @@ def get_previous(h: int) -> int:
     -------
     int
     """
-    return h - 1 if (h & 3) > 0 else h + 2
+    return h - 1 if (h & _POSITION_BITS) > 0 else h + 2
 
 
 @kernel
@@ -134,7 +147,7 @@ def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bo
         if is_half_edge(h) and h < mesh[TWIN, h] and _must_flip(mesh, cotangents, h):
             flip_count, are_new_ccw = _flip_from(mesh, points, cotangents, stack, h, flip_count)
             is_ccw &= are_new_ccw
-            if flip_count < 0:
+            if flip_count == _FAILED:
                 return False
     # Flips may have removed triangles that were clockwise before.
     return is_ccw or _compute_all_cotangents(mesh, points, cotangents)
@@ -142,26 +155,28 @@ def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bo
 
 @kernel
 def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Triangulate from scratch by inserting the points one after the other."""
+    """Triangulate from scratch by inserting one point after another; return whether it succeeded."""
     n = len(points) - 3
+    # At first there is one triangle, whose corners are the sentinels.
     for k in range(3):
         mesh[CORNER, k] = n + k
-        mesh[TWIN, k] = -1
+        mesh[TWIN, k] = NO_TWIN
     flip_count = 0
     triangle = 0
     for i in range(n):
-        triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, 2 * i + 1)
-        if triangle < 0:
+        # Each of the previous points has added two triangles.
+        triangle_count = 2 * i + 1
+        triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, triangle_count)
+        if triangle == _FAILED:
             return False
-        # Each point adds two triangles to those before.
-        second = ENTRIES_PER_TRIANGLE * (2 * i + 1)
+        second = ENTRIES_PER_TRIANGLE * triangle_count
         third = second + ENTRIES_PER_TRIANGLE
         _split_triangle(mesh, triangle, second, third, i)
         for h in (triangle, second, third):
             _compute_cotangents(mesh, points, cotangents, h)
         for h in (triangle, second, third):
             flip_count, _ = _flip_from(mesh, points, cotangents, stack, h, flip_count)
-            if flip_count < 0:
+            if flip_count == _FAILED:
                 return False
     return _compute_all_cotangents(mesh, points, cotangents)
 
@@ -196,9 +211,9 @@ def _write_triangle(mesh: Mesh, first: int, a: int, b: int, c: int) -> None:
 
 @inlined_kernel
 def _link(mesh: Mesh, h: int, twin: int) -> None:
-    """Make two half-edges each other's twins. If `twin` is -1, the first one has none."""
+    """Make two half-edges each other's twins; `twin` may be `NO_TWIN`."""
     mesh[TWIN, h] = twin
-    if twin >= 0:
+    if twin != NO_TWIN:
         mesh[TWIN, twin] = h
 
 
@@ -238,37 +253,38 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
     """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
     own = cotangents[h]
     opposite = cotangents[mesh[TWIN, h]]
+    # This is also true if a cotangent is nan.
     return not own + opposite >= -_TOLERANCE * (abs(own) + abs(opposite))
 
 
 @kernel
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
-    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 on failure."""
+    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or `_FAILED`."""
     triangle = start
     # Because of rounding, the walk could go in circles.
     max_steps = 3 * triangle_count + 3
     for _ in range(max_steps):
         h = _find_edge_to_cross(mesh, points, triangle, x, y)
-        if h < 0:
+        if h == _NO_HALF_EDGE:
             return triangle
         twin = mesh[TWIN, h]
-        if twin < 0:
-            return -1
-        triangle = get_first(twin)
-    return -1
+        if twin == NO_TWIN:
+            return _FAILED
+        triangle = get_first_half_edge(twin)
+    return _FAILED
 
 
 @inlined_kernel
 def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: float) -> int:
-    """Return a half-edge of a triangle that has (x, y) on its right; -1 if the triangle contains (x, y)."""
+    """Return a half-edge of a triangle with (x, y) on its right; `_NO_HALF_EDGE` if (x, y) is inside."""
     for h in range(triangle, triangle + 3):
         a = mesh[CORNER, h]
-        b = mesh[CORNER, get_next(h)]
+        b = mesh[CORNER, get_next_half_edge(h)]
         ax = points[a, 0]
         ay = points[a, 1]
         if (points[b, 0] - ax) * (y - ay) - (points[b, 1] - ay) * (x - ax) < 0.0:
             return h
-    return -1
+    return _NO_HALF_EDGE
 
 
 @inlined_kernel
@@ -277,7 +293,7 @@ def _flip_from(
 ) -> tuple[int, bool]:
     """Flip the edge of h if it is not Delaunay, then the edges around it, until all of them are.
 
-    Return the number of flips so far, or -1 on failure, and whether all new triangles are counter-clockwise.
+    Return the number of flips so far, or `_FAILED`, and whether all new triangles are counter-clockwise.
     """
     stack[0] = h
     stack_size = 1
@@ -286,25 +302,26 @@ def _flip_from(
         stack_size -= 1
         a = stack[stack_size]
         b = mesh[TWIN, a]
-        if b < 0 or not _must_flip(mesh, cotangents, a):
+        if b == NO_TWIN or not _must_flip(mesh, cotangents, a):
             continue
         # The new edge connects the two corners opposite to the old one. `before_a` and `before_b` become its
         # half-edges, and b and a take over their former edges.
-        before_a = get_previous(a)
-        before_b = get_previous(b)
+        before_a = get_previous_half_edge(a)
+        before_b = get_previous_half_edge(b)
         mesh[CORNER, a] = mesh[CORNER, before_b]
         mesh[CORNER, b] = mesh[CORNER, before_a]
         _link(mesh, a, mesh[TWIN, before_b])
         _link(mesh, b, mesh[TWIN, before_a])
         _link(mesh, before_a, before_b)
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(a))
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(b))
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(a))
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(b))
         flip_count += 1
         if flip_count > _MAX_FLIPS_PER_POINT * len(points) or stack_size + 4 > len(stack):
-            return -1, False
+            return _FAILED, False
+        # The outline of the quadrilateral: edges that the flip may have made non-Delaunay.
         stack[stack_size] = a
-        stack[stack_size + 1] = get_next(a)
+        stack[stack_size + 1] = get_next_half_edge(a)
         stack[stack_size + 2] = b
-        stack[stack_size + 3] = get_next(b)
+        stack[stack_size + 3] = get_next_half_edge(b)
         stack_size += 4
     return flip_count, is_ccw

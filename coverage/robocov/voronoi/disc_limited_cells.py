@@ -29,9 +29,9 @@ class _Arcs(NamedTuple):
 class _CutEdges(NamedTuple):
     """Edges cut by discs: each is replaced by an arc, the part of the edge in the disc, and another arc."""
 
-    first: Array
-    """(e, 2) m, where the part in the disc begins, relative to the generator."""
-    last: Array
+    inner_start: Array
+    """(e, 2) m, where the part in the disc starts, relative to the generator."""
+    inner_end: Array
     """(e, 2) m, where it ends; the same point if the edge is outside the disc."""
     arc_before: _Arcs
     arc_after: _Arcs
@@ -66,9 +66,9 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     radius = np.minimum(radii, 2.0 * reach + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
     # First the triangles between the generators and the parts of the edges in the discs, then the sectors.
-    cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]
+    cross = cut.inner_start[:, 0] * cut.inner_end[:, 1] - cut.inner_start[:, 1] * cut.inner_end[:, 0]
     doubled_area = cross.copy()
-    doubled_moment = cross[:, None] * (cut.first + cut.last) / 3.0
+    doubled_moment = cross[:, None] * (cut.inner_start + cut.inner_end) / 3.0
     for angle, turn in (cut.arc_before, cut.arc_after):
         doubled_area += radius * radius * turn
         factor = 2.0 / 3.0 * radius**3
@@ -105,8 +105,8 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     max_coordinate = float(np.abs(edges.start).max(initial=0.0))
     radius = np.minimum(radii[edges.cell], 4.0 * max_coordinate + 1.0)
     cut = _cut_by_discs(edges, radius)
-    starts = [cut.first]
-    ends = [cut.last]
+    starts = [cut.inner_start]
+    ends = [cut.inner_end]
     cells = [edges.cell]
     fraction = np.linspace(0.0, 1.0, _CHORDS_PER_ARC + 1)
     for start_angle, turn in (cut.arc_before, cut.arc_after):
@@ -122,7 +122,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
         start=np.concatenate(starts)[order],
         end=np.concatenate(ends)[order],
         cell=cell[order],
-        beyond=np.full(len(cell), REGION),
+        other_cell=np.full(len(cell), REGION),
     )
 
 
@@ -135,18 +135,20 @@ def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
     nearest = edges.start + middle[:, None] * step
     squared_half = (radius * radius - (nearest * nearest).sum(axis=1)) / squared_length
     half = np.sqrt(np.maximum(squared_half, 0.0))
-    first = edges.start + np.clip(middle - half, 0.0, 1.0)[:, None] * step
-    last = edges.start + np.clip(middle + half, 0.0, 1.0)[:, None] * step
+    inner_start = edges.start + np.clip(middle - half, 0.0, 1.0)[:, None] * step
+    inner_end = edges.start + np.clip(middle + half, 0.0, 1.0)[:, None] * step
     return _CutEdges(
-        first=first,
-        last=last,
-        arc_before=_build_arcs(edges.start, first),
-        arc_after=_build_arcs(last, edges.end),
+        inner_start=inner_start,
+        inner_end=inner_end,
+        arc_before=_build_arcs(edges.start, inner_start),
+        arc_after=_build_arcs(inner_end, edges.end),
     )
 
 
 def _build_arcs(start: Array, end: Array) -> _Arcs:
     """Return the arcs about the origin from the directions of start points to those of end points, (e, 2)."""
-    x, y = start.T
-    u, v = end.T
-    return _Arcs(angle=np.arctan2(y, x), turn=np.arctan2(x * v - y * u, x * u + y * v))
+    start_x, start_y = start.T
+    end_x, end_y = end.T
+    cross = start_x * end_y - start_y * end_x
+    dot = start_x * end_x + start_y * end_y
+    return _Arcs(angle=np.arctan2(start_y, start_x), turn=np.arctan2(cross, dot))

@@ -33,9 +33,11 @@ def find_own_samples(
             if is_own[i, k]:
                 x = samples[k, 0]
                 y = samples[k, 1]
-                own_square = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
-                other_square = (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
-                is_own[i, k] = own_square <= other_square
+                dx = x - positions[i, 0]
+                dy = y - positions[i, 1]
+                neighbor_dx = x - neighbor_positions[m, 0]
+                neighbor_dy = y - neighbor_positions[m, 1]
+                is_own[i, k] = dx**2 + dy**2 <= neighbor_dx**2 + neighbor_dy**2
     return is_own
 
 

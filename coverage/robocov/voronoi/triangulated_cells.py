@@ -8,9 +8,9 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET, SIDE_X, SIDE_Y
 from robocov.voronoi.clipping import (
-    BEYOND,
     DX,
     DY,
+    OTHER_CELL,
     ROBOT,
     SQUARED_DISTANCE,
     CellArrays,
@@ -26,12 +26,20 @@ from robocov.voronoi.delaunay import (
     CORNER,
     TWIN,
     Mesh,
-    get_next,
-    get_previous,
+    get_next_half_edge,
+    get_previous_half_edge,
     is_half_edge,
     update_triangulation,
 )
 
+FAILED = -1
+"""Returned instead of a number of edges if the triangulation failed."""
+_MAX_OFFSET_SIZES = 2.0
+"""Largest offset of a robot from the center of the region in x and y, as a multiple of the region's size.
+
+The sentinels are at least 9 sizes away from the center. Robots within these offsets lie in their triangle,
+and are nearer than any sentinel to every point of the region, so that no sentinel cuts a cell.
+"""
 _AREA_TOLERANCE = 1e-12
 """Largest difference that rounding may cause between the total area of the cells and the area of the region,
 as a fraction of the region's area."""
@@ -45,7 +53,7 @@ class Triangulation(NamedTuple):
     cotangents: Array
     """(8 n + 4,) Cotangents of the angles opposite to the half-edges."""
     half_edges: IntArray
-    """(8 n + 4,) A half-edge that begins at each robot, in the first n entries."""
+    """(n + 3,) A half-edge that begins at each robot, and at each of the three sentinels."""
 
 
 class _Fan(NamedTuple):
@@ -75,19 +83,19 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     sides : (k, 5) array
         The region, as `Region.sides`.
     mesh : (2, 8 n + 4) int32 array
-        Triangulation of a previous partition; ``mesh[CORNER, 0]`` is -1 if there is none. Changed in place.
+        Triangulation of a previous partition, if there is one; see `update_triangulation`. Changed in place.
     cells : CellArrays
         Changed in place.
 
     Returns
     -------
     int
-        Number of edges, or -1 if the triangulation failed, as it may if robots coincide.
+        Number of edges, or `FAILED`; the triangulation may fail if robots coincide.
     """
-    half_edges = np.empty(mesh.shape[1], np.intp)
+    half_edges = np.empty(len(points) + 3, np.intp)
     triangulation = Triangulation(mesh, np.empty(mesh.shape[1]), half_edges)
     if not _triangulate(triangulation, points, sides):
-        return -1
+        return FAILED
     workspace = create_workspace(len(points), len(sides))
     edge_count = 0
     total_area = 0.0
@@ -97,7 +105,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
         total_area += cells.mass[i]
     region_area = _compute_region_area(sides)
     is_complete = abs(total_area - region_area) <= _AREA_TOLERANCE * region_area
-    return edge_count if is_complete else -1
+    return edge_count if is_complete else FAILED
 
 
 @kernel
@@ -109,14 +117,12 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     for i in range(n):
         vertices[i, 0] = points[i, 0]
         vertices[i, 1] = points[i, 1]
-        # Robots within this distance lie in the triangle of the sentinels, and no sentinel cuts a cell.
-        if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
+        if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > _MAX_OFFSET_SIZES * size:
             return False
     _place_sentinels(vertices[n:], x, y, size)
     mesh = triangulation.mesh
     half_edges = triangulation.half_edges
-    # The array of half-edges is filled only afterwards, and serves as the stack until then.
-    stack = half_edges
+    stack = np.empty(mesh.shape[1], np.intp)
     if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
     for h in range(mesh.shape[1]):
@@ -127,7 +133,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 
 @inlined_kernel
 def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
-    """Write the three sentinels, which are the corners of a large triangle around (x, y)."""
+    """Write the three sentinels, the corners of a large triangle around the center (x, y) of the region."""
     sentinels[0, 0] = x - 8.0 * size
     sentinels[0, 1] = y - 5.0 * size
     sentinels[1, 0] = x + 8.0 * size
@@ -138,7 +144,7 @@ def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
 
 @kernel
 def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
-    """Return the center of the region's bounding box and the sum of its width and height, m."""
+    """Return the center of the region's bounding box, and the region's size: its width plus its height, m."""
     left = sides[0, SIDE_X]
     right = sides[0, SIDE_X]
     low = sides[0, SIDE_Y]
@@ -181,6 +187,7 @@ def _find_cell(
             sides[k, SIDE_OFFSET]
             - (sides[k, SIDE_NORMAL_X] * points[i, 0] + sides[k, SIDE_NORMAL_Y] * points[i, 1]),
         )
+    # If all vertices of the cell are nearer than the sides of the region, no side cuts it.
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
         return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest)
     # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
@@ -206,8 +213,8 @@ def _walk_around(
     squared_reach = 0.0
     h = first_half_edge
     while True:
-        back = get_previous(h)
-        j = mesh[CORNER, get_next(h)]
+        back = get_previous_half_edge(h)
+        j = mesh[CORNER, get_next_half_edge(h)]
         if j < n:
             if j < lowest_robot:
                 lowest_robot = j
@@ -226,11 +233,13 @@ def _walk_around(
             neighbor_rows[count, ROBOT] = j
             rings[0, count, X] = x
             rings[0, count, Y] = y
-            rings[0, count, BEYOND] = mesh[CORNER, back]
+            # The edge from here to the next Voronoi vertex borders on the third corner of the triangle.
+            rings[0, count, OTHER_CELL] = mesh[CORNER, back]
             count += 1
         else:
             # Robot i is connected to a sentinel: its cell is not bounded by robots alone.
             squared_reach = np.inf
+        # Turn to the next triangle counter-clockwise.
         h = mesh[TWIN, back]
         if h == first_half_edge:
             return _Fan(

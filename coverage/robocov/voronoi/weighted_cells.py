@@ -24,7 +24,7 @@ from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
-from robocov.voronoi.arcs import BEYOND, CELL, compute_moments, link_rings, split_into_chords
+from robocov.voronoi.arcs import CELL, OTHER_CELL, compute_moments, link_rings, split_into_chords
 from robocov.voronoi.boundary_curves import trace_boundaries
 from robocov.voronoi.bounded_partition import (
     VoronoiPartition,
@@ -100,7 +100,7 @@ class WeightedCells(Cells):
             start=np.concatenate([np.empty((0, 2)), *(line[:-1] for line in lines)]),
             end=np.concatenate([np.empty((0, 2)), *(line[1:] for line in lines)]),
             cell=self.pieces[:, CELL].astype(np.intp).repeat(chord_counts),
-            beyond=self.pieces[:, BEYOND].astype(np.intp).repeat(chord_counts),
+            other_cell=self.pieces[:, OTHER_CELL].astype(np.intp).repeat(chord_counts),
         )
 
     @cached_property
@@ -227,7 +227,7 @@ def _compute_weighted_cells(
             points=points,
             sides=region.sides,
             pairs=np.column_stack([robot, other, offsets, speeds[robot], speeds[other]]),
-            edges=np.column_stack([edges.start, edges.end, edges.cell, edges.beyond]),
+            edges=np.column_stack([edges.start, edges.end, edges.cell, edges.other_cell]),
             is_straight=is_straight,
         )
     moments = compute_moments(pieces, cell_count=len(points))

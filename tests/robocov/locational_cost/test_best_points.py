@@ -54,7 +54,7 @@ def select_cell_edges(edges: CellEdges, index: int) -> CellEdges:
         edges.start[is_of_cell],
         edges.end[is_of_cell],
         np.zeros(is_of_cell.sum(), dtype=int),
-        edges.beyond[is_of_cell],
+        edges.other_cell[is_of_cell],
     )
 
 
