@@ -8,9 +8,16 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.cost.lattice import SLOTS, Tiles
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
-from robocov.geodesic.box_tree import LEAF_SIZE, LOW_X, skip_subtree
+from robocov.cost.lattice import NO_SITE, SLOTS, Tiles
+from robocov.geodesic.angular_index import (
+    NO_SPACE,
+    ONLY_SOURCE,
+    AngularWallIndex,
+    index_walls,
+    is_box_hidden,
+    is_visible,
+)
+from robocov.geodesic.box_tree import END_OF_TREE, LEAF_SIZE, LOW_X, ROOT, skip_subtree
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
@@ -41,9 +48,6 @@ _FARTHEST = 1
 """Columns of the lengths that `find_corner_views` writes; see `CornerViews`."""
 LENGTH_COLUMNS = 2
 """Number of these columns."""
-
-_SOURCE = 0
-"""The only source of the index, which is the current corner."""
 
 
 def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:
@@ -101,20 +105,17 @@ def find_corner_views(
     Returns
     -------
     int
-        Number of rows of the result, or -1 if there is not enough space in it or in the index.
+        Number of rows of the result, or `NO_SPACE` if there is not enough in it or in the index.
     """
-    squared_reach = np.inf
-    used = 0  # There is only one source, so none of the entries are used by others.
     row_count = 0
     for corner in range(first, end):
         x = walls.corners[corner, 0]
         y = walls.corners[corner, 1]
-        entry_count = add_walls(walls, wall_index, _SOURCE, x, y, squared_reach, used)
-        if entry_count < 0:
-            return -1
+        if index_walls(walls, wall_index, x, y) == NO_SPACE:
+            return NO_SPACE
         row_count = _add_views(walls, tiles, wall_index, corner, indices, lengths, row_count)
-        if row_count < 0:
-            return -1
+        if row_count == NO_SPACE:
+            return NO_SPACE
     return row_count
 
 
@@ -128,27 +129,23 @@ def _add_views(
     lengths: Array,
     row_count: int,
 ) -> int:
-    """Add a row for each tile in which a corner sees sites.
-
-    Return the new number of rows, or -1 if there is not enough space.
-    """
+    """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`."""
     tree = tiles.tree
     first_leaf = len(tree) // 2
-    # Node 1 is the root of the tree. After the last node, `skip_subtree` returns 0.
-    node = 1
-    while node != 0:
+    node = ROOT
+    while node != END_OF_TREE:
         is_empty = tree[node, LOW_X] == np.inf
-        if is_empty or is_box_hidden(tree, node, wall_index, _SOURCE):
+        if is_empty or is_box_hidden(tree, node, wall_index, ONLY_SOURCE):
             node = skip_subtree(node)
             continue
         if node < first_leaf:
-            node *= 2
+            node = 2 * node
             continue
         first_tile = (node - first_leaf) * LEAF_SIZE
         for tile in range(first_tile, min(first_tile + LEAF_SIZE, len(tiles.boxes))):
             if row_count == len(indices):
-                return -1
-            if is_box_hidden(tiles.boxes, tile, wall_index, _SOURCE):
+                return NO_SPACE
+            if is_box_hidden(tiles.boxes, tile, wall_index, ONLY_SOURCE):
                 continue
             visible_slots = _find_visible_sites(walls, wall_index, tiles, corner, tile, lengths[row_count])
             if visible_slots != 0:
@@ -174,9 +171,9 @@ def _find_visible_sites(
         x = tiles.x[tile, slot]
         y = tiles.y[tile, slot]
         if (
-            tiles.site[tile, slot] >= 0
+            tiles.site[tile, slot] != NO_SITE
             and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
-            and is_visible(walls, wall_index, _SOURCE, x, y)
+            and is_visible(walls, wall_index, ONLY_SOURCE, x, y)
         ):
             visible_slots |= 1 << slot
             dx = x - corner_x

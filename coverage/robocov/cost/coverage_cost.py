@@ -19,13 +19,14 @@ from robocov.cost.corner_views import (
 )
 from robocov.cost.lattice import MAX_LATTICE, build_lattice
 from robocov.cost.result import CoverageResult
-from robocov.cost.site_paths import CostMap, Search, SitePaths, find_site_paths
+from robocov.cost.site_paths import NO_ROBOT, CostMap, Search, SitePaths, find_site_paths
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.density.polygon_masses import compute_square_means
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, quote, require_number, to_floats
 from robocov.geodesic import Geodesics
 from robocov.geodesic.angular_index import AngularWallIndex
+from robocov.geodesic.corner_graph import NO_CORNER
 from robocov.geodesic.geodesics import SOURCE_BINS
 
 
@@ -141,6 +142,7 @@ class CoverageCost:
         return twin
 
     def _set_density(self, environment: Environment) -> None:
+        """Use the density of an environment: compute the weights of the sites."""
         self.environment = environment
         self._component_masses = environment.free_masses
         self._mass = float(self._component_masses.sum())
@@ -230,9 +232,10 @@ class CoverageCost:
         paths = SitePaths.allocate(team_count, len(self.points))
         # The number of entries that the wall index needs is not known in advance.
         while True:
-            entry_count = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
+            # `add_walls` keeps one entry per bin free for the wall that it adds.
+            max_entries = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
             search = Search.allocate(
-                wall_index=AngularWallIndex.allocate(robot_count, SOURCE_BINS, entry_count),
+                wall_index=AngularWallIndex.allocate(robot_count, SOURCE_BINS, max_entries),
                 robot_count=robot_count,
                 corner_count=len(self.corners),
                 tile_count=len(self._map.tiles.boxes),
@@ -252,9 +255,9 @@ class CoverageCost:
         shape = (1, len(self.points))
         arrivals = SitePaths(
             distance=np.full(shape, np.inf),
-            owner=np.full(shape, -1),
-            first_corner=np.full(shape, -1),
-            last_corner=np.full(shape, -1),
+            owner=np.full(shape, NO_ROBOT),
+            first_corner=np.full(shape, NO_CORNER),
+            last_corner=np.full(shape, NO_CORNER),
         )
         times = np.full(shape, np.inf)
         for speed in np.unique(speeds)[::-1]:
@@ -290,7 +293,7 @@ class CoverageCost:
         uncovered_area = 0.0
         # Sites that no robot can reach are left out of the means.
         if not is_covered.all():
-            is_reached = owner >= 0
+            is_reached = owner != NO_ROBOT
             reached_distances = distances[is_reached]
             reached_owner = owner[is_reached]
             weights = None if self.weights is None else self.weights[is_reached]

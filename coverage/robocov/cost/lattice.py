@@ -25,6 +25,9 @@ SLOTS = TILE_SIDE**2
 TILES_PER_GROUP = 16
 """Number of consecutive tiles that share a bounding box."""
 
+NO_SITE = -1
+"""Stands for the site of a cell that is not free."""
+
 _CELLS_PER_BLOCK = 1 << 18
 """Number of cells that are located at the same time, to limit memory."""
 
@@ -79,7 +82,7 @@ class Tiles(NamedTuple):
     y: Array
     """(t, SLOTS) y coordinate of each site."""
     site: IntArray
-    """(t, SLOTS) Index of the site in the lattice, or -1 if the cell is not free."""
+    """(t, SLOTS) Index of the site in the lattice, or `NO_SITE` if the cell is not free."""
     component: IntArray
     """(t, SLOTS) Component of the free space."""
     boxes: Array
@@ -164,7 +167,7 @@ def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Ti
     return Tiles(
         x=x,
         y=y,
-        site=np.where(is_empty, -1, site),
+        site=np.where(is_empty, NO_SITE, site),
         component=component[site],
         boxes=np.hstack([low, high]),
         group_boxes=np.hstack([group_low, group_high]),

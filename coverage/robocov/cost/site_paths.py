@@ -16,8 +16,9 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.cost.corner_views import CornerViews
-from robocov.cost.lattice import SLOTS, TILES_PER_GROUP, Tiles
+from robocov.cost.lattice import NO_SITE, SLOTS, TILES_PER_GROUP, Tiles
 from robocov.geodesic.angular_index import (
+    NO_SPACE,
     AngularWallIndex,
     add_walls,
     is_box_hidden,
@@ -32,12 +33,15 @@ from robocov.geodesic.box_tree import (
     LOW_Y,
     compute_squared_box_distance,
 )
-from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue, relax_paths
+from robocov.geodesic.corner_graph import NO_CORNER, CornerGraph, CornerPaths, CornerQueue, relax_paths
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 _MAX_SMALL_TEAM = 12
 """Size of the largest team for which walls are indexed at any distance. In such a small team, each robot is
 tested with most sites anyway."""
+
+NO_ROBOT = -1
+"""Stands for the robot where a path starts if there is no path."""
 
 _REACH_PADDING = 1e-9
 """Relative margin added to the reach of a robot's view, far larger than rounding."""
@@ -76,9 +80,9 @@ class Search(NamedTuple):
     site_length: Array
     """(t, SLOTS) Length of the shortest path to each site; inf if there is none."""
     site_robot: IntArray
-    """(t, SLOTS) The robot where that path starts, or -1 if there is none."""
+    """(t, SLOTS) The robot where that path starts, or `NO_ROBOT`."""
     site_corner: IntArray
-    """(t, SLOTS) The last corner at which that path bends, or -1 if there is none."""
+    """(t, SLOTS) The last corner at which that path bends, or `NO_CORNER`."""
 
     @classmethod
     def allocate(
@@ -117,11 +121,11 @@ class SitePaths(NamedTuple):
     distance: Array
     """(r, m) Length of each path, m; inf if no robot can reach the site."""
     owner: IntArray
-    """(r, m) The robot where the path starts, or -1 if there is none."""
+    """(r, m) The robot where the path starts, or `NO_ROBOT`."""
     first_corner: IntArray
-    """(r, m) The first corner at which the path bends, or -1 if there is none."""
+    """(r, m) The first corner at which the path bends, or `NO_CORNER`."""
     last_corner: IntArray
-    """(r, m) The last corner at which the path bends, or -1 if there is none."""
+    """(r, m) The last corner at which the path bends, or `NO_CORNER`."""
 
     @classmethod
     def allocate(cls, team_count: int, site_count: int) -> SitePaths:
@@ -176,9 +180,11 @@ def find_site_paths(
         for tile in range(len(tiles.boxes)):
             for slot in range(SLOTS):
                 site = tiles.site[tile, slot]
-                if site >= 0:
+                if site != NO_SITE:
                     last_corner = search.site_corner[tile, slot]
-                    first_corner = search.corner_paths.first_corner[last_corner] if last_corner >= 0 else -1
+                    first_corner = NO_CORNER
+                    if last_corner != NO_CORNER:
+                        first_corner = search.corner_paths.first_corner[last_corner]
                     paths.distance[team, site] = search.site_length[tile, slot] * unit
                     paths.owner[team, site] = search.site_robot[tile, slot]
                     paths.first_corner[team, site] = first_corner
@@ -199,7 +205,7 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
         entry_count = add_walls(
             cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], reach * reach, entry_count
         )
-        if entry_count < 0:
+        if entry_count == NO_SPACE:
             return False
     is_any_hidden = False
     for tile in range(len(tiles.boxes)):
@@ -238,14 +244,14 @@ def _list_nearest_candidates(
     """
     # No point of the box is farther from its nearest robot than from any one robot. For each robot, the point
     # that is farthest from it is a corner of the box.
-    squared_bound = np.inf
+    max_squared_distance = np.inf
     for k in range(candidate_count):
         x = robots[candidates[k], 0]
         y = robots[candidates[k], 1]
         dx = max(x - boxes[box, LOW_X], boxes[box, HIGH_X] - x)
         dy = max(y - boxes[box, LOW_Y], boxes[box, HIGH_Y] - y)
-        squared_bound = min(squared_bound, dx * dx + dy * dy)
-    return _list_robots_within(boxes, box, robots, squared_bound, candidates, candidate_count, result)
+        max_squared_distance = min(max_squared_distance, dx * dx + dy * dy)
+    return _list_robots_within(boxes, box, robots, max_squared_distance, candidates, candidate_count, result)
 
 
 @kernel
@@ -253,7 +259,7 @@ def _list_robots_within(
     boxes: Array,
     box: int,
     robots: Array,
-    squared_bound: float,
+    max_squared_distance: float,
     candidates: IntArray,
     candidate_count: int,
     result: IntArray,
@@ -262,7 +268,8 @@ def _list_robots_within(
     result_count = 0
     for k in range(candidate_count):
         i = candidates[k]
-        if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= squared_bound:
+        squared_distance = compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1])
+        if squared_distance <= max_squared_distance:
             result[result_count] = i
             result_count += 1
     return result_count
@@ -286,14 +293,15 @@ def _find_nearest_robots_of_tile(
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y
             squared_length = dx * dx + dy * dy
-            squared_best = length[tile, slot]
-            nearest_robot[tile, slot] = i if squared_length < squared_best else nearest_robot[tile, slot]
-            length[tile, slot] = squared_length if squared_length < squared_best else squared_best
+            best_squared_length = length[tile, slot]
+            is_nearer = squared_length < best_squared_length
+            nearest_robot[tile, slot] = i if is_nearer else nearest_robot[tile, slot]
+            length[tile, slot] = squared_length if is_nearer else best_squared_length
     for slot in range(SLOTS):
         i = nearest_robot[tile, slot]
         length[tile, slot] = np.sqrt(length[tile, slot])
         search.site_robot[tile, slot] = i
-        search.site_corner[tile, slot] = -1
+        search.site_corner[tile, slot] = NO_CORNER
         search.reach[i] = max(search.reach[i], length[tile, slot])
 
 
@@ -305,8 +313,8 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
     for slot in range(SLOTS):
         if not is_covered[tiles.component[tile, slot]]:
             search.site_length[tile, slot] = np.inf
-            search.site_robot[tile, slot] = -1
-        elif tiles.site[tile, slot] >= 0:
+            search.site_robot[tile, slot] = NO_ROBOT
+        elif tiles.site[tile, slot] != NO_SITE:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
             robot = search.nearest_robot[tile, slot]
@@ -378,11 +386,11 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
-            longest = 0.0
+            max_length = 0.0
             for leaf_corner in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
-                longest = max(longest, search.corner_paths.length[leaf_corner])
+                max_length = max(max_length, search.corner_paths.length[leaf_corner])
             candidate_count = _list_robots_within(
-                boxes, leaf, robots, longest * longest, search.all_robots, len(robots), leaf_robots
+                boxes, leaf, robots, max_length * max_length, search.all_robots, len(robots), leaf_robots
             )
         for k in range(candidate_count):
             waiting_count = _try_straight_path(walls, search, corner, leaf_robots[k], waiting_count)
@@ -393,9 +401,9 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
 def _find_nearest_candidate(
     robots: Array, candidates: IntArray, candidate_count: int, x: float, y: float
 ) -> int:
-    """Return the candidate at the smallest Euclidean distance from (x, y); -1 if there is none."""
+    """Return the candidate at the smallest Euclidean distance from (x, y). There is at least one."""
     min_squared_distance = np.inf
-    nearest = -1
+    nearest: int = candidates[0]
     for k in range(candidate_count):
         i = candidates[k]
         dx = x - robots[i, 0]
@@ -426,7 +434,7 @@ def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, wa
         paths.length[corner] = length
         paths.source[corner] = robot
         paths.first_corner[corner] = corner
-        paths.previous_corner[corner] = -1
+        paths.previous_corner[corner] = NO_CORNER
         if not search.queue.is_waiting[corner]:
             search.queue.is_waiting[corner] = True
             search.queue.corners[waiting_count] = corner
@@ -442,25 +450,31 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
         first_tile = group * TILES_PER_GROUP
         end_tile = min(first_tile + TILES_PER_GROUP, len(tiles.boxes))
         has_hidden_sites = False
-        longest = 0.0
+        max_length = 0.0
         for tile in range(first_tile, end_tile):
             if search.hidden_slots[tile]:
                 has_hidden_sites = True
                 _try_corner_paths(cost_map, search, tile)
-                longest = max(longest, _find_longest_hidden_path(search, tile))
+                max_length = max(max_length, _compute_max_hidden_length(search, tile))
         if has_hidden_sites:
-            _try_other_robots(cost_map, search, robots, group, longest)
+            _try_other_robots(cost_map, search, robots, group, max_length)
 
 
 @kernel
-def _try_other_robots(cost_map: CostMap, search: Search, robots: Array, group: int, longest: float) -> None:
-    """Try the straight paths to the hidden sites of a group of tiles, whose paths are at most `longest`."""
+def _try_other_robots(
+    cost_map: CostMap, search: Search, robots: Array, group: int, max_length: float
+) -> None:
+    """Try the straight paths from other robots to the hidden sites of a group of tiles.
+
+    `max_length` is the length of the longest path to these sites so far. Robots that are farther away than
+    that from a tile cannot shorten a path to its sites.
+    """
     tiles = cost_map.tiles
     group_robot_count = _list_robots_within(
         tiles.group_boxes,
         group,
         robots,
-        longest * longest,
+        max_length * max_length,
         search.all_robots,
         len(robots),
         search.group_robots,
@@ -468,12 +482,12 @@ def _try_other_robots(cost_map: CostMap, search: Search, robots: Array, group: i
     first_tile = group * TILES_PER_GROUP
     for tile in range(first_tile, min(first_tile + TILES_PER_GROUP, len(tiles.boxes))):
         if search.hidden_slots[tile]:
-            longest_of_tile = _find_longest_hidden_path(search, tile)
+            max_length_of_tile = _compute_max_hidden_length(search, tile)
             tile_robot_count = _list_robots_within(
                 tiles.boxes,
                 tile,
                 robots,
-                longest_of_tile * longest_of_tile,
+                max_length_of_tile * max_length_of_tile,
                 search.group_robots,
                 group_robot_count,
                 search.tile_robots,
@@ -490,22 +504,23 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
     corners = cost_map.walls.corners
     paths = search.corner_paths
     hidden_slots = search.hidden_slots[tile]
-    first = views.first_row[tile]
-    end = views.first_row[tile + 1]
+    first_row = views.first_row[tile]
+    end_row = views.first_row[tile + 1]
     # If a corner sees all hidden sites, none of their paths needs to be longer than the one via that corner.
-    bound = np.inf
-    for row in range(first, end):
-        if hidden_slots & ~views.visible_slots[row] == 0:
-            bound = min(bound, paths.length[views.corner[row]] + views.farthest[row])
-    for row in range(first, end):
+    max_length = np.inf
+    for row in range(first_row, end_row):
+        unseen_slots = hidden_slots & ~views.visible_slots[row]
+        if unseen_slots == 0:
+            max_length = min(max_length, paths.length[views.corner[row]] + views.farthest[row])
+    for row in range(first_row, end_row):
         corner = views.corner[row]
-        slots = views.visible_slots[row] & hidden_slots
+        seen_slots = hidden_slots & views.visible_slots[row]
         to_corner = paths.length[corner]
-        if slots == 0 or to_corner + views.nearest[row] > bound or to_corner == np.inf:
+        if seen_slots == 0 or to_corner + views.nearest[row] > max_length or to_corner == np.inf:
             continue
         robot = paths.source[corner]
         for slot in range(SLOTS):
-            if (slots >> slot) & 1:
+            if (seen_slots >> slot) & 1:
                 dx = tiles.x[tile, slot] - corners[corner, 0]
                 dy = tiles.y[tile, slot] - corners[corner, 1]
                 length = to_corner + np.sqrt(dx * dx + dy * dy)
@@ -522,14 +537,14 @@ def _is_better(length: float, robot: int, best_length: float, best_robot: int) -
 
 
 @kernel
-def _find_longest_hidden_path(search: Search, tile: int) -> float:
+def _compute_max_hidden_length(search: Search, tile: int) -> float:
     """Return the length of the longest path to a hidden site of a tile."""
     hidden_slots = search.hidden_slots[tile]
-    longest = 0.0
+    max_length = 0.0
     for slot in range(SLOTS):
         if (hidden_slots >> slot) & 1:
-            longest = max(longest, search.site_length[tile, slot])
-    return longest
+            max_length = max(max_length, search.site_length[tile, slot])
+    return max_length
 
 
 @kernel
@@ -554,4 +569,4 @@ def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int
             ):
                 search.site_length[tile, slot] = length
                 search.site_robot[tile, slot] = robot
-                search.site_corner[tile, slot] = -1
+                search.site_corner[tile, slot] = NO_CORNER

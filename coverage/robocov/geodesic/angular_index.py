@@ -15,11 +15,13 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.box_tree import (
+    END_OF_TREE,
     HIGH_X,
     HIGH_Y,
     LEAF_SIZE,
     LOW_X,
     LOW_Y,
+    ROOT,
     compute_squared_box_distance,
     skip_subtree,
 )
@@ -27,6 +29,8 @@ from robocov.geodesic.grid import cross
 from robocov.geodesic.walls import (
     END_X,
     END_Y,
+    NO_VERTEX,
+    NO_WALL,
     Walls,
     contains_direction,
     find_vertex,
@@ -45,11 +49,20 @@ _MAX_SIDE_ERROR = 2.0**55
 _MAX_TREE_DEPTH = 64
 """Size of the stack of a tree search, which contains at most one node for each level of the tree."""
 
+ONLY_SOURCE = 0
+"""Row of the source in an index that has only one."""
+
+NO_ENTRY = -1
+"""Stands for the entry before the first one in a bin."""
+
+NO_SPACE = -1
+"""Returned instead of a number of entries, or of rows, if there is not enough space for them."""
+
 _FULL_TURN = 4.0
 """Pseudo-angle of a full turn; see `compute_pseudo_angle`."""
 
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
+"""Smallest length used as a divisor, which prevents division by zero."""
 
 _MUST_CHECK_SECTORS = -1.0
 """Squared clear distance in all bins of a source at a vertex; less than the square of any distance."""
@@ -68,11 +81,11 @@ class AngularWallIndex(NamedTuple):
     squared_horizon: Array
     """(n, bins) Squared distances beyond which everything is hidden."""
     head: IntArray
-    """(n, bins) The last entry of each bin, or -1 if it is empty."""
+    """(n, bins) The last entry of each bin, or `NO_ENTRY` if it is empty."""
     entry_wall: IntArray
     """(m,) The wall of each entry."""
     entry_before: IntArray
-    """(m,) The previous entry in the same bin, or -1 if there is none."""
+    """(m,) The previous entry in the same bin, or `NO_ENTRY`."""
     stack: IntArray
     """Nodes of the box tree that are still to be visited."""
 
@@ -160,9 +173,9 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
     bins_per_unit = bin_count / _FULL_TURN
-    first = int(np.floor((angle - half_angle) * bins_per_unit))
-    last = int(np.floor((angle + half_angle) * bins_per_unit))
-    for unwrapped_bin in range(first, min(last, first + bin_count - 1) + 1):
+    first_bin = int(np.floor((angle - half_angle) * bins_per_unit))
+    last_bin = int(np.floor((angle + half_angle) * bins_per_unit))
+    for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
         k = unwrapped_bin & (bin_count - 1)
         if index.squared_horizon[source, k] >= squared_distance:
             return False
@@ -171,7 +184,13 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
 
 @kernel
 def add_walls(
-    walls: Walls, index: AngularWallIndex, source: int, x: float, y: float, squared_reach: float, used: int
+    walls: Walls,
+    index: AngularWallIndex,
+    source: int,
+    x: float,
+    y: float,
+    squared_reach: float,
+    entry_count: int,
 ) -> int:
     """Add a source to an index, with the walls around it.
 
@@ -186,22 +205,22 @@ def add_walls(
         Its position, not inside an obstacle.
     squared_reach : float
         Squared distance up to which walls are added.
-    used : int
-        Number of entries that the other sources already use.
+    entry_count : int
+        Number of entries that other sources already use.
 
     Returns
     -------
     int
-        Number of entries used now, or -1 if the index has too few.
+        New number of entries, or `NO_SPACE`.
     """
     boxes = walls.boxes
     stack = index.stack
     first_leaf = len(boxes) // 2
     bin_count = index.head.shape[1]
     _reset_source(index, source, x, y, squared_reach)
-    stack[0] = 1
+    stack[0] = ROOT
     stack_size = 1
-    while stack_size:
+    while stack_size > 0:
         stack_size -= 1
         node = stack[stack_size]
         if compute_squared_box_distance(boxes, node, x, y) >= squared_reach:
@@ -210,24 +229,49 @@ def add_walls(
             continue
         if node < first_leaf:
             # Visit the nearer child first: boxes that its walls hide need not be visited.
-            left_distance = compute_squared_box_distance(boxes, 2 * node, x, y)
-            right_distance = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
-            nearer = 2 * node + int(right_distance < left_distance)
-            farther = nearer ^ 1
+            nearer = 2 * node
+            farther = 2 * node + 1
+            nearer_distance = compute_squared_box_distance(boxes, nearer, x, y)
+            farther_distance = compute_squared_box_distance(boxes, farther, x, y)
+            if farther_distance < nearer_distance:
+                nearer, farther = farther, nearer
             stack[stack_size] = farther
             stack[stack_size + 1] = nearer
             stack_size += 2
             continue
-        first = (node - first_leaf) * LEAF_SIZE
-        for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
-            if used + bin_count > len(index.entry_wall):
-                return -1
+        first_wall = (node - first_leaf) * LEAF_SIZE
+        for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
+            # A wall may need an entry in every bin.
+            if entry_count + bin_count > len(index.entry_wall):
+                return NO_SPACE
             if walls.can_hide[wall]:
-                used = _add_wall(walls, wall, index, source, used)
-    if find_vertex(walls.vertices, x, y) >= 0:
+                entry_count = _add_wall(walls, wall, index, source, entry_count)
+    if find_vertex(walls.vertices, x, y) != NO_VERTEX:
         for k in range(bin_count):
             index.squared_clear_distance[source, k] = _MUST_CHECK_SECTORS
-    return used
+    return entry_count
+
+
+@kernel
+def index_walls(walls: Walls, index: AngularWallIndex, x: float, y: float) -> int:
+    """Index the walls around a single source, `ONLY_SOURCE`, at any distance.
+
+    Parameters
+    ----------
+    walls : Walls
+    index : AngularWallIndex
+        Overwritten; it has space for one source.
+    x, y : float, grid steps
+        Position of the source, not inside an obstacle.
+
+    Returns
+    -------
+    int
+        Number of entries, or `NO_SPACE`.
+    """
+    squared_reach = np.inf
+    entry_count = 0
+    return add_walls(walls, index, ONLY_SOURCE, x, y, squared_reach, entry_count)
 
 
 @kernel
@@ -239,21 +283,21 @@ def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squa
     for k in range(index.head.shape[1]):
         index.squared_clear_distance[source, k] = squared_reach
         index.squared_horizon[source, k] = np.inf
-        index.head[source, k] = -1
+        index.head[source, k] = NO_ENTRY
 
 
 @kernel
-def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, used: int) -> int:
-    """Add a wall to the bins that it spans if it faces the source; return the number of entries used."""
+def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, entry_count: int) -> int:
+    """Add a wall to the bins that it spans if it faces the source; return the new number of entries."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
     # A wall in line with the source hides nothing, unless the source is in its interior.
     if not _faces(walls.ends, wall, x, y):
-        return used
+        return entry_count
     squared_near = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _PADDING)
     if squared_near >= index.squared_reach[source]:
-        return used
+        return entry_count
     squared_far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
     bin_count = index.head.shape[1]
@@ -272,10 +316,10 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         if squared_near > index.squared_horizon[source, k]:
             continue
         index.squared_clear_distance[source, k] = min(index.squared_clear_distance[source, k], squared_near)
-        index.entry_wall[used] = wall
-        index.entry_before[used] = index.head[source, k]
-        index.head[source, k] = used
-        used += 1
+        index.entry_wall[entry_count] = wall
+        index.entry_before[entry_count] = index.head[source, k]
+        index.head[source, k] = entry_count
+        entry_count += 1
         if covered_first <= unwrapped_bin < covered_end:
             index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_far)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
@@ -286,7 +330,7 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
             walls, wall, x, y, stop, (covered_end + 1) / bins_per_unit, squared_far
         )
         index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
-    return used
+    return entry_count
 
 
 @kernel
@@ -314,7 +358,7 @@ def _compute_max_squared_chain_distance(
         ax = walls.ends[wall, END_X] - x
         ay = walls.ends[wall, END_Y] - y
         wall = walls.following[wall]
-        if wall < 0:
+        if wall == NO_WALL:
             break
         bx = walls.ends[wall, END_X] - x
         by = walls.ends[wall, END_Y] - y
@@ -418,7 +462,7 @@ def _is_visible_past_walls(
     if dx * dx + dy * dy > index.squared_reach[source]:
         return _is_segment_free(walls, x, y, dx, dy)
     entry = index.head[source, k]
-    while entry >= 0:
+    while entry != NO_ENTRY:
         if _hides(walls.ends, index.entry_wall[entry], x, y, dx, dy):
             return False
         entry = index.entry_before[entry]
@@ -429,6 +473,7 @@ def _is_visible_past_walls(
 def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether a wall that faces (x, y) hides the point at offset (dx, dy) from there."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
+    # The point is behind the wall, and its direction is between those of the ends of the wall.
     return (
         cross(bx - ax, by - ay, dx - ax, dy - ay) < 0.0
         and cross(ax, ay, dx, dy) >= 0.0
@@ -449,15 +494,15 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
     """Return whether no wall hides the point at offset (dx, dy) from (x, y), searching along the segment."""
     boxes = walls.boxes
     first_leaf = len(boxes) // 2
-    node = 1
-    while node:
+    node = ROOT
+    while node != END_OF_TREE:
         if _is_box_off_segment(boxes, node, x, y, dx, dy):
             node = skip_subtree(node)
         elif node < first_leaf:
-            node *= 2
+            node = 2 * node
         else:
-            first = (node - first_leaf) * LEAF_SIZE
-            for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
+            first_wall = (node - first_leaf) * LEAF_SIZE
+            for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                 if (
                     walls.can_hide[wall]
                     and _faces(walls.ends, wall, x, y)

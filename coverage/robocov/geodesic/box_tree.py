@@ -1,8 +1,11 @@
 """Trees of bounding boxes, which let searches skip everything that is far away.
 
 A tree is a (nodes, 4) array. Row i is the box of node i, with the columns `LOW_X`, `LOW_Y`, `HIGH_X` and
-`HIGH_Y`. Node 1 is the root, and node i contains nodes 2 i and 2 i + 1. The second half of the nodes are
+`HIGH_Y`. Node 1 is the root, and node i has the children 2 i and 2 i + 1. The second half of the nodes are
 leaves of `LEAF_SIZE` consecutive items each; the boxes of empty leaves start at infinity. Row 0 is not used.
+
+A search starts at the `ROOT`. It descends from a node to its first child, and skips the nodes below a box
+that is too far away: `skip_subtree` returns the next node, or `END_OF_TREE`.
 """
 
 import numpy as np
@@ -10,6 +13,10 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
+ROOT = 1
+"""The node that contains all items."""
+END_OF_TREE = 0
+"""Stands for the next node where there is none."""
 LEAF_SIZE = 8
 """Number of items per leaf."""
 LOW_X = 0
@@ -87,11 +94,12 @@ def skip_subtree(node: int) -> int:
     Returns
     -------
     int
-        0 at the end of the search.
+        The node, or `END_OF_TREE`.
     """
+    # Second children have odd numbers. After them, the search continues after the subtree of their parent.
     while node & 1:
         node >>= 1
-    return node + 1 if node else 0
+    return node + 1 if node != 0 else END_OF_TREE
 
 
 @kernel

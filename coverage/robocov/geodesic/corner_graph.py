@@ -8,9 +8,19 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
-from robocov.geodesic.box_tree import LEAF_SIZE, LOW_X, skip_subtree
+from robocov.geodesic.angular_index import (
+    NO_SPACE,
+    ONLY_SOURCE,
+    AngularWallIndex,
+    index_walls,
+    is_box_hidden,
+    is_visible,
+)
+from robocov.geodesic.box_tree import END_OF_TREE, LEAF_SIZE, LOW_X, ROOT, skip_subtree
 from robocov.geodesic.walls import Walls, can_bend_at_corner
+
+NO_CORNER = -1
+"""Stands for a corner at which a path bends if it is straight."""
 
 
 class CornerGraph(NamedTuple):
@@ -34,7 +44,7 @@ class CornerPaths(NamedTuple):
     first_corner: IntArray
     """(k,) The first corner at which the path bends, or where it ends if it is straight."""
     previous_corner: IntArray
-    """(k,) The last corner at which the path bends before its end, or -1 if it is straight."""
+    """(k,) The last corner at which the path bends before its end, or `NO_CORNER` if it is straight."""
 
     @classmethod
     def allocate(cls, corner_count: int) -> CornerPaths:
@@ -106,7 +116,7 @@ def build_corner_graph(corner_count: int, pairs: IntArray, lengths: Array) -> Co
 
 @kernel
 def find_visible_corners(
-    walls: Walls, index: AngularWallIndex, source: int, first: int, visible: IntArray
+    walls: Walls, index: AngularWallIndex, source: int, first_corner: int, visible: IntArray
 ) -> int:
     """Find the corners that a source sees and at which a shortest path from it can bend.
 
@@ -117,7 +127,7 @@ def find_visible_corners(
         Its reach must be unlimited.
     source : int
         Row of the source in the index.
-    first : int
+    first_corner : int
         The first corner to consider; those before it are skipped.
     visible : (k,) int array
         Result: the corners that were found.
@@ -133,16 +143,16 @@ def find_visible_corners(
     y = index.positions[source, 1]
     first_leaf = len(boxes) // 2
     count = 0
-    node = 1
-    while node:
+    node = ROOT
+    while node != END_OF_TREE:
         if boxes[node, LOW_X] == np.inf or is_box_hidden(boxes, node, index, source):
             node = skip_subtree(node)
         elif node < first_leaf:
-            node *= 2
+            node = 2 * node
         else:
             first_in_leaf = (node - first_leaf) * LEAF_SIZE
             end_of_leaf = min(first_in_leaf + LEAF_SIZE, len(corners))
-            for corner in range(max(first_in_leaf, first), end_of_leaf):
+            for corner in range(max(first_in_leaf, first_corner), end_of_leaf):
                 if can_bend_at_corner(corners, walls.corner_walls, corner, x, y) and is_visible(
                     walls, index, source, corners[corner, 0], corners[corner, 1]
                 ):
@@ -181,18 +191,18 @@ def find_links(
     Returns
     -------
     int
-        Number of links, or -1 if there is not enough space.
+        Number of links, or `NO_SPACE`.
     """
     corners = walls.corners
-    used = 0
+    link_count = 0
     for corner in range(first, end):
         x = corners[corner, 0]
         y = corners[corner, 1]
-        if add_walls(walls, index, 0, x, y, np.inf, 0) < 0:
-            return -1
-        count = find_visible_corners(walls, index, 0, corner + 1, visible)
-        if used + count > len(pairs):
-            return -1
+        if index_walls(walls, index, x, y) == NO_SPACE:
+            return NO_SPACE
+        count = find_visible_corners(walls, index, ONLY_SOURCE, corner + 1, visible)
+        if link_count + count > len(pairs):
+            return NO_SPACE
         for k in range(count):
             other_x = corners[visible[k], 0]
             other_y = corners[visible[k], 1]
@@ -200,11 +210,11 @@ def find_links(
             if can_bend_at_corner(corners, walls.corner_walls, corner, other_x, other_y):
                 dx = other_x - x
                 dy = other_y - y
-                pairs[used, 0] = corner
-                pairs[used, 1] = visible[k]
-                lengths[used, 0] = np.sqrt(dx * dx + dy * dy)
-                used += 1
-    return used
+                pairs[link_count, 0] = corner
+                pairs[link_count, 1] = visible[k]
+                lengths[link_count, 0] = np.sqrt(dx * dx + dy * dy)
+                link_count += 1
+    return link_count
 
 
 @kernel

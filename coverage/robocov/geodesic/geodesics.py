@@ -13,8 +13,9 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 from robocov.environment import GRID_M, Environment
 from robocov.errors import InputError
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
+from robocov.geodesic.angular_index import NO_SPACE, AngularWallIndex, add_walls, is_visible
 from robocov.geodesic.corner_graph import (
+    NO_CORNER,
     CornerGraph,
     CornerPaths,
     CornerQueue,
@@ -36,7 +37,7 @@ _CORNERS_PER_REPORT = 64
 """Number of corners that are processed between two progress reports."""
 _TARGETS_PER_BLOCK = 1024
 """Number of targets that are indexed at the same time, which limits the memory."""
-_MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
+_INITIAL_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
 """Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
 _MAX_DEPTH_M = 2.0 * GRID_M
 """Points up to this depth in an obstacle are moved to free space; see also `_MAX_RELATIVE_DEPTH`."""
@@ -50,8 +51,8 @@ class CornerComputation(Protocol):
     """A computation that produces rows for the corners from `first` up to `end`.
 
     It writes whole numbers, such as the indices of corners, to `indices`, and the lengths that belong to them
-    to `lengths`. It chooses the columns of both. It returns the number of rows that it has written, or -1 if
-    there was not enough space for them or in the index.
+    to `lengths`. It chooses the columns of both. It returns the number of rows that it has written, or
+    `NO_SPACE` if there was not enough space for them or in the index.
     """
 
     def __call__(
@@ -107,7 +108,7 @@ class Geodesics:
         self.walls: Walls = build_walls(self.free)
         self.corners = self.grid.to_meters(self.walls.corners)
         self._name = environment.name
-        self._entries_per_source = dict(_MIN_ENTRIES_PER_SOURCE)
+        self._entries_per_source = dict(_INITIAL_ENTRIES_PER_SOURCE)
         self.graph = self._build_graph(heartbeat)
 
     def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
@@ -137,7 +138,7 @@ class Geodesics:
         index_columns, length_columns : int
             Number of whole numbers and of lengths in each row that it writes.
         progress : callable, optional
-            Called with the fraction that is done. It may raise an exception to stop.
+            Called with the completed fraction. It may raise an exception to stop.
 
         Returns
         -------
@@ -170,10 +171,12 @@ class Geodesics:
             max_rows = len(index.entry_wall)
             indices = np.empty((max_rows, index_columns), np.int64)
             lengths = np.empty((max_rows, length_columns))
-            used = compute(index, indices, lengths)
-            return None if used < 0 else (indices[:used].copy(), lengths[:used].copy())
+            row_count = compute(index, indices, lengths)
+            if row_count == NO_SPACE:
+                return None
+            return indices[:row_count].copy(), lengths[:row_count].copy()
 
-        return self.run_with_index(1, _CORNER_BINS, compute_rows)
+        return self.run_with_index(source_count=1, bin_count=_CORNER_BINS, compute=compute_rows)
 
     def run_with_index(
         self, source_count: int, bin_count: int, compute: Callable[[AngularWallIndex], _Result | None]
@@ -195,6 +198,7 @@ class Geodesics:
             What `compute` has returned.
         """
         while True:
+            # `add_walls` keeps one entry per bin free for the wall that it adds.
             max_entries = self._entries_per_source[bin_count] * source_count + 2 * bin_count
             result = compute(AngularWallIndex.allocate(source_count, bin_count, max_entries))
             if result is not None:
@@ -333,13 +337,16 @@ class Geodesics:
         distances = np.empty((len(grid_positions), corner_count))
         paths = CornerPaths.allocate(corner_count)
 
-        def fill(index: AngularWallIndex) -> AngularWallIndex | None:
+        def fill_index(index: AngularWallIndex) -> AngularWallIndex | None:
+            """Return the index, and write the distances; None if the index is too small."""
             has_space = _find_corner_distances(
                 self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )
             return index if has_space else None
 
-        index = self.run_with_index(len(grid_positions), SOURCE_BINS, fill)
+        index = self.run_with_index(
+            source_count=len(grid_positions), bin_count=SOURCE_BINS, compute=fill_index
+        )
         return index, distances, paths
 
     def find_path(self, source: Array, target: Array) -> Array:
@@ -367,11 +374,12 @@ class Geodesics:
         if np.isinf(distance[0, 0]):
             return np.empty((0, 2))
         via_corner = from_source[0] + to_target[0]
-        corner = -1
+        # Follow the path backwards from its last corner, if it is not straight.
+        corner = NO_CORNER
         if via_corner.min(initial=np.inf) <= distance[0, 0]:
             corner = int(via_corner.argmin())
         bends = []
-        while corner >= 0:
+        while corner != NO_CORNER:
             bends.append(corner)
             corner = int(paths.previous_corner[corner])
         points = self.grid.to_meters(ends)
@@ -395,28 +403,31 @@ def _find_corner_distances(
     """
     corner_count = len(walls.corners)
     queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))
-    used = 0
+    squared_reach = np.inf
+    entry_count = 0
     for i in range(len(points)):
         x = points[i, 0]
         y = points[i, 1]
-        used = add_walls(walls, index, i, x, y, np.inf, used)
-        if used < 0:
+        entry_count = add_walls(walls, index, i, x, y, squared_reach, entry_count)
+        if entry_count == NO_SPACE:
             return False
         for corner in range(corner_count):
             paths.length[corner] = np.inf
             paths.source[corner] = 0
             paths.first_corner[corner] = corner
-            paths.previous_corner[corner] = -1
+            paths.previous_corner[corner] = NO_CORNER
             queue.is_waiting[corner] = False
-        count = find_visible_corners(walls, index, i, 0, queue.corners)
-        for k in range(count):
+        # There are straight paths to the visible corners. The queue starts with them.
+        first_corner = 0
+        visible_count = find_visible_corners(walls, index, i, first_corner, queue.corners)
+        for k in range(visible_count):
             corner = queue.corners[k]
             dx = walls.corners[corner, 0] - x
             dy = walls.corners[corner, 1] - y
             paths.length[corner] = np.sqrt(dx * dx + dy * dy)
             queue.is_waiting[corner] = True
         if not must_be_straight:
-            relax_paths(graph, paths, queue, count)
+            relax_paths(graph, paths, queue, visible_count)
         distances[i] = paths.length
     return True
 
@@ -446,12 +457,12 @@ def _combine_distances(
                 corners[count] = corner
                 count += 1
         for i in range(len(from_sources)):
-            shortest = np.inf
+            min_length = np.inf
             if is_visible(walls, index, i, x, y):
                 dx = x - index.positions[i, 0]
                 dy = y - index.positions[i, 1]
-                shortest = np.sqrt(dx * dx + dy * dy)
+                min_length = np.sqrt(dx * dx + dy * dy)
             for k in range(count):
                 corner = corners[k]
-                shortest = min(shortest, from_sources[i, corner] + to_targets[j, corner])
-            distances[i, j] = shortest
+                min_length = min(min_length, from_sources[i, corner] + to_targets[j, corner])
+            distances[i, j] = min_length

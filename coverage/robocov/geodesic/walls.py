@@ -12,10 +12,12 @@ from shapely import MultiPolygon
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.box_tree import (
+    END_OF_TREE,
     HIGH_X,
     HIGH_Y,
     LEAF_SIZE,
     LOW_Y,
+    ROOT,
     Z_ORDER_BITS,
     build_box_tree,
     compute_z_order,
@@ -40,6 +42,11 @@ OUTGOING_X = 2
 OUTGOING_Y = 3
 """Column of the same arrays: y of the direction of the outgoing wall."""
 
+NO_WALL = -1
+"""Stands for the following wall where there is not exactly one."""
+NO_VERTEX = -1
+"""Stands for the vertex of a point that is not at any."""
+
 _ON_BOUNDARY = 1000
 """Contribution of a wall through a point to the point's winding number: more than any number of turns."""
 
@@ -57,7 +64,7 @@ class Walls(NamedTuple):
     """(w, 4) Start and end of each wall, with the free space on its left; for the columns, see `START_X`. The
     walls are sorted so that nearby ones have nearby indices."""
     following: IntArray
-    """(w,) The wall that starts where this one ends, or -1 if several do."""
+    """(w,) The wall that starts where this one ends, or `NO_WALL` if several do."""
     component: IntArray
     """(w,) Component of the free space that the wall bounds."""
     can_hide: BoolArray
@@ -199,6 +206,7 @@ def _find_sectors(segments: _Segments) -> _Sectors:
         rows = slice(first[pinch], first[pinch] + count[pinch])
         outgoing_angle = _compute_angles(vertices[after[rows]] - vertices[pinch])
         incoming_angle = _compute_angles(vertices[before[rows]] - vertices[pinch])
+        # The angle from each outgoing wall, counter-clockwise, to each incoming one.
         turns = (incoming_angle - outgoing_angle[:, None]) % (2.0 * np.pi)
         before[rows] = before[rows][turns.argmin(axis=1)]
     return _Sectors(vertex, before, after)
@@ -218,12 +226,12 @@ def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArr
 
 
 def _find_following(segments: _Segments) -> IntArray:
-    """Find the wall that starts where each one ends, or -1 if several do."""
+    """Find the wall that starts where each one ends, or `NO_WALL` if several do."""
     count = len(segments.vertices)
-    starting = np.full(count, -1)
+    starting = np.full(count, NO_WALL)
     starting[segments.start] = np.arange(len(segments.start))
     is_only_one = np.bincount(segments.start, minlength=count)[segments.end] == 1
-    return np.where(is_only_one, starting[segments.end], -1)
+    return np.where(is_only_one, starting[segments.end], NO_WALL)
 
 
 def _find_hull_walls(segments: _Segments) -> BoolArray:
@@ -299,7 +307,7 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
     Returns
     -------
     int
-        The vertex, or -1 if there is none.
+        The vertex, or `NO_VERTEX`.
     """
     low = 0
     high = len(vertices)
@@ -311,7 +319,7 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
             high = middle
     if low < len(vertices) and vertices[low, 0] == x and vertices[low, 1] == y:
         return low
-    return -1
+    return NO_VERTEX
 
 
 @kernel
@@ -362,15 +370,15 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
         y = points[i, 1]
         for component in range(windings.shape[1]):
             windings[i, component] = 0
-        node = 1
-        while node:
+        node = ROOT
+        while node != END_OF_TREE:
             if boxes[node, LOW_Y] > y or boxes[node, HIGH_Y] < y or boxes[node, HIGH_X] < x:
                 node = skip_subtree(node)
             elif node < first_leaf:
-                node *= 2
+                node = 2 * node
             else:
-                first = (node - first_leaf) * LEAF_SIZE
-                for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
+                first_wall = (node - first_leaf) * LEAF_SIZE
+                for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                     windings[i, walls.component[wall]] += _count_winding(walls.ends, wall, x, y)
                 node = skip_subtree(node)
 

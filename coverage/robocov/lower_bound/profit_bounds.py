@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
+from robocov.geodesic.angular_index import NO_SPACE, ONLY_SOURCE, AngularWallIndex, index_walls, is_visible
 from robocov.geodesic.corner_graph import find_visible_corners
 from robocov.geodesic.walls import Walls
 
@@ -17,8 +17,6 @@ CENTER_PROFIT = 0
 PROFIT_BOUND = 1
 """Row of the result of `bound_profits`: the upper bounds on the profits of all points."""
 
-_SOURCE = 0
-"""The only source of the index, which is the center of the current triangle."""
 _MIN_SEGMENT_LENGTH = 1.0
 """Length of the shortest segment that is not empty, grid steps: all points have whole coordinates."""
 
@@ -113,13 +111,8 @@ def bound_profits(
     bool
         Whether the index had enough entries.
     """
-    squared_reach = np.inf
-    used = 0  # There is only one source, so none of the entries are used by others.
     for t in range(len(triangles)):
-        center_x = centers[t, 0]
-        center_y = centers[t, 1]
-        entry_count = add_walls(site_data.walls, wall_index, _SOURCE, center_x, center_y, squared_reach, used)
-        if entry_count < 0:
+        if index_walls(site_data.walls, wall_index, centers[t, 0], centers[t, 1]) == NO_SPACE:
             return False
         center = _set_triangle(site_data, wall_index, scratch, triangles[t], centers[t])
         profit = 0.0
@@ -148,7 +141,10 @@ def _set_triangle(
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
         scratch.max_profits[vertex] = 0.0
     corners = site_data.walls.corners
-    corner_count = find_visible_corners(site_data.walls, wall_index, _SOURCE, 0, scratch.corners)
+    first_corner = 0
+    corner_count = find_visible_corners(
+        site_data.walls, wall_index, ONLY_SOURCE, first_corner, scratch.corners
+    )
     for k in range(corner_count):
         corner = scratch.corners[k]
         scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
@@ -169,17 +165,17 @@ def _add_site(
     site_y = site_data.sites[site, 1]
     dx = center.x - site_x
     dy = center.y - site_y
-    straight = np.sqrt(dx * dx + dy * dy)
+    straight_length = np.sqrt(dx * dx + dy * dy)
     # The whole triangle is within `radius` of its center, so no point of it is nearer to the site than this.
-    if straight - center.radius >= price:
+    if straight_length - center.radius >= price:
         return 0.0
     # The distance bounds start at the price: a site pays nothing to a robot at that distance or beyond.
     for vertex in range(3):
         scratch.min_distances[vertex] = price
     distance = np.inf
-    if is_visible(site_data.walls, wall_index, _SOURCE, site_x, site_y):
-        distance = straight
-        _lower_to_tangent(scratch, straight, dx, dy, straight)
+    if is_visible(site_data.walls, wall_index, ONLY_SOURCE, site_x, site_y):
+        distance = straight_length
+        _lower_to_tangent(scratch, straight_length, dx, dy, straight_length)
     distance = min(distance, _lower_by_corners(site_data, scratch, center, site))
     weight = site_data.weights[site]
     for vertex in range(3):
@@ -195,16 +191,16 @@ def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Ce
     """
     corners = site_data.walls.corners
     min_distances = scratch.min_distances
-    shortest = np.inf
+    min_length = np.inf
     for k in range(center.corner_count):
         corner = scratch.corners[k]
         length = scratch.corner_distances[k] + site_data.from_corners[site, corner]
-        shortest = min(shortest, length)
+        min_length = min(min_length, length)
         if length - center.radius < max(min_distances[0], min_distances[1], min_distances[2]):
             dx = center.x - corners[corner, 0]
             dy = center.y - corners[corner, 1]
             _lower_to_tangent(scratch, length, dx, dy, scratch.corner_distances[k])
-    return shortest
+    return min_length
 
 
 @kernel

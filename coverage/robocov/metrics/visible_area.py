@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, compute_pseudo_angle
+from robocov.geodesic.angular_index import NO_SPACE, AngularWallIndex, compute_pseudo_angle, index_walls
 from robocov.geodesic.grid import Grid
 from robocov.geodesic.walls import END_X, END_Y, START_X, START_Y, Walls, build_walls
 
@@ -149,10 +149,10 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
 def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tuple[AngularWallIndex, int]:
     """Index the walls around a position; return the index, enlarged if needed, and its number of entries."""
     x, y = position
-    entries = add_walls(walls, index, 0, x, y, np.inf, 0)
-    while entries < 0:
+    entries = index_walls(walls, index, x, y)
+    while entries == NO_SPACE:
         index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
-        entries = add_walls(walls, index, 0, x, y, np.inf, 0)
+        entries = index_walls(walls, index, x, y)
     return index, entries
 
 
