@@ -273,17 +273,18 @@ def _add_strip(moments: Array, c: int, strip: _Strip, weight: float) -> None:
     width_bottom = strip.right_bottom - strip.left_bottom
     width_top = strip.right_top - strip.left_top
     if width_bottom > 0.0 or width_top > 0.0:
-        # If the edge crosses the jump, integrate only over the heights on one side of the crossing.
-        first = 0.0
-        last = 1.0
+        # Heights are bottom + t (top - bottom), with t from 0 to 1. If the edge crosses the jump, integrate
+        # only over the heights on one side of the crossing.
+        t_bottom = 0.0
+        t_top = 1.0
         if width_bottom < 0.0:
-            first = width_bottom / (width_bottom - width_top)
+            t_bottom = width_bottom / (width_bottom - width_top)
         if width_top < 0.0:
-            last = width_bottom / (width_bottom - width_top)
-        fraction = last - first
+            t_top = width_bottom / (width_bottom - width_top)
+        fraction = t_top - t_bottom
         node_weight = 0.5 * fraction * (strip.top - strip.bottom) * weight
         for node in (_GAUSS_NODE, 1.0 - _GAUSS_NODE):
-            t = first + fraction * node
+            t = t_bottom + fraction * node
             right = strip.right_bottom + t * (strip.right_top - strip.right_bottom)
             left = strip.left_bottom + t * (strip.left_top - strip.left_bottom)
             mass = node_weight * (right - left)

@@ -33,6 +33,11 @@ _ONE, _U, _V, _UU, _VV = range(5)
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of the Gauss rule with three points on [0, 1] from the middle one."""
+_MIDDLE_NODE = 1
+"""Index of the middle node."""
+_MIDDLE_WEIGHT = 8.0 / 18.0
+_OUTER_WEIGHT = 5.0 / 18.0
+"""Weights of the middle node and of the outer nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,9 +325,9 @@ def _add_part(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, stop:
     c = coefficients[2, j, i]
     d = coefficients[3, j, i]
     for node in range(3):
-        t = start + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - start)
-        node_weight = 8.0 if node == 1 else 5.0
-        weight = node_weight / 18.0 * (stop - start) * edge.dv
+        t = start + (0.5 + _GAUSS_NODE * (node - _MIDDLE_NODE)) * (stop - start)
+        node_weight = _MIDDLE_WEIGHT if node == _MIDDLE_NODE else _OUTER_WEIGHT
+        weight = node_weight * (stop - start) * edge.dv
         v = edge.v + t * edge.dv
         xi = edge.u + t * edge.du - i
         eta = v - j

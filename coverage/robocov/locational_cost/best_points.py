@@ -31,11 +31,13 @@ HEIGHT_HELP = "height h of the sensor in (14), for the target sensing; points mu
 _MAX_ITERATIONS = 80
 """Most cells need 4; a very thin cell below a low sensor needs a few dozen."""
 _MAX_WEIGHTED_ITERATIONS = 30
-_LAST_STEP = 1e-7
-"""Length of a step, relative to half the perimeter of the cell, at which the search ends."""
-_LAST_WEIGHTED_STEP = 1e-6
-_NO_STEP = 1e-15
-"""Length of a step, relative to half the perimeter of the cell, that changes nothing."""
+"""The same for densities that are not uniform."""
+_STEP_TOLERANCE = 1e-7
+"""Length of a step, relative to half the perimeter of the cell, below which the search has converged."""
+_WEIGHTED_STEP_TOLERANCE = 1e-6
+"""The same for densities that are not uniform, where a quadrature limits the accuracy."""
+_MIN_STEP = 1e-15
+"""Smallest length of a step, relative to half the perimeter of the cell, that changes the point."""
 _MIN_CURVATURE = 1e-14
 """Curvatures up to this fraction of the largest one may be rounding errors."""
 _MIN_AREA = 1e-9
@@ -176,7 +178,7 @@ def _search_uniform(cells: Cells, f: Performance, shape: CellDerivatives, centro
         if not search.is_active.any():
             break
         derivatives = compute_derivatives(cells.edges, search.trials, f)
-        _advance(search, derivatives, f.sign, _LAST_STEP)
+        _advance(search, derivatives, f.sign, _STEP_TOLERANCE)
     return search.points
 
 
@@ -196,7 +198,7 @@ def _search_weighted(
         )
         derivatives = derivatives._replace(**weighted._asdict())
         # The weighted derivatives are already those of a cost to be minimized.
-        _advance(search, derivatives, 1.0, _LAST_WEIGHTED_STEP)
+        _advance(search, derivatives, 1.0, _WEIGHTED_STEP_TOLERANCE)
     return search.points
 
 
@@ -216,11 +218,11 @@ def _start_search(points: Array, is_active: BoolArray) -> _Search:
 
 
 @kernel
-def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_step: float) -> None:
+def _advance(search: _Search, derivatives: CellDerivatives, sign: float, tolerance: float) -> None:
     """Accept the trial points, or shorten the steps to them, and choose the next ones.
 
-    `derivatives` are those at the trial points. A step that is shorter than `last_step`, relative to half the
-    perimeter of the cell, ends the search.
+    `derivatives` are those at the trial points. The search in a cell has converged if the step is shorter
+    than `tolerance`, relative to half the perimeter of the cell.
     """
     for i in range(len(search.points)):
         if not search.is_active[i]:
@@ -242,7 +244,7 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_st
             search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
         else:
             search.fraction[i] *= _MAX_SHORTENING
-        _choose_next_trial(search, i, derivatives.half_perimeter[i], last_step)
+        _choose_next_trial(search, i, derivatives.half_perimeter[i], tolerance)
 
 
 @kernel
@@ -266,18 +268,18 @@ def _accept_trial(
 
 
 @kernel
-def _choose_next_trial(search: _Search, i: int, half_perimeter: float, last_step: float) -> None:
+def _choose_next_trial(search: _Search, i: int, half_perimeter: float, tolerance: float) -> None:
     """Choose the next trial point of cell i, or end its search if the step to it is short enough."""
     x = search.fraction[i] * search.step_x[i]
     y = search.fraction[i] * search.step_y[i]
     length = np.sqrt(x * x + y * y)
     search.trials[i, 0] = search.points[i, 0] + x
     search.trials[i, 1] = search.points[i, 1] + y
-    if length <= min(last_step * half_perimeter, search.clearance[i]):
+    if length <= min(tolerance * half_perimeter, search.clearance[i]):
         search.points[i, 0] = search.trials[i, 0]
         search.points[i, 1] = search.trials[i, 1]
         search.is_active[i] = False
-    elif not length > _NO_STEP * half_perimeter:
+    elif not length > _MIN_STEP * half_perimeter:
         # The step changes nothing, or its length is nan.
         search.is_active[i] = False
 

@@ -70,8 +70,8 @@ class CellDerivatives(NamedTuple):
 class _RelativeEdge(NamedTuple):
     """An edge relative to a point.
 
-    `distance` is that of the edge's line, negative if the point lies on its outer side. `start` is where the
-    edge starts on that line, measured from the foot of the perpendicular.
+    In the symbols of the module docstring, `distance` is d, which is negative if the point lies on the outer
+    side of the edge, and `start` is s₁.
     """
 
     normal_x: float
@@ -237,25 +237,25 @@ def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimete
 def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
     """Return the integrals over an edge for f = r²."""
     d = edge.distance
-    first = edge.start
-    last = edge.start + edge.length
+    s1 = edge.start
+    s2 = edge.start + edge.length
     # The length between the rounded ends, which may differ from `edge.length`.
-    length = last - first
-    mean = (first * first + first * last + last * last) / 3.0 + d * d
-    return _EdgeIntegral(total=length * mean, along=length * (last + first), across=2.0 * d * length)
+    length = s2 - s1
+    mean = (s1 * s1 + s1 * s2 + s2 * s2) / 3.0 + d * d
+    return _EdgeIntegral(total=length * mean, along=length * (s2 + s1), across=2.0 * d * length)
 
 
 @kernel
 def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
     """Return the integrals over an edge for f = r."""
     d = edge.distance
-    first = edge.start
-    last = edge.start + edge.length
-    first_r = np.sqrt(d * d + first * first)
-    last_r = np.sqrt(d * d + last * last)
-    inverse_integral = _integrate_inverse(d, first, last)
-    total = 0.5 * (last * last_r - first * first_r + d * d * inverse_integral)
-    return _EdgeIntegral(total=total, along=last_r - first_r, across=d * inverse_integral)
+    s1 = edge.start
+    s2 = edge.start + edge.length
+    r1 = np.sqrt(d * d + s1 * s1)
+    r2 = np.sqrt(d * d + s2 * s2)
+    inverse_integral = _integrate_inverse(d, s1, s2)
+    total = 0.5 * (s2 * r2 - s1 * r1 + d * d * inverse_integral)
+    return _EdgeIntegral(total=total, along=r2 - r1, across=d * inverse_integral)
 
 
 @kernel
@@ -265,33 +265,34 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
     A constant that is the same for all edges of a cell may be omitted from f: around the cell it adds 0.
     """
     d = edge.distance
-    first = edge.start
-    last = edge.start + edge.length
+    s1 = edge.start
+    s2 = edge.start + edge.length
     # The length between the rounded ends, which may differ from `edge.length`.
-    length = last - first
+    length = s2 - s1
     squared_height = height * height
     w = np.sqrt(d * d + squared_height)
-    angle = np.arctan2(w * length, w * w + first * last)
+    angle = np.arctan2(w * length, w * w + s1 * s2)
     total = angle / w
     if half_perimeter < height:
-        # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation.
-        remainder = _subtract_arctan(last / w) - _subtract_arctan(first / w)
+        # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation. With
+        # atan x = x - (x - atan x), the terms s/w² - s/h² are -s (d/w)² / h².
+        remainder = _subtract_arctan(s2 / w) - _subtract_arctan(s1 / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
-    # The values of 1/f at both ends.
-    first_r = np.sqrt(d * d + first * first)
-    last_r = np.sqrt(d * d + last * last)
-    first_inverse = first_r * first_r + squared_height
-    last_inverse = last_r * last_r + squared_height
-    along = (first - last) * (first + last) / (first_inverse * last_inverse)
-    across = -d / (w * w) * (last / last_inverse - first / first_inverse + angle / w)
+    # The values of 1/f at both ends, and `along` as f(r₂) - f(r₁) without cancellation.
+    r1 = np.sqrt(d * d + s1 * s1)
+    r2 = np.sqrt(d * d + s2 * s2)
+    inverse_f1 = r1 * r1 + squared_height
+    inverse_f2 = r2 * r2 + squared_height
+    along = (s1 - s2) * (s1 + s2) / (inverse_f1 * inverse_f2)
+    across = -d / (w * w) * (s2 / inverse_f2 - s1 / inverse_f1 + angle / w)
     return _EdgeIntegral(total, along, across)
 
 
 @kernel
-def _integrate_inverse(d: float, first: float, last: float) -> float:
+def _integrate_inverse(d: float, s1: float, s2: float) -> float:
     """Return ∫ 1/r ds over an edge."""
     d = max(abs(d), _MIN_LENGTH_M)
-    return float(np.arcsinh(last / d) - np.arcsinh(first / d))
+    return float(np.arcsinh(s2 / d) - np.arcsinh(s1 / d))
 
 
 @kernel
@@ -314,23 +315,24 @@ def _sum_edge_costs(
 ) -> Array:
     """Return the cost of each cell: the sum of ∫ f over the triangles between its point and its edges.
 
-    The integral over a triangle is negative if the point is on the outer side of the edge.
+    With F(r) the integral of f(r) r dr from 0 to r, the integral over a triangle is d ∫ F(r)/r² ds. It is
+    negative if the point is on the outer side of the edge.
     """
     sums = np.zeros(len(points))
     for k in range(len(cell)):
         i = cell[k]
         edge = _compute_relative_edge(start, end, k, points[i, 0], points[i, 1])
         d = edge.distance
-        first = edge.start
-        last = first + edge.length
+        s1 = edge.start
+        s2 = s1 + edge.length
         if kind == SQUARED_DISTANCE:
-            square = 3.0 * d * d + first * first + first * last + last * last
+            square = 3.0 * d * d + s1 * s1 + s1 * s2 + s2 * s2
             sums[i] += d * edge.length * square / 12.0
         elif kind == DISTANCE:
-            first_r = np.sqrt(d * d + first * first)
-            last_r = np.sqrt(d * d + last * last)
-            inverse_integral = _integrate_inverse(d, first, last)
-            sums[i] += d * (last * last_r - first * first_r + d * d * inverse_integral) / 6.0
+            r1 = np.sqrt(d * d + s1 * s1)
+            r2 = np.sqrt(d * d + s2 * s2)
+            inverse_integral = _integrate_inverse(d, s1, s2)
+            sums[i] += d * (s2 * r2 - s1 * r1 + d * d * inverse_integral) / 6.0
         else:
             _add_sensing_cost(sums, i, edge, height, rule)
     return sums
@@ -345,13 +347,13 @@ def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, r
     """
     d = edge.distance
     w = np.sqrt(d * d + height * height)
-    first_tau = np.arcsinh(edge.start / w)
-    last_tau = np.arcsinh((edge.start + edge.length) / w)
-    panel_count = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
-    half_panel = 0.5 * (last_tau - first_tau) / panel_count
+    tau1 = np.arcsinh(edge.start / w)
+    tau2 = np.arcsinh((edge.start + edge.length) / w)
+    panel_count = max(int(np.ceil((tau2 - tau1) / _PANEL_LENGTH)), 1)
+    half_panel = 0.5 * (tau2 - tau1) / panel_count
     for panel in range(panel_count):
         for node in range(rule.shape[1]):
-            tau = first_tau + half_panel * (2 * panel + 1 + rule[_NODES, node])
+            tau = tau1 + half_panel * (2 * panel + 1 + rule[_NODES, node])
             s = w * np.sinh(tau)
             ratio = (s * s + d * d) / (height * height)
             # log(1 + r²/h²)/r², times h²; its limit at r = 0 is 1.
