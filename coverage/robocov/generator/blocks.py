@@ -149,13 +149,13 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
     tilt_deviation = float(rng.choice(_TILTS_RAD))
     street_width = request.gap_before_rounding
     # The streets along the boundary lie half outside. Otherwise, the blocks next to them would be smaller.
-    low = street_width / 2.0
-    x = request.width - street_width / 2.0
-    y = request.height - street_width / 2.0
-    outline = [(low, low), (x, low), (x, y), (low, y)]
-    whole = [Edge(*point, street_width / 2.0, _MIN_WIDENING_SHARE / 2.0) for point in outline]
+    half_width = street_width / 2.0
+    right = request.width - half_width
+    top = request.height - half_width
+    outline = [(half_width, half_width), (right, half_width), (right, top), (half_width, top)]
+    whole_map = [Edge(x, y, setback=half_width, widening_share=_MIN_WIDENING_SHARE / 2.0) for x, y in outline]
     # Cells to divide, and the number of blocks in each.
-    waiting = [(whole, int(request.obstacles))]
+    waiting = [(whole_map, int(request.obstacles))]
     cells = []
     while waiting:
         cell, count = waiting.pop()
@@ -296,6 +296,7 @@ def _find_feasible_widening(cells: list[Cell], request: Request, corner_disc: Di
     while not all(_is_thick(_build_block(cell, widening, corner_disc, None)) for cell in cells):
         if widening == 0.0:
             return None
+        # Below one rounding step, only streets of the smallest width remain to be tried.
         widening = widening / 2.0 if widening > request.step else 0.0
     return widening
 
@@ -330,10 +331,11 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
     """Cut off the corner of a block, or cut a notch into it; return the whole block if that is not valid."""
     points = np.array([(edge.x, edge.y) for edge in block])
     index = trim.corner % len(points)
-    point = points[index]
-    first = point + (points[index - 1] - point) * trim.before
-    last = point + (points[(index + 1) % len(points)] - point) * trim.after
-    cut = [first, first + last - point, last] if trim.is_notch else [first, last]
+    corner = points[index]
+    start = corner + (points[index - 1] - corner) * trim.before
+    end = corner + (points[(index + 1) % len(points)] - corner) * trim.after
+    # The inner corner of a notch is opposite to the corner of the block in a parallelogram.
+    cut = [start, start + end - corner, end] if trim.is_notch else [start, end]
     trimmed = Polygon([*points[:index], *cut, *points[index + 1 :]])
     return trimmed if trimmed.is_valid else _to_polygon(block)
 

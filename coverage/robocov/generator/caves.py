@@ -102,7 +102,8 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 def _compute_shore_rise(request: Request, points: Array) -> Array:
     """Return the height by which the field is raised at each point because of the boundary."""
-    distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
+    upper_right = points[-1, -1]
+    distances = np.minimum(points, upper_right - points).min(axis=-1)
     return np.asarray(_SHORE_RISE * np.exp(-((distances / (_SHORE_UNITS * request.unit)) ** 2)))
 
 
@@ -140,7 +141,8 @@ class _CaveBuilder:
         chambers = [
             part for part in shapely.get_parts(low_area) if part.area >= _MIN_CHAMBER_AREA_UNITS2 * unit**2
         ]
-        # The core is dilated later, by at least the radius by which the start is eroded here.
+        # The hall is the chamber around the start. The core is dilated later, by at least the radius by which
+        # the start is eroded here.
         hall = self.start.buffer(-self.min_radius)
         if hall.is_empty:
             hall = self.start.centroid
@@ -380,12 +382,12 @@ def build_window_tunnel(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeom
     middle = (first_wall + second_wall) / 2.0
     across = second_wall - first_wall
     across = across / np.hypot(across[0], across[1]) * (_WINDOW_REACH * radius)
-    along = np.array([-across[1], across[0]])
+    through = np.array([-across[1], across[0]])
     left = middle + across
     right = middle - across
     # The parts of the core in two rectangles, one on either side of the window.
-    front = core.intersection(Polygon([left, right, right + along, left + along]))
-    back = core.intersection(Polygon([left, right, right - along, left - along]))
+    front = core.intersection(Polygon([left, right, right + through, left + through]))
+    back = core.intersection(Polygon([left, right, right - through, left - through]))
     if front.is_empty or back.is_empty:
         return Point(middle)
     start = shapely.shortest_line(Point(middle), front).coords[-1]

@@ -47,6 +47,7 @@ _MAX_DISC_SIDES = 0.1
 _MIN_DISC_FRACTION = 0.4
 """Smallest fraction of that radius that remains if walls are near."""
 _DISC_SHRINKAGE = 0.9
+"""Factor by which the radius shrinks until the disc fits between walls."""
 _DISC_MARGIN_SIDES = 0.02
 """Margin between the disc in the corner and the boundary, as a fraction of the shorter side."""
 _MAX_CENTER_OFFSET_SIDES = 0.3
@@ -60,6 +61,7 @@ _CENTER_OFFSET_WEIGHT = 0.2
 _SCORE_DIGITS = 9
 """Decimal places to which scores are rounded, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
+"""Rounding error that a measured gap may have."""
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,11 @@ def _choose_grid_shape(request: Request) -> GridShape:
         return abs(math.log(columns * rows / request.obstacles)) + _ELONGATION_WEIGHT * elongation
 
     count = int(request.obstacles)
-    shapes = [
-        (columns, rows) for columns in range(1, count + 1) for rows in range(1, 2 * count // columns + 1)
-    ]
+    shapes = []
+    for columns in range(1, count + 1):
+        # Shapes with more than twice the requested number of cells are not considered.
+        max_rows = 2 * count // columns
+        shapes += [(columns, rows) for rows in range(1, max_rows + 1)]
     return min(shapes, key=compute_mismatch)
 
 

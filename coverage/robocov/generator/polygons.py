@@ -149,7 +149,7 @@ def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Genera
 
 
 def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
-    """Draw a convex polygon of 3 to 7 vertices on an ellipse that is not too thin.
+    """Draw a convex polygon of 3 to 7 vertices on an ellipse, which is usually not thin.
 
     Parameters
     ----------
@@ -168,6 +168,7 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
         stretch = rng.uniform(1.0, _MAX_STRETCH)
         outline = np.column_stack([stretch * np.cos(angles), np.sin(angles)])
         polygon = shapely.Polygon(outline)
+        # The last polygon is used even if it is thin.
         if 4.0 * math.pi * polygon.area >= _MIN_ROUNDNESS * polygon.length**2:
             break
     return _scale_and_rotate(outline, area, rng)
@@ -186,8 +187,8 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     (6, 2) array, m
     """
     width = rng.uniform(*_L_WIDTHS)
-    relative_width, arm_height = rng.uniform(*_L_THICKNESSES, 2)
-    arm_width = width * relative_width
+    relative_arm_width, arm_height = rng.uniform(*_L_THICKNESSES, 2)
+    arm_width = width * relative_arm_width
     outline = np.array(
         [
             (0.0, 0.0),
@@ -202,7 +203,7 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
 
 
 def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
-    """Draw a U with an opening of the given width; its arms may differ in length.
+    """Draw a U whose opening has at least the given width; its arms may differ in length.
 
     Parameters
     ----------
@@ -214,27 +215,27 @@ def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array
     Returns
     -------
     (8, 2) array, m, or None
-        None if the opening is too wide for the area.
+        None if no U of this area has been found.
     """
     for _ in range(_MAX_REDRAWS):
         width = rng.uniform(*_U_WIDTHS)
-        left, right = rng.uniform(*_U_ARM_WIDTHS, 2)
-        base = rng.uniform(*_U_BASE_HEIGHTS)
+        left_width, right_width = rng.uniform(*_U_ARM_WIDTHS, 2)
+        base_height = rng.uniform(*_U_BASE_HEIGHTS)
         right_height = rng.uniform(*_U_RIGHT_HEIGHTS)
         outline = np.array(
             [
                 (0.0, 0.0),
                 (width, 0.0),
                 (width, right_height),
-                (width - right, right_height),
-                (width - right, base),
-                (left, base),
-                (left, 1.0),
+                (width - right_width, right_height),
+                (width - right_width, base_height),
+                (left_width, base_height),
+                (left_width, 1.0),
                 (0.0, 1.0),
             ]
         )
         scale = math.sqrt(area / shapely.Polygon(outline).area)
-        if (width - left - right) * scale >= opening:
+        if (width - left_width - right_width) * scale >= opening:
             return _scale_and_rotate(outline, area, rng)
     return None
 

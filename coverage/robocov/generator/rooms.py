@@ -257,10 +257,11 @@ def build_building(
 
 def _draw_thickness(request: Request, rng: np.random.Generator) -> float:
     """Return a random thickness of walls, m."""
-    room_gaps = request.unit / request.gap
-    smallness = (_SMALL_ROOM_SIDE_GAPS - room_gaps) / (_SMALL_ROOM_SIDE_GAPS - _SMALLEST_ROOM_SIDE_GAPS)
-    smallness = min(max(smallness, 0.0), 1.0)
-    max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * smallness
+    # Interpolate the largest fraction of walls between that of other rooms and that of the smallest ones.
+    room_side_gaps = request.unit / request.gap
+    weight = (_SMALL_ROOM_SIDE_GAPS - room_side_gaps) / (_SMALL_ROOM_SIDE_GAPS - _SMALLEST_ROOM_SIDE_GAPS)
+    weight = min(max(weight, 0.0), 1.0)
+    max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * weight
     fraction = rng.uniform(_MIN_WALL_FRACTION, max_fraction)
     # In units, the walls of a mean room block their length times their thickness; the room's area is 1.
     thickness_units = min(fraction * request.area / _WALL_LENGTH_UNITS, _MAX_THICKNESS_UNITS)
@@ -351,6 +352,7 @@ def _divide_by_corridor(
     plan.walls.append(Wall(axis, end, *wall_range))
     plan.corridor = len(plan.rooms)
     plan.rooms.append(box.crop(axis, low=start, high=end))
+    # One room is the corridor, and at least one room is on either side of it.
     first_share = start / (extent - corridor_width)
     first_count = min(max(round((count - 1) * first_share), 1), count - 2)
     return [
@@ -445,7 +447,8 @@ def _place_furniture(
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
         for room in door.rooms:
             occupied[room].append(opening.polygon)
-    # A room is drawn with a probability that is proportional to its area.
+    # A room is drawn with a probability that is proportional to its area. Because of rounding, the cumulative
+    # sum may end next to 1.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
     cumulative_probabilities = cumulative_areas / cumulative_areas[-1]
     mean_piece_area = area / (_PIECES_PER_ROOM * len(inner_rooms))
@@ -551,6 +554,7 @@ def _place_piece(
     # Distances to a circle are measured from its center, and are larger by its radius.
     if piece.is_round:
         shapes = shapely.points(middle)
+        # Rounding moves the center by up to half a step.
         radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0)
     else:
         shapes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
