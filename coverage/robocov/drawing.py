@@ -1,8 +1,8 @@
 """Drawing backends, which plot maps, runs and results for the library.
 
-A backend is an object, most simply a module, with the functions of `DrawingBackend`. Its package names it in
-the entry-point group ``robocov.drawing``, as backends of pandas are named. The application offers
-``matplotlib``.
+A backend is an object, most simply a module, with the functions of `DrawingBackend`. Its package registers it
+in the entry-point group ``robocov.drawing``, as plotting backends of pandas are registered. The application
+provides the backend ``matplotlib``.
 """
 
 from collections.abc import Callable

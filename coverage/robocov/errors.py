@@ -188,12 +188,12 @@ class MapError(InputError):
         """
         first = mistakes[0]
         message = first.format_message(where)
-        other_count = len(mistakes) - 1 + unlisted
-        if other_count > 0:
-            message += f" (and {other_count} more)"
+        total_count = len(mistakes) + unlisted
+        if total_count > 1:
+            message += f" (and {total_count - 1} more)"
         error = cls(message)
         error.mistakes = tuple(mistakes[: cls.MAX_LISTED])
-        error.unlisted = other_count + 1 - len(error.mistakes)
+        error.unlisted = total_count - len(error.mistakes)
         error.where = where
         error.line = first.line
         error.column = first.column

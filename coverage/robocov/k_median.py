@@ -94,8 +94,10 @@ def choose_greedily(table: Array, count: int) -> IntArray:
     Compared with a single source far from everything, these sources save at least 1 - 1/e of what the best k
     sources save (Nemhauser, Wolsey and Fisher 1978).
     """
+    # All sources are replaced, so that their initial values do not matter.
     sources = np.zeros(count, dtype=np.intp)
-    return _replace_sources(table, sources, np.arange(count), 0)[1]
+    _, chosen = _replace_sources(table, sources, np.arange(count), unchanged_count=0)
+    return chosen
 
 
 def run_lloyd(
@@ -197,6 +199,7 @@ def improve_sources(
     """
     after_lloyd = run_lloyd(table, sources, fixed)
     if not threshold < 1.0:
+        # Nothing can save the whole cost.
         return after_lloyd
     best = after_lloyd
     for _ in range(_MAX_ROUNDS):
@@ -259,8 +262,10 @@ def rebuild_sources(table: Array, sources: IntArray, fixed: BoolArray, threshold
     candidates = []
     for size in _REMOVAL_SIZES:
         for removed in combinations(free, size):
+            # The removed sources come last, and are replaced.
             order = np.append(np.delete(np.arange(len(sources)), removed), removed)
-            candidates.append(_replace_sources(table, sources, order, len(sources) - size))
+            cost, rebuilt = _replace_sources(table, sources, order, unchanged_count=len(sources) - size)
+            candidates.append((cost, rebuilt))
     candidates.sort(key=lambda candidate: candidate[0])
     best = sources
     best_cost = _compute_cost(table, sources) * (1.0 - threshold)

@@ -27,7 +27,7 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 _MIN_DISTANCE = 1e-12
 """Distance that is assumed between robots at the same position, m."""
 _MIN_GOAL_DISTANCE = 1e-300
-"""Distance to the goal that replaces smaller ones in divisions, so that nothing is divided by zero, m."""
+"""Smallest distance to the goal used as a divisor, which prevents division by zero, m."""
 
 
 class PotentialGains(NamedTuple):
@@ -114,6 +114,7 @@ def compute_potential_forces(
         factor = _compute_attraction_factor(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
         attraction[i, 0] = factor * dx
         attraction[i, 1] = factor * dy
+    # If communication is not limited, there are no lists of neighbors.
     if len(neighbors.indptr) > 0:
         robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
     else:

@@ -93,6 +93,9 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 _POINT_ROBOT_VALUES = {"track_width": DEFAULT_TRACK_WIDTH_M, "turning_rate": DEFAULT_TURNING_RATE_RAD_S}
 """Parameters that matter only for unicycles, with their values in a team of points."""
 
+_MISSING = "missing"
+"""Stands for a value that is missing in JSON. Like any text, it is not valid for a parameter."""
+
 
 def _build_default_column() -> Array:
     """Return a placeholder for a column of default values, because the number of robots is not known yet."""
@@ -128,7 +131,7 @@ class Team:
     Raises
     ------
     ParameterError
-        If a value is out of range, or an array has another length than `radius`.
+        If a value is out of range, or the length of an array differs from that of `radius`.
 
     See Also
     --------
@@ -349,7 +352,7 @@ def _check_column(name: str, values: Array, size: int) -> None:
 def _read_column(data: Mapping[str, Any], name: str, n: int) -> Array:
     """Return the values of a parameter for n robots from JSON, which contains a list or one shared value."""
     parameter = PARAMETERS[name]
-    value = data.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, "missing"))
+    value = data.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, _MISSING))
     values = value if isinstance(value, list) else [value] * n
     is_valid = len(values) == n and all(_is_valid_json(parameter, entry) for entry in values)
     if not is_valid:
