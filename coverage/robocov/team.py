@@ -94,7 +94,7 @@ _POINT_ROBOT_VALUES = {"track_width": DEFAULT_TRACK_WIDTH_M, "turning_rate": DEF
 """Parameters that matter only for unicycles, with their values in a team of points."""
 
 _MISSING = "missing"
-"""Stands for a value that is missing in JSON. Like any text, it is not valid for a parameter."""
+"""Used in place of a value that is missing in JSON. Like any text, it is not valid for a parameter."""
 
 
 def _build_default_column() -> Array:

@@ -26,7 +26,7 @@ TILES_PER_GROUP = 16
 """Number of consecutive tiles that share a bounding box."""
 
 NO_SITE = -1
-"""Stands for the site of a cell that is not free."""
+"""Used in place of a site if a cell is not free."""
 
 _CELLS_PER_BLOCK = 1 << 18
 """Number of cells that are located at the same time, to limit memory."""

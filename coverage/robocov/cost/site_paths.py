@@ -41,7 +41,7 @@ _MAX_SMALL_TEAM = 12
 tested with most sites anyway."""
 
 NO_ROBOT = -1
-"""Stands for the robot where a path starts if there is no path."""
+"""Used in place of a robot if no path leads to a site."""
 
 _REACH_PADDING = 1e-9
 """Relative margin added to the reach of a robot's view, far larger than rounding."""

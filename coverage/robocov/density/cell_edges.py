@@ -9,7 +9,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
-"""Stands for the cell on the other side of an edge that lies on the region's boundary."""
+"""Used in place of the cell on the other side of an edge that lies on the region's boundary."""
 
 MASS = 0
 """Column of the moments of cells: the integral of φ, m²."""

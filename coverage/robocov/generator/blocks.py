@@ -356,12 +356,12 @@ def _draw_trims(
 
 def _draw_trim(rng: np.random.Generator) -> Trim | None:
     """Draw a chamfer or a notch; None if a block has neither."""
-    kind = rng.random()
+    choice = rng.random()
     corner = int(rng.integers(0, _MAX_CORNERS))
-    if kind < _CHAMFER_PROBABILITY:
+    if choice < _CHAMFER_PROBABILITY:
         fraction = rng.uniform(*_CHAMFER_FRACTIONS)
         return Trim(corner, before=fraction, after=fraction, is_notch=False)
-    if kind < _CHAMFER_PROBABILITY + _NOTCH_PROBABILITY:
+    if choice < _CHAMFER_PROBABILITY + _NOTCH_PROBABILITY:
         before, after = rng.uniform(*_NOTCH_FRACTIONS, 2).tolist()
         return Trim(corner, before=before, after=after, is_notch=True)
     return None

@@ -53,7 +53,7 @@ ONLY_SOURCE = 0
 """Row of the source in an index that has only one."""
 
 NO_ENTRY = -1
-"""Stands for the entry before the first one in a bin."""
+"""Used in place of an entry where there is none."""
 
 NO_SPACE = -1
 """Returned instead of a number of entries, or of rows, if there is not enough space for them."""

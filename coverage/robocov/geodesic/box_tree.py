@@ -16,7 +16,7 @@ from robocov.compiled import kernel
 ROOT = 1
 """The node that contains all items."""
 END_OF_TREE = 0
-"""Stands for the next node where there is none."""
+"""Returned instead of a node at the end of a search."""
 LEAF_SIZE = 8
 """Number of items per leaf."""
 LOW_X = 0

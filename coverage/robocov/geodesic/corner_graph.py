@@ -20,7 +20,7 @@ from robocov.geodesic.box_tree import END_OF_TREE, LEAF_SIZE, LOW_X, ROOT, skip_
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 NO_CORNER = -1
-"""Stands for a corner at which a path bends if it is straight."""
+"""Used in place of a corner if a path is straight, and does not bend."""
 
 
 class CornerGraph(NamedTuple):

@@ -451,18 +451,19 @@ def _combine_distances(
     for j in range(len(targets)):
         x = targets[j, 0]
         y = targets[j, 1]
-        count = 0
+        # List the corners from which there is a straight path to the target.
+        corner_count = 0
         for corner in range(len(corners)):
             if to_targets[j, corner] < np.inf:
-                corners[count] = corner
-                count += 1
+                corners[corner_count] = corner
+                corner_count += 1
         for i in range(len(from_sources)):
             min_length = np.inf
             if is_visible(walls, index, i, x, y):
                 dx = x - index.positions[i, 0]
                 dy = y - index.positions[i, 1]
                 min_length = np.sqrt(dx * dx + dy * dy)
-            for k in range(count):
+            for k in range(corner_count):
                 corner = corners[k]
                 min_length = min(min_length, from_sources[i, corner] + to_targets[j, corner])
             distances[i, j] = min_length

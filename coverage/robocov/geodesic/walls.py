@@ -43,9 +43,9 @@ OUTGOING_Y = 3
 """Column of the same arrays: y of the direction of the outgoing wall."""
 
 NO_WALL = -1
-"""Stands for the following wall where there is not exactly one."""
+"""Used in place of the following wall unless there is exactly one."""
 NO_VERTEX = -1
-"""Stands for the vertex of a point that is not at any."""
+"""Returned instead of a vertex if a point does not coincide with any."""
 
 _ON_BOUNDARY = 1000
 """Contribution of a wall through a point to the point's winding number: more than any number of turns."""

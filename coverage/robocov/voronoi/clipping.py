@@ -221,13 +221,11 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
     # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
     # are those from `first_cut` to `last_cut`; `after` is the vertex after them, and `before` the one before.
     last_cut = farthest
-    after = farthest
-    for _ in range(count):
-        after = _get_next_vertex(last_cut, count)
-        if rings[ring, after, _EXCESS] <= 0.0:
-            break
+    after = _get_next_vertex(last_cut, count)
+    while after != farthest and rings[ring, after, _EXCESS] > 0.0:
         last_cut = after
-    else:
+        after = _get_next_vertex(last_cut, count)
+    if after == farthest:
         # All vertices are beyond the bisector.
         return 0
     first_cut = farthest

@@ -30,7 +30,7 @@ CORNER = 0
 TWIN = 1
 """Row of a mesh: the half-edge of the neighboring triangle along the same edge, or `NO_TWIN`."""
 NO_TWIN = -1
-"""Stands for the twin of a half-edge on the outline of a mesh."""
+"""Used in place of a twin on the outline of a mesh."""
 NOT_TRIANGULATED = -1
 """First corner of a mesh that does not contain a triangulation."""
 ENTRIES_PER_TRIANGLE = 4
@@ -41,7 +41,7 @@ _POSITION_BITS = 3
 _FAILED = -1
 """Returned instead of a triangle or of a number of flips if rounding makes the triangulation fail."""
 _NO_HALF_EDGE = -1
-"""Returned instead of a half-edge if a point is on the right of none."""
+"""Returned instead of a half-edge if a point is on the right of none of a triangle."""
 
 _TOLERANCE = 1e-14
 """An edge is not flipped if the sum of its two cotangents is negative by at most this fraction of the sum of

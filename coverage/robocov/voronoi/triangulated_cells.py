@@ -187,11 +187,11 @@ def _find_cell(
             sides[k, SIDE_OFFSET]
             - (sides[k, SIDE_NORMAL_X] * points[i, 0] + sides[k, SIDE_NORMAL_Y] * points[i, 1]),
         )
-    # If all vertices of the cell are nearer than the sides of the region, no side cuts it.
+    # If all vertices of the cell are nearer than the sides of the region, no side cuts it. In any case, the
+    # cell starts at the neighbor with the lowest number, so that it does not depend on the order of the
+    # triangles.
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
         return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest)
-    # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
-    # triangles.
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
 

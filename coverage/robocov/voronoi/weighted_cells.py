@@ -234,6 +234,7 @@ def _compute_weighted_cells(
     areas = moments[:, MASS]
     first_moments = moments[:, [MOMENT_X, MOMENT_Y]]
     mass = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
+    # The centroid of an empty cell is its generator.
     centroid = points + first_moments / np.where(mass > 0.0, mass, np.inf)[:, None]
     # A cell without arcs is the same as among equally fast robots, and so are the bits of mass and centroid.
     mass = np.where(is_straight, equal_cells.mass, mass)
