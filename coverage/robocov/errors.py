@@ -145,7 +145,7 @@ class MapError(InputError):
 
     See Also
     --------
-    load_map : Raises it.
+    load_map : Raises this error.
 
     Examples
     --------
@@ -205,7 +205,7 @@ class StartError(InputError):
 
     See Also
     --------
-    Environment.start : Raises it if there is no such start.
+    Environment.start : Raises this error if there is no such start.
 
     Examples
     --------
@@ -224,7 +224,7 @@ class ParameterError(InputError):
 
     See Also
     --------
-    InputError : Its base class, of all unusable inputs.
+    InputError : Base class of the errors of unusable inputs.
 
     Examples
     --------

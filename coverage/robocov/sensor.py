@@ -40,7 +40,7 @@ class RangeSensor:
     See Also
     --------
     World : The physics of the robots.
-    Simulation : Has a sensor of its map, the attribute ``sensor``.
+    Simulation : Its attribute ``sensor`` is the sensor of its map.
 
     Examples
     --------

@@ -62,8 +62,8 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
 
     See Also
     --------
-    Team.homogeneous : A team of identical robots.
-    Team.concatenate : A team of several teams.
+    Team.homogeneous : Build a team of identical robots.
+    Team.concatenate : Build one team from several.
 
     Examples
     --------

@@ -100,7 +100,7 @@ class LowerBound:
 
     See Also
     --------
-    compute_lower_bound : Compute it for a placement.
+    compute_lower_bound : Compute the bound for a placement.
 
     Examples
     --------
