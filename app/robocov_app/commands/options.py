@@ -140,7 +140,9 @@ class ConditionOptions:
     delay: float = 0.0
     """Message latency, s."""
     message_rate: float | None = None
-    """Messages per second with which each robot reports its position; by default one in every step."""
+    """Times per second at which each robot sends messages, with its position; by default in every step."""
+    bandwidth: float | None = None
+    """Bytes per second that each robot can send; by default unlimited."""
     forget_after: float = 3.0
     """Time without messages after which a robot is forgotten, s."""
     position_noise: float = 0.0

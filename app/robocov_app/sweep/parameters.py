@@ -49,6 +49,7 @@ UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*TEXT_PARAMETERS, GRO
 _MAX_NUMBER = 1e300
 _NO_LIMIT_VALUES: dict[str, tuple[object, ...]] = {
     "message_rate": (None, NO_LIMIT),
+    "bandwidth": (None, NO_LIMIT),
     "sensing_range": (None, NO_LIMIT, math.inf),
     "communication_range": (None, NO_LIMIT, math.inf),
 }

@@ -1,14 +1,27 @@
-"""Messages between robots, with loss, latency and a limited rate.
+"""Messages between robots, with loss, latency, a limited rate and a limited bandwidth.
 
-A message contains its sender's own estimate of its position, and is sent to all robots in communication
-range. For each receiver independently, the message is either lost or arrives after the latency. A robot
-remembers the newest message from each other robot. If none arrives for `Conditions.forget_after`, it forgets
-that robot.
+There are two kinds of messages. Both are sent to all robots in communication range, at the rate of the
+conditions. For each receiver independently, a message is either lost or arrives after the latency.
+
+- *Positions.* Each robot sends its own estimate of its position. A robot remembers the newest position from
+  each other robot. If none arrives for `Conditions.forget_after`, it forgets that robot.
+- *Messages of the controller* (`robocov.observation.Message`): all else that robots know of each other, such
+  as maps. The controller returns them with its decision, at the end of a step; they arrive in the next step
+  at the earliest. A long message is sent in packets of at most `MAX_PACKET_BYTES`. It is lost as soon as one
+  of its packets is lost.
+
+The bandwidth limits the bytes per second that a robot sends. What exceeds it waits in a queue at the sender,
+in order. A position does not wait in this queue: it is sent next, or replaced by a newer one. While messages
+wait, positions and messages take turns.
+
+The state of the communication is an `Inbox`: what has arrived, is in flight or waits. It is part of the state
+of a simulation, so a copy continues with the same messages.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -16,11 +29,18 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions.conditions import TIME_TOLERANCE_S, Conditions
-from robocov.conditions.random_streams import LOSS_STREAM, create_generator
+from robocov.conditions.random_streams import LOSS_STREAM, MESSAGE_LOSS_STREAM, create_generator
+from robocov.observation import Message, Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 
 NEVER = -1
 """Placeholder for the step of a message that has not been sent or has not arrived."""
+POSITION_BYTES = 20
+"""Size of a message with the number and the position of a robot."""
+MAX_PACKET_BYTES = 1400
+"""Maximum size of a packet: about that of a frame of a wireless network."""
+_MIN_SEND_LIMIT_BYTES = 1.0
+"""Lower limit of the bytes that a robot may send when its turn comes, so that it can send at all."""
 
 
 class Broadcast(NamedTuple):
@@ -42,9 +62,60 @@ class Broadcast(NamedTuple):
     is_received: BoolArray
 
 
+class Transmission(NamedTuple):
+    """A message of a controller in flight.
+
+    Attributes
+    ----------
+    arrival_step : int
+        Number of the step, from time zero, in which it arrives.
+    message : ReceivedMessage
+    is_received : (n,) bool array
+        Whether each robot receives it.
+    """
+
+    arrival_step: int
+    message: ReceivedMessage
+    is_received: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outbox:
+    """Messages that wait at the senders because the bandwidth is limited. Immutable.
+
+    Attributes
+    ----------
+    queues : tuple of tuple of Message
+        The messages of each robot that wait, in order.
+    credits : (n,) array, bytes
+        Bytes that each robot may send now; negative after a message that was larger.
+    sent_position : (n,) bool array
+        Whether the last thing that each robot sent was its position.
+    """
+
+    queues: tuple[tuple[Message, ...], ...]
+    credits: Array
+    sent_position: BoolArray
+
+    @classmethod
+    def create_empty(cls, count: int) -> Outbox:
+        """Create the outbox of robots that have not sent any message.
+
+        Parameters
+        ----------
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        Outbox
+        """
+        return cls(queues=((),) * count, credits=np.zeros(count), sent_position=np.zeros(count, dtype=bool))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Inbox:
-    """Messages received and messages in flight. Immutable; replaced in each step.
+    """Messages received, messages in flight and messages that wait. Immutable; replaced in each step.
 
     Attributes
     ----------
@@ -54,13 +125,19 @@ class Inbox:
     positions : (n, n, 2) array, m
         Positions in these messages.
     in_flight : tuple of Broadcast
-        In the order in which they arrive.
+        Positions, in the order in which they arrive.
+    transmissions : tuple of Transmission
+        Messages of the controller, in the order in which they arrive.
+    outbox : Outbox
+        Messages of the controller that wait.
     """
 
     sent_steps: IntArray
     arrival_steps: IntArray
     positions: Array
-    in_flight: tuple[Broadcast, ...] = ()
+    in_flight: tuple[Broadcast, ...]
+    transmissions: tuple[Transmission, ...]
+    outbox: Outbox
 
     @classmethod
     def create_empty(cls, count: int) -> Inbox:
@@ -76,10 +153,31 @@ class Inbox:
         Inbox
         """
         never = np.full((count, count), NEVER, dtype=np.intp)
-        return cls(sent_steps=never, arrival_steps=never.copy(), positions=np.zeros((count, count, 2)))
+        return cls(
+            sent_steps=never,
+            arrival_steps=never.copy(),
+            positions=np.zeros((count, count, 2)),
+            in_flight=(),
+            transmissions=(),
+            outbox=Outbox.create_empty(count),
+        )
+
+    @property
+    def has_messages(self) -> bool:
+        """Whether messages of the controller are in flight or wait."""
+        return bool(self.transmissions) or any(self.outbox.queues)
+
+    def drop_messages(self) -> Inbox:
+        """Return the inbox without the messages of the controller, which another one would not understand."""
+        if not self.has_messages:
+            return self
+        outbox = Outbox.create_empty(len(self.positions))
+        return replace(self, transmissions=(), outbox=outbox)
 
     def select_robots(self, rows: IntArray) -> Inbox:
         """Return the inbox of a team of m robots, some of this team and some new.
+
+        Messages of the controller are dropped, because its memory is that of this team.
 
         Parameters
         ----------
@@ -106,6 +204,8 @@ class Inbox:
             arrival_steps=np.where(is_new_pair, NEVER, self.arrival_steps[old_pairs]),
             positions=self.positions[old_pairs],
             in_flight=in_flight,
+            transmissions=(),
+            outbox=Outbox.create_empty(len(old_rows)),
         )
 
 
@@ -126,11 +226,15 @@ class Radio:
         self._ranges = ranges
         self._dt = dt
         self._latency_steps = math.ceil(conditions.delay / dt - TIME_TOLERANCE_S)
+        self._period_bytes: float | None = None
+        if conditions.bandwidth is not None:
+            period = dt if conditions.message_rate is None else max(dt, 1.0 / conditions.message_rate)
+            self._period_bytes = conditions.bandwidth * period
 
-    def exchange_messages(
+    def exchange_positions(
         self, inbox: Inbox, step: int, reported_positions: Array, true_positions: Array, working: BoolArray
     ) -> Inbox:
-        """Send and deliver the messages of one step.
+        """Send and deliver the positions of one step.
 
         Parameters
         ----------
@@ -151,11 +255,15 @@ class Radio:
         """
         in_flight = inbox.in_flight
         if self._is_sending(step):
+            is_received = self._find_receivers(step, true_positions, working)
+            if self._period_bytes is not None:
+                inbox, is_sender = self._pay_for_positions(inbox)
+                is_received &= is_sender
             broadcast = Broadcast(
                 sent_step=step,
                 arrival_step=step + self._latency_steps,
                 positions=np.array(reported_positions),
-                is_received=self._find_receivers(step, true_positions, working),
+                is_received=is_received,
             )
             in_flight = (*in_flight, broadcast)
         # Messages are in flight in the order in which they arrive, so those that are due come first.
@@ -170,7 +278,165 @@ class Radio:
             arrival_steps[broadcast.is_received] = broadcast.arrival_step
             receiver, sender = np.nonzero(broadcast.is_received)
             newest_positions[receiver, sender] = broadcast.positions[sender]
-        return Inbox(sent_steps, arrival_steps, newest_positions, in_flight[len(due) :])
+        return replace(
+            inbox,
+            sent_steps=sent_steps,
+            arrival_steps=arrival_steps,
+            positions=newest_positions,
+            in_flight=in_flight[len(due) :],
+        )
+
+    def receive_messages(
+        self, inbox: Inbox | None, step: int, observations: Observations
+    ) -> tuple[Inbox | None, Observations]:
+        """Deliver the messages of the controller that arrive in a step.
+
+        Parameters
+        ----------
+        inbox : Inbox or None
+            After the positions of the step were exchanged; None if nothing is in flight and nothing waits.
+        step : int
+            Number of the step since time zero.
+        observations : Observations
+
+        Returns
+        -------
+        inbox : Inbox or None
+            The same without these messages. None if it is empty and communication is ideal.
+        observations : Observations
+            The same with these messages, and with the size of those that the robots can send.
+        """
+        limits = self._compute_send_limits(inbox, step, len(observations.positions))
+        due = []
+        if inbox is not None:
+            due = [message for message in inbox.transmissions if message.arrival_step <= step]
+            inbox = replace(inbox, transmissions=inbox.transmissions[len(due) :])
+            if not (inbox.has_messages or self._conditions.uses_messages):
+                inbox = None
+        if not due and limits is None:
+            return inbox, observations
+        received: list[list[ReceivedMessage]] = [[] for _ in observations.positions]
+        for transmission in due:
+            for robot in np.flatnonzero(transmission.is_received).tolist():
+                received[robot].append(transmission.message)
+        messages = tuple(map(tuple, received)) if due else ()
+        return inbox, replace(observations, messages=messages, send_limits=limits)
+
+    def _compute_send_limits(self, inbox: Inbox | None, step: int, count: int) -> Array | None:
+        """Compute the size of the messages that each of n robots can send in a step, (n,) bytes or None."""
+        if not self._is_sending(step):
+            return np.zeros(count)
+        if self._period_bytes is None or inbox is None:
+            return None
+        is_waiting = np.array([len(queue) > 0 for queue in inbox.outbox.queues])
+        limits = np.maximum(inbox.outbox.credits, _MIN_SEND_LIMIT_BYTES)
+        return np.where(is_waiting, 0.0, limits)
+
+    def send_messages(
+        self,
+        inbox: Inbox | None,
+        step: int,
+        messages: Sequence[Sequence[Message]],
+        true_positions: Array,
+        working: BoolArray,
+    ) -> tuple[Inbox | None, int]:
+        """Send messages of a controller at the end of a step, as far as the conditions allow.
+
+        Parameters
+        ----------
+        inbox : Inbox or None
+            Messages after the observations of the step; None if nothing is in flight and nothing waits.
+        step : int
+            Number of the step since time zero.
+        messages : sequence of sequence of Message
+            New messages of each robot; empty if there are none. Robots that do not work send nothing.
+        true_positions : (n, 2) array, m
+            True positions, which determine which robots are in range.
+        working : (n,) bool array
+            Mask of the robots that work.
+
+        Returns
+        -------
+        inbox : Inbox or None
+            None if it was None, and no messages were sent.
+        sent_bytes : int
+            Size of the messages that were sent in this step.
+        """
+        if inbox is None and not any(messages):
+            return None, 0
+        if inbox is None:
+            inbox = Inbox.create_empty(len(working))
+        queues = list(inbox.outbox.queues)
+        for robot in np.flatnonzero(~working).tolist():
+            queues[robot] = ()
+        if messages:
+            for robot in np.flatnonzero(working).tolist():
+                queues[robot] = (*queues[robot], *messages[robot])
+        outbox = replace(inbox.outbox, queues=tuple(queues))
+        if not (self._is_sending(step) and any(queues)):
+            return replace(inbox, outbox=outbox), 0
+        outbox, departing = self._take_from_queues(outbox)
+        links = Neighbors.from_ranges(true_positions, self._ranges).restrict_to_working(working)
+        transmissions = []
+        for sender, own in enumerate(departing):
+            if own:
+                is_linked = np.zeros(len(working), dtype=bool)
+                is_linked[links.list_neighbors(sender)] = True
+                transmissions += self._transmit(sender, own, step, is_linked)
+        inbox = replace(inbox, transmissions=(*inbox.transmissions, *transmissions), outbox=outbox)
+        return inbox, sum(message.size for own in departing for message in own)
+
+    def _pay_for_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
+        """Add the bytes of one sending period to the credits, and subtract the positions that are sent.
+
+        Returns
+        -------
+        inbox : Inbox
+        is_sender : (n,) bool array
+            Mask of the robots that send their positions now.
+        """
+        assert self._period_bytes is not None
+        outbox = inbox.outbox
+        available = np.minimum(outbox.credits + self._period_bytes, self._period_bytes)
+        is_waiting = np.array([len(queue) > 0 for queue in outbox.queues])
+        is_sender = (available > 0.0) & ~(is_waiting & outbox.sent_position)
+        available = available - POSITION_BYTES * is_sender
+        sent_position = outbox.sent_position | is_sender
+        return replace(inbox, outbox=Outbox(outbox.queues, available, sent_position)), is_sender
+
+    def _take_from_queues(self, outbox: Outbox) -> tuple[Outbox, list[tuple[Message, ...]]]:
+        """Take the messages that leave now from the queues, in order."""
+        if self._period_bytes is None:
+            return replace(outbox, queues=((),) * len(outbox.queues)), list(outbox.queues)
+        available = outbox.credits.copy()
+        sent_position = outbox.sent_position.copy()
+        queues = []
+        departing = []
+        for robot, queue in enumerate(outbox.queues):
+            count = 0
+            while count < len(queue) and available[robot] > 0.0:
+                available[robot] -= queue[count].size
+                count += 1
+            sent_position[robot] &= count == 0
+            departing.append(queue[:count])
+            queues.append(queue[count:])
+        return Outbox(tuple(queues), available, sent_position), departing
+
+    def _transmit(
+        self, sender: int, messages: Sequence[Message], step: int, is_linked: BoolArray
+    ) -> list[Transmission]:
+        """Send messages of one robot; `is_linked`, (n,) bool, is the mask of the robots in range."""
+        arrival_step = step + max(1, self._latency_steps)
+        is_received = np.broadcast_to(is_linked, (len(messages), len(is_linked)))
+        if self._conditions.loss:
+            packet_counts = np.array([math.ceil(message.size / MAX_PACKET_BYTES) for message in messages])
+            arrival_probabilities = (1.0 - self._conditions.loss) ** packet_counts
+            rng = create_generator(self._conditions.seed, MESSAGE_LOSS_STREAM, step, sender)
+            is_received = is_received & (rng.random(is_received.shape) < arrival_probabilities[:, None])
+        return [
+            Transmission(arrival_step, ReceivedMessage(sender, message.payload), receivers)
+            for message, receivers in zip(messages, is_received, strict=True)
+        ]
 
     def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbors, Array, Array]:
         """Read the newest message that each working robot has from every robot that it has not forgotten.

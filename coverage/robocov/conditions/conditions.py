@@ -42,6 +42,7 @@ PARAMETERS: dict[str, ConditionParameter] = {
     "loss": ConditionParameter(0.0, 1.0, "", "loss"),
     "delay": ConditionParameter(0.0, 1e3, "s", "delay_s"),
     "message_rate": ConditionParameter(1e-3, 1e4, "Hz", "message_rate_hz", may_be_null=True),
+    "bandwidth": ConditionParameter(1.0, 1e12, "B/s", "bandwidth_bytes_per_s", may_be_null=True),
     "forget_after": ConditionParameter(1e-3, MAX_TIME_S, "s", "forget_after_s"),
     "position_noise": ConditionParameter(0.0, 1e3, "m", "position_noise_m"),
     "sensing_noise": ConditionParameter(0.0, 1e3, "m", "sensing_noise_m"),
@@ -56,7 +57,8 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 class Conditions:
     """Imperfections and changes during a run, with the seed of its random numbers.
 
-    Communication is ideal unless there is message loss, delay, a message rate or localization noise. With
+    Communication is ideal unless there is message loss, delay, a message rate, a bandwidth or localization
+    noise. With
     ideal communication, the others forget a robot as soon as it fails, otherwise after `forget_after`.
 
     Attributes
@@ -66,7 +68,9 @@ class Conditions:
     delay : float, s
         Latency of messages.
     message_rate : float or None, Hz
-        Rate at which robots broadcast their positions. None: in every control step.
+        Rate at which robots broadcast their positions and other messages. None: in every control step.
+    bandwidth : float or None, B/s
+        Bytes per second that each robot can send. Messages beyond that wait in a queue. None: unlimited.
     forget_after : float, s
         Time without messages after which a robot is no longer assumed to be at its last reported position.
     position_noise : float, m
@@ -103,6 +107,7 @@ class Conditions:
     loss: float = 0.0
     delay: float = 0.0
     message_rate: float | None = None
+    bandwidth: float | None = None
     forget_after: float = 3.0
     position_noise: float = 0.0
     sensing_noise: float = 0.0
@@ -154,8 +159,8 @@ class Conditions:
     @property
     def uses_messages(self) -> bool:
         """Whether robots know each other's positions only from messages."""
-        has_rate = self.message_rate is not None
-        return bool(self.loss or self.delay or has_rate or self.position_noise)
+        is_limited = self.message_rate is not None or self.bandwidth is not None
+        return bool(self.loss or self.delay or is_limited or self.position_noise)
 
     @property
     def has_team_changes(self) -> bool:
@@ -313,6 +318,8 @@ class Conditions:
             If a key is missing, or a value cannot be used.
         """
         try:
+            # Files of earlier versions have no bandwidth.
+            data = {PARAMETERS["bandwidth"].json_key: None, **data}
             numbers = {name: data[parameter.json_key] for name, parameter in PARAMETERS.items()}
             failures = [(failure["robot"], failure["time_s"]) for failure in data["failures"]]
             joins = [(join["robot"], join["time_s"], join["place_m"]) for join in data["joins"]]

@@ -60,7 +60,7 @@ class Perception:
         truth : Observations
             Observations under ideal conditions.
         inbox : Inbox or None
-            Messages before the step; None if communication is ideal.
+            Messages before the step; None if communication is ideal and no messages are in flight.
         working : (n,) bool array
             Mask of the robots that work.
 
@@ -68,7 +68,7 @@ class Perception:
         -------
         observations : Observations
         inbox : Inbox or None
-            Messages after the step.
+            Messages after the positions of the step were exchanged.
         """
         step = round(truth.time / self._dt)
         positions = self._add_position_noise(step, truth.positions)
@@ -84,8 +84,8 @@ class Perception:
         )
         if inbox is None or not self._conditions.uses_messages:
             neighbors = truth.neighbors.restrict_to_working(working)
-            return replace(observations, neighbors=neighbors), None
-        inbox = self._radio.exchange_messages(inbox, step, positions, truth.positions, working)
+            return replace(observations, neighbors=neighbors), inbox
+        inbox = self._radio.exchange_positions(inbox, step, positions, truth.positions, working)
         neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, working)
         observations = replace(
             observations,

@@ -16,9 +16,11 @@ SCANNING_STREAM = 3
 """Stream of the noise of scans."""
 FAILURE_STREAM = 4
 """Stream of the times of failures."""
+MESSAGE_LOSS_STREAM = 5
+"""Stream of the loss of the messages of controllers."""
 
 
-def create_generator(seed: int, stream: int, step: int = 0) -> np.random.Generator:
+def create_generator(seed: int, stream: int, step: int = 0, robot: int | None = None) -> np.random.Generator:
     """Create the random number generator of one step of a stream.
 
     Parameters
@@ -29,10 +31,13 @@ def create_generator(seed: int, stream: int, step: int = 0) -> np.random.Generat
         Number of the stream, such as `LOSS_STREAM`.
     step : int
         Number of the step since time zero, from 0.
+    robot : int or None
+        Number of the robot, from 0, in a stream with separate numbers for each robot.
 
     Returns
     -------
     numpy.random.Generator
-        A new generator, independent of those of all other seeds, streams and steps.
+        A new generator, independent of those of all other seeds, streams, steps and robots.
     """
-    return np.random.default_rng([seed, stream, step])
+    key = [seed, stream, step] if robot is None else [seed, stream, step, robot]
+    return np.random.default_rng(key)

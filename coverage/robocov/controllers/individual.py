@@ -1,7 +1,7 @@
 """Controllers of a single robot, and the adapter that calls them for each robot of a team."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Protocol, runtime_checkable
 
@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.user_modules import format_location
 from robocov.errors import ParameterError, quote
-from robocov.observation import Decision, Observations, to_numbers
+from robocov.observation import Decision, Message, Observations, ReceivedMessage, to_numbers
 from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, partition
@@ -40,6 +40,10 @@ class OwnView:
         Heading of a unicycle, from +x; None in a team of points.
     memory : object
         Memory of the robot: the result of ``begin``, or the value that the controller assigned last.
+    messages : sequence of ReceivedMessage
+        Messages of other robots that have arrived in this step.
+    sent_messages : list of Message
+        Messages that the robot sends at the end of this step; `send` adds to it.
 
     See Also
     --------
@@ -66,6 +70,20 @@ class OwnView:
     _cells: VoronoiPartition
     heading: float | None = None
     memory: Any = None
+    messages: Sequence[ReceivedMessage] = ()
+    sent_messages: list[Message] = field(default_factory=list)
+
+    def send(self, payload: Any, size: int) -> None:
+        """Send a message to all robots in communication range.
+
+        Parameters
+        ----------
+        payload : object
+            The content. It must not be changed afterwards.
+        size : int, bytes
+            Its size as it would be encoded.
+        """
+        self.sent_messages.append(Message(payload, size))
 
     @property
     def centroid(self) -> Array:
@@ -154,7 +172,7 @@ class IndividualControllerAdapter:
 
     Examples
     --------
-    >>> from dataclasses import dataclass
+    >>> from dataclasses import dataclass, field
     >>> @dataclass(frozen=True)
     ... class Homing:
     ...     stiffness: float = 0.5
@@ -221,15 +239,18 @@ class IndividualControllerAdapter:
         )
         forces = np.empty_like(seen.positions)
         memories = []
+        messages = []
         for robot in range(len(forces)):
             own = _build_view(seen, cells, robot, memory.by_robot[robot])
             forces[robot] = self._call_controller(own)
             memories.append(own.memory)
+            messages.append(own.sent_messages)
         return Decision(
             forces=forces,
             goals=cells.centroid,
             cells=cells,
             memory=IndividualMemories(memories, cells.triangulation),
+            messages=messages if any(messages) else (),
         )
 
     def _call_controller(self, own: OwnView) -> Array:
@@ -266,6 +287,7 @@ def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory:
         _cells=cells,
         heading=None if seen.steering is None else float(seen.steering[robot, 0]),
         memory=memory,
+        messages=seen.get_messages(robot),
     )
 
 

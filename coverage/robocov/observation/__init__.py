@@ -7,6 +7,7 @@ control is distributed and that the obstacles are unknown.
 
 - `observations`, `scans`, `region`: everything that the robots know
 - `neighbors`: the communication graph
+- `messages`: messages that robots send each other, in addition to their positions
 - `decisions`, `cells`: the decision of a controller, and the cells that it uses
 - `snapshot`: the observations and the decision of one step
 - `scanned_view`: the free space that is visible in a scan
@@ -15,6 +16,7 @@ control is distributed and that the obstacles are unknown.
 
 from robocov.observation.cells import Cells
 from robocov.observation.decisions import Decision, check_decision, check_forces, copy_decision, to_numbers
+from robocov.observation.messages import Message, ReceivedMessage
 from robocov.observation.observations import NearNeighbors, Observations
 from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_ray_directions
 from robocov.observation.snapshot import Snapshot
@@ -23,8 +25,10 @@ __all__ = [
     "MAX_RAYS",
     "Cells",
     "Decision",
+    "Message",
     "NearNeighbors",
     "Observations",
+    "ReceivedMessage",
     "Scanning",
     "Scans",
     "Snapshot",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.errors import ParameterError, quote
 from robocov.observation.cells import Cells
+from robocov.observation.messages import Message, check_messages
 
 
 @dataclass(slots=True, eq=False)
@@ -30,6 +32,8 @@ class Decision:
         The cells that the controller used.
     memory : object
         Memory of the robots, which the controller receives again at its next decision.
+    messages : sequence of sequence of Message
+        The messages that each robot sends; empty if no robot sends any.
 
     See Also
     --------
@@ -51,6 +55,7 @@ class Decision:
     terms: Mapping[str, Array] = field(default_factory=dict)
     cells: Cells | None = None
     memory: Any = None
+    messages: Sequence[Sequence[Message]] = ()
 
 
 def check_decision(returned: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
@@ -114,7 +119,8 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
     Raises
     ------
     ParameterError
-        If `terms` is not a mapping of names to forces of all robots, or `cells` is not a `Cells` object.
+        If `terms` is not a mapping of names to forces of all robots, `cells` is not a `Cells` object, or
+        `messages` are not messages of each robot.
     """
     where = f"controller {controller!r}: decide(seen, memory) returned"
     if not isinstance(decision.terms, Mapping):
@@ -127,7 +133,18 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
         got = f"{quote(decision.cells)}{source}"
         raise ParameterError(f"{where} cells {got}, expected the result of robocov.partition, or None")
     goals = None if decision.goals is None else decision.goals.copy()
-    return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
+    messages = check_messages(decision.messages, len(decision.forces), f"{where} messages")
+    if messages:
+        messages = [[_copy_message(message) for message in own] for own in messages]
+    return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms, messages=messages)
+
+
+def _copy_message(message: Message) -> Message:
+    """Return a copy of a message, or the message itself if its payload cannot be copied."""
+    try:
+        return Message(deepcopy(message.payload), message.size)
+    except Exception:
+        return message
 
 
 def check_forces(values: Any, count: int, name: str) -> Array:

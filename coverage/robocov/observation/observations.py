@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.density.base import Density
 from robocov.observation.close_pairs import find_close_pairs
+from robocov.observation.messages import ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.observation.scans import Scans
@@ -57,6 +59,12 @@ class Observations:
     steering : (n, 2) array or None, rad and rad/s
         Heading of each unicycle, from +x, and its turning rate; a robot knows its own. None in a team of
         points.
+    messages : sequence of sequence of ReceivedMessage
+        The messages that have arrived at each robot in this step, in the order in which they were sent;
+        empty if no robot has received any.
+    send_limits : (n,) array or None, bytes
+        The size of the messages that each robot can send in this step. 0: earlier messages still wait, or
+        the next ones leave later. None: unlimited.
 
     See Also
     --------
@@ -90,6 +98,22 @@ class Observations:
     density: Density | None = None
     scans: Scans | None = None
     steering: Array | None = None
+    messages: Sequence[Sequence[ReceivedMessage]] = ()
+    send_limits: Array | None = None
+
+    def get_messages(self, robot: int) -> Sequence[ReceivedMessage]:
+        """Return the messages that have arrived at a robot in this step.
+
+        Parameters
+        ----------
+        robot : int
+
+        Returns
+        -------
+        sequence of ReceivedMessage
+            In the order in which they were sent.
+        """
+        return self.messages[robot] if self.messages else ()
 
     def get_neighbor_positions(self, robot: int) -> Array:
         """Return the known positions of a robot's neighbors.

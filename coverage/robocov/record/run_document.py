@@ -33,12 +33,17 @@ class _Join(_Failure):
     place_m: Point | None
 
 
-def _build_number_field(low: float, high: float, *, allow_null: bool) -> Any:
+_LATER_CONDITIONS = ("bandwidth",)
+"""Conditions that files of earlier versions do not contain; null by default."""
+
+
+def _build_number_field(low: float, high: float, *, allow_null: bool, is_required: bool) -> Any:
     """Return the field of a model for a number in a range, or null."""
     null = " or null" if allow_null else ""
     description = expect(f"a number from {low:g} to {high:g}{null}")
     number: Any = Annotated[float, Field(ge=low, le=high)]
-    return Annotated[number | None if allow_null else number, description], ...
+    default: Any = ... if is_required else None
+    return Annotated[number | None if allow_null else number, description], default
 
 
 def _build_conditions_model() -> Any:
@@ -48,9 +53,12 @@ def _build_conditions_model() -> Any:
         "joins": (list[_Join], ...),
         "seed": (Seed, ...),
     }
-    for parameter in PARAMETERS.values():
+    for name, parameter in PARAMETERS.items():
         fields[parameter.json_key] = _build_number_field(
-            parameter.minimum, parameter.maximum, allow_null=parameter.may_be_null
+            parameter.minimum,
+            parameter.maximum,
+            allow_null=parameter.may_be_null,
+            is_required=name not in _LATER_CONDITIONS,
         )
     return create_model("_Conditions", __base__=Document, **fields)
 

@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
+from robocov.conditions import Conditions
+from robocov.conditions.communication import Inbox, Radio
 from robocov.controllers import has_memory
 from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
 from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
 from robocov.errors import ParameterError, StartError, format_count, to_floats
-from robocov.observation import Decision, Observations, Scans, Snapshot, check_forces
+from robocov.observation import Decision, Message, Observations, Scans, Snapshot, check_forces
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
@@ -41,6 +43,8 @@ class _BatchDecision(NamedTuple):
     goals: Array | None
     """(runs * n, 2) m; None if the controller has no goals."""
     memories: list[Any]
+    messages: list[Sequence[Sequence[Message]]]
+    """The messages of each run; empty if the controller decides for all runs at once."""
 
 
 class SimulationBatch:
@@ -132,6 +136,8 @@ class SimulationBatch:
         else:
             memories = [self._begin_run() for _ in range(run_count)]
         self._memories: list[Any] = memories
+        self._radio = Radio(Conditions(), self.team.communication_range, dt)
+        self._inboxes: list[Inbox | None] = [None] * run_count
         self._start_step()
 
     def _start_step(self) -> None:
@@ -196,14 +202,18 @@ class SimulationBatch:
             If forces are not finite or not of this shape, or the controller fails.
         """
         next_memories = self._memories
+        messages: list[Sequence[Sequence[Message]]] = []
         if forces is None:
             decision = self._observe_and_decide()
             joint_forces = decision.forces
             next_memories = decision.memories
+            messages = decision.messages
         else:
             joint_forces = self._check_forces(forces)
+        next_inboxes = self._send_messages(messages)
         self._world.step(joint_forces, self.dt)
         self._memories = next_memories
+        self._inboxes = next_inboxes
         self._steps += 1
         self._start_step()
 
@@ -284,7 +294,7 @@ class SimulationBatch:
             if self._decides_jointly:
                 observations = [self.observe()]
             else:
-                observations = [self.observe_run(run) for run in range(len(self))]
+                observations = [self._receive_messages(run) for run in range(len(self))]
             decisions = [
                 self._caller.decide(observed, memory)
                 for observed, memory in zip(observations, self._memories, strict=True)
@@ -293,8 +303,23 @@ class SimulationBatch:
                 forces=np.concatenate([decision.forces for decision in decisions]),
                 goals=_join_goals(decisions),
                 memories=[decision.memory for decision in decisions],
+                messages=[] if self._decides_jointly else [decision.messages for decision in decisions],
             )
         return self._decision
+
+    def _receive_messages(self, run: int) -> Observations:
+        """Return the observations of one run, with the messages that were sent in the last step."""
+        _, observations = self._radio.receive_messages(self._inboxes[run], self._steps, self.observe_run(run))
+        return observations
+
+    def _send_messages(self, messages: list[Sequence[Sequence[Message]]]) -> list[Inbox | None]:
+        """Return the inbox of each run with its messages, which all arrive in the next step."""
+        inboxes: list[Inbox | None] = [None] * len(self)
+        working = np.ones(len(self.team), dtype=bool)
+        for run, run_messages in enumerate(messages):
+            positions = self._world.positions[self._rows[run]]
+            inboxes[run], _ = self._radio.send_messages(None, self._steps, run_messages, positions, working)
+        return inboxes
 
     def restart(self, run: int, starts: Array) -> None:
         """Restart one run from other positions. The simulation time of the batch continues.
@@ -315,6 +340,7 @@ class SimulationBatch:
         self._world.place(run, starts)
         if not self._decides_jointly:
             self._memories = [*self._memories[:run], self._begin_run(), *self._memories[run + 1 :]]
+            self._inboxes = [*self._inboxes[:run], None, *self._inboxes[run + 1 :]]
         self._start_step()
 
     def run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from copy import copy, deepcopy
 from time import process_time
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.conditions.communication import Inbox
+from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.perception import Perception, ignore_idle_robots
 from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
@@ -19,7 +19,7 @@ from robocov.defaults import DEFAULT_DT_S
 from robocov.drawing import show
 from robocov.environment import Environment, require_environment
 from robocov.errors import format_count
-from robocov.observation import Observations, Snapshot, check_forces
+from robocov.observation import Message, Observations, Snapshot, check_forces
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
@@ -43,7 +43,7 @@ MAX_START_OVERLAP_M = 1e-6
 
 
 class _Knowledge(NamedTuple):
-    """Observations and messages of a step."""
+    """Observations of a step, and the messages that have not arrived by then."""
 
     observations: Observations
     inbox: Inbox | None
@@ -71,11 +71,15 @@ class Simulation:
     memory : object
         Memory of the robots, which the controller returned with its last decision.
     inbox : Inbox or None
-        Messages that the robots have received; None if robots know the positions of others without delay.
+        Messages that the robots have received, that are in flight or that wait. None if robots know the
+        positions of others without delay, and there are no messages of the controller.
     joined : tuple of JoinedRobot
         Robots that have joined since the simulation was built.
     decision_time : float
         Processor time that the controller has used so far, s.
+    sent_bytes : int
+        Size of the messages of the controller that the robots have sent so far, received or not. Positions
+        are not included.
 
     Raises
     ------
@@ -122,6 +126,7 @@ class Simulation:
         self.conditions = check_conditions(conditions, robots=len(state))
         self.joined: tuple[JoinedRobot, ...] = ()
         self.decision_time = 0.0
+        self.sent_bytes = 0
         self._steps = state.steps
         if not state.is_computed:
             check_joins(environment, self.conditions)
@@ -131,6 +136,7 @@ class Simulation:
         self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
         has_team_changes = self.conditions is not None and self.conditions.has_team_changes
         self._has_changing_obstacles = environment.has_moving_obstacles or has_team_changes
+        self._radio = Radio(self.conditions or Conditions(), self.team.communication_range, dt)
         self._perception: Perception | None = None
         self.inbox: Inbox | None = None
         if self.conditions is not None:
@@ -227,17 +233,25 @@ class Simulation:
         if external_forces is not None:
             external_forces = check_forces(external_forces, robot_count, "external_forces")
         next_memory = self.memory
+        messages: Sequence[Sequence[Message]] = ()
         if forces is None:
             decision = self.observe_and_decide().decision
             forces = decision.forces
             next_memory = decision.memory
+            messages = decision.messages
         else:
             forces = check_forces(forces, robot_count, "forces")
-        next_inbox = None if self._perception is None else self._get_knowledge().inbox
+        inbox = self.inbox
+        if self._perception is not None or inbox is not None:
+            inbox = self._get_knowledge().inbox
+        next_inbox, sent_bytes = self._radio.send_messages(
+            inbox, self._steps, messages, self.positions, self.working
+        )
         positions_before = self.positions
         self._world.step(forces, self.dt, external_forces, time=self.time)
         self.memory = next_memory
         self.inbox = next_inbox
+        self.sent_bytes += sent_bytes
         self._steps += 1
         self.joined += self._find_new_robots(positions_before)
         self._start_step()
@@ -287,9 +301,10 @@ class Simulation:
         """Return the observations and messages of this step, computing them only once."""
         if self._knowledge is None:
             observations = self._sense()
-            inbox = None
+            inbox = self.inbox
             if self._perception is not None:
-                observations, inbox = self._perception.perceive(observations, self.inbox, self.working)
+                observations, inbox = self._perception.perceive(observations, inbox, self.working)
+            inbox, observations = self._radio.receive_messages(inbox, self._steps, observations)
             self._knowledge = _Knowledge(observations, inbox)
         return self._knowledge
 
@@ -483,8 +498,8 @@ class Simulation:
     ) -> Simulation:
         """Return a simulation that continues from here with changes; this one is not affected.
 
-        The memory of the robots is kept unless the controller or the number of robots changes, and their
-        messages unless the conditions or the number of robots change.
+        The memory of the robots is kept unless the controller or the number of robots changes, and so are the
+        messages of the controller. All messages are dropped if the conditions or the number of robots change.
 
         Parameters
         ----------
@@ -527,6 +542,8 @@ class Simulation:
                 twin.inbox = self.inbox
             if controller is None:
                 twin.memory = deepcopy(self.memory)
+            elif twin.inbox is not None:
+                twin.inbox = twin.inbox.drop_messages()
         return twin
 
 

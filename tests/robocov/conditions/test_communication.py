@@ -106,7 +106,7 @@ def test_messages_agree_with_a_simulation_of_each_message(
     inbox = Inbox.create_empty(robots)
     known_messages = simulate_messages(conditions, ranges, walks, working)
     for step, positions in enumerate(walks):
-        inbox = radio.exchange_messages(inbox, step, positions, positions, working[step])
+        inbox = radio.exchange_positions(inbox, step, positions, positions, working[step])
         neighbors, reported, ages = radio.read_reports(inbox, step, working[step])
         robot, other = neighbors.list_pairs()
         pairs = sorted(known_messages[step])
@@ -127,7 +127,7 @@ def test_latency_and_silence_of_whole_steps_are_exact(delay: float, dt: float, s
     for step in range(16):
         # The robots are out of range after the first message.
         positions = np.array([[0.0, 0.0], [9.0 * step, 0.0]])
-        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        inbox = radio.exchange_positions(inbox, step, positions, positions, working)
         _, reported, _ = radio.read_reports(inbox, step, working)
         if len(reported) > 0:
             steps_with_report.append(step)
@@ -143,7 +143,7 @@ def test_messages_are_sent_whenever_a_period_has_passed(dt: str, rate: int) -> N
     inbox = Inbox.create_empty(2)
     sent_steps = []
     for step in range(100):
-        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        inbox = radio.exchange_positions(inbox, step, positions, positions, working)
         if inbox.sent_steps[0, 1] == step:
             sent_steps.append(step)
     messages = [floor(Fraction(dt) * rate * step) for step in range(-1, 100)]
@@ -157,8 +157,8 @@ def test_inboxes_are_immutable() -> None:
     working = np.ones(3, dtype=bool)
     for step, positions in enumerate(draw_walks(3, 12, 4)):
         content = deepcopy(inbox)
-        first = radio.exchange_messages(inbox, step, positions, positions, working)
-        second = radio.exchange_messages(inbox, step, positions, positions, working)
+        first = radio.exchange_positions(inbox, step, positions, positions, working)
+        second = radio.exchange_positions(inbox, step, positions, positions, working)
         np.testing.assert_array_equal(first.positions, second.positions)
         np.testing.assert_array_equal(inbox.sent_steps, content.sent_steps)
         np.testing.assert_array_equal(inbox.arrival_steps, content.arrival_steps)
@@ -176,7 +176,7 @@ def test_messages_are_lost_with_the_given_probability() -> None:
     working = np.ones(robots, dtype=bool)
     received = 0
     for step, positions in enumerate(draw_walks(robots, steps, 1)):
-        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        inbox = radio.exchange_positions(inbox, step, positions, positions, working)
         _, reported, _ = radio.read_reports(inbox, step, working)
         received += len(reported)
     sent = steps * robots * (robots - 1)
@@ -352,7 +352,7 @@ def test_inboxes_can_be_selected_for_another_team() -> None:
     inbox = Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
     for step, positions in enumerate(draw_walks(3, 6, 2)):
-        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        inbox = radio.exchange_positions(inbox, step, positions, positions, working)
     # Robots 3 and 1 of the old team, with a new one between them.
     selected = inbox.select_robots(np.array([2, -1, 0]))
     assert selected.sent_steps[0, 2] == inbox.sent_steps[2, 0]

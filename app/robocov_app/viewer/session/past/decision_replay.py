@@ -7,6 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from robocov.conditions import Conditions
+from robocov.conditions.communication import Radio
 from robocov.conditions.perception import Perception
 from robocov.controllers import inform_controller
 from robocov.controllers.base import Controller
@@ -44,10 +46,13 @@ def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) ->
     seen = _observe(state, time)
     perception = _build_perception(state.setup, dt)
     true_positions = None
+    inbox = state.inbox
     if perception is not None:
-        inbox = perception.create_inbox() if state.inbox is None else state.inbox
-        seen, _ = perception.perceive(seen, inbox, np.ones(len(state.positions), dtype=bool))
+        if inbox is None:
+            inbox = perception.create_inbox()
+        seen, inbox = perception.perceive(seen, inbox, np.ones(len(state.positions), dtype=bool))
         true_positions = state.positions
+    _, seen = _build_radio(state.setup, dt).receive_messages(inbox, round(time / dt), seen)
     decision = _decide(seen, state)
     if state.recorded is not None and not _has_same_forces(decision, state.recorded):
         # The controller has changed since, or it cannot be loaded.
@@ -130,6 +135,11 @@ def _build_perception(setup: PaneSetup, dt: float) -> Perception | None:
     if setup.conditions is None:
         return None
     return Perception(setup.conditions, setup.team, dt)
+
+
+@lru_cache(maxsize=8)
+def _build_radio(setup: PaneSetup, dt: float) -> Radio:
+    return Radio(setup.conditions or Conditions(), setup.team.communication_range, dt)
 
 
 @lru_cache(maxsize=4)

@@ -97,7 +97,7 @@ class PaneState(NamedTuple):
     recorded : Decision or None
         The decision in the record, if the state comes from one.
     inbox : Inbox or None
-        Messages that the robots have; None if they know the others directly.
+        Messages that the robots have, that are in flight or that wait; None if there are none.
     steering : (n, 2) array or None, rad and rad/s
         Headings and turning rates of unicycles.
     """
