@@ -17,7 +17,13 @@ from robocov.errors import ParameterError
 def test_conditions_are_ideal_by_default() -> None:
     assert Conditions().is_ideal
     assert Conditions(seed=4, forget_after=1.0).is_ideal
-    for parameters in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
+    for parameters in (
+        {"loss": 0.1},
+        {"delay": 0.1},
+        {"message_rate": 2.0},
+        {"bandwidth": 1e4},
+        {"position_noise": 0.1},
+    ):
         assert Conditions(**parameters).uses_messages
         assert not Conditions(**parameters).is_ideal
     for parameters in (
@@ -156,6 +162,13 @@ def test_conditions_are_unchanged_by_json(
         seed=seed,
     )
     assert Conditions.from_dict(json.loads(json.dumps(conditions.to_dict(), allow_nan=False))) == conditions
+
+
+def test_conditions_of_earlier_versions_have_no_bandwidth() -> None:
+    data = Conditions(bandwidth=1e4).to_dict()
+    assert Conditions.from_dict(data).bandwidth == 1e4
+    del data["bandwidth_bytes_per_s"]
+    assert Conditions.from_dict(data) == Conditions()
 
 
 def test_unreadable_conditions_are_rejected() -> None:

@@ -19,9 +19,14 @@ def test_nothing_said_is_no_conditions() -> None:
 
 
 def test_what_is_said_becomes_conditions() -> None:
-    options = ConditionOptions(loss=0.2, delay=0.3, fail=("3@20",), join=("5@30:2.5,1", "6@4"))
+    options = ConditionOptions(loss=0.2, delay=0.3, bandwidth=1e4, fail=("3@20",), join=("5@30:2.5,1", "6@4"))
     assert options.build_conditions(7, 6) == Conditions(
-        loss=0.2, delay=0.3, failures=((3, 20.0),), joins=((5, 30.0, (2.5, 1.0)), (6, 4.0)), seed=7
+        loss=0.2,
+        delay=0.3,
+        bandwidth=1e4,
+        failures=((3, 20.0),),
+        joins=((5, 30.0, (2.5, 1.0)), (6, 4.0)),
+        seed=7,
     )
 
 
