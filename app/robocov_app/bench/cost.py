@@ -141,6 +141,7 @@ class MovingRobots:
 
 
 def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
+    """Measure the cost among random obstacles: its construction, then an evaluation for each team."""
     environment = build_random_map(vertices)
     start = perf_counter()
     cost = CoverageCost(environment, lattice)
@@ -148,7 +149,8 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     size = {"lattice": lattice, "vertices": vertices}
     build_goal = BUILD_GOALS_S.get((lattice, vertices))
     yield Row("cost", "built, once a map", size, build_time, goal_seconds=build_goal)
-    for robots in QUICK_ROBOTS if quick else ROBOTS:
+    team_sizes = QUICK_ROBOTS if quick else ROBOTS
+    for robots in team_sizes:
         if robots > len(cost.points):
             continue
         moving = MovingRobots(cost, robots)
@@ -167,7 +169,9 @@ def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
         if (other_name, other_lattice) != (name, lattice):
             continue
         times = _measure_costs(cost, MovingRobots(cost, robots), _measure_by_tree, quick)
-        speedup = SPEEDUPS[lattice] * (_CAMPUS_FACTOR if name == "campus" else 1.0)
+        speedup = SPEEDUPS[lattice]
+        if name == "campus":
+            speedup *= _CAMPUS_FACTOR
         if robots == _LARGE_TEAM:
             speedup = _LARGE_TEAM_SPEEDUP
         size: Mapping[str, int | str] = {"map": name, "lattice": lattice, "robots": robots}

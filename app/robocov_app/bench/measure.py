@@ -56,14 +56,18 @@ class Row:
     @property
     def ratio(self) -> float | None:
         """Ratio of the time to that of the yardstick; None without a yardstick."""
-        return None if self.yardstick_seconds is None else self.seconds / self.yardstick_seconds
+        if self.yardstick_seconds is None:
+            return None
+        return self.seconds / self.yardstick_seconds
 
     @property
     def met(self) -> bool | None:
         """Whether all goals are met; None without any goal."""
         limits = ((self.ratio, self.goal), (self.seconds, self.goal_seconds))
         results = [value <= goal for value, goal in limits if value is not None and goal is not None]
-        return all(results) if results else None
+        if not results:
+            return None
+        return all(results)
 
     @property
     def case(self) -> str:

@@ -12,7 +12,7 @@ from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, style_axes, to_plot_color
 from robocov_app.look.theme import LIGHT, Theme
 
-NOTE = "medians of calls in turn on one thread; below 1 robocov is faster; a bar marks the goal"
+NOTE = "medians of alternating calls on one thread; below 1 robocov is faster; a bar marks the goal"
 HEADINGS = {
     "step": "Simulated step",
     "maps": "Exact coverage cost on maps",
@@ -90,7 +90,9 @@ def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) 
 
 def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
     ratio = cast("float", row.ratio)
-    color = to_plot_color(theme.get_controller_color("rpf" if row.met is False else "rapf"))
+    color = to_plot_color(theme.get_controller_color("rapf"))
+    if row.met is False:
+        color = to_plot_color(theme.get_controller_color("rpf"))
     axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
     axes.plot(ratio, y, "o", color=color, markersize=6.5)
     if row.goal is not None:

@@ -41,7 +41,8 @@ START_GOALS = {"robocov --help": 2.0}
 
 def list_cases(*, quick: bool = False) -> list[Case]:
     """Return the case of a sweep."""
-    return [partial(_measure_sweep, 1 if quick else _FULL_SEEDS)]
+    seeds = 1 if quick else _FULL_SEEDS
+    return [partial(_measure_sweep, seeds)]
 
 
 def list_start_cases(*, quick: bool = False) -> list[Case]:

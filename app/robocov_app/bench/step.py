@@ -69,6 +69,9 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
     step = times["step"]
     goals = GOALS[robots]
     before = BEFORE[robots]
+    max_step_s = None
+    if robots == 6:
+        max_step_s = simulation.dt / _MIN_SPEED
     yield Row(
         "step",
         "one step",
@@ -77,7 +80,7 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         yardstick=TRIANGULATION,
         yardstick_seconds=times["delaunay"],
         goal=goals.triangulation,
-        goal_seconds=simulation.dt / _MIN_SPEED if robots == 6 else None,
+        goal_seconds=max_step_s,
         note=f"{simulation.dt / step:.0f} x real time",
         before=before.triangulation,
     )

@@ -32,7 +32,7 @@ FRAME_GOALS_S = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 MAX_FRAME_S = 50e-3
 """Maximum time of any frame."""
 _MIN_CROWD = 100
-"""Number of robots from which they are smaller, so that there is space for them."""
+"""Minimum number of robots that are smaller, so that there is space for them."""
 _CROWD_RADIUS_M = 0.05
 _MAX_FIRST_START = 10
 """Maximum number of robots for which the first start of the map has space."""
@@ -97,10 +97,14 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
 
 
 def _build_session(robots: int) -> Session:
-    limits = RobotProperties(radius=_CROWD_RADIUS_M) if robots >= _MIN_CROWD else RobotProperties()
-    start = "uniform" if robots > _MAX_FIRST_START else None
+    properties = RobotProperties()
+    if robots >= _MIN_CROWD:
+        properties = RobotProperties(radius=_CROWD_RADIUS_M)
+    start = None
+    if robots > _MAX_FIRST_START:
+        start = "uniform"
     scenario = SessionScenario(
-        load_map("rooms"), (ControllerChoice("rapf"),), robots, start, properties=limits
+        load_map("rooms"), (ControllerChoice("rapf"),), robots, start, properties=properties
     )
     return Session(scenario)
 

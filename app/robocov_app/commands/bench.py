@@ -108,9 +108,11 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
     ParameterError
         If the yardstick of the part is not installed.
     """
-    names: list[str] = list(PARTS) if part_name == "all" else [part_name]
-    if part_name == "all" and importlib.util.find_spec("gymnasium") is None:
-        names.remove("learning")
+    names: list[str] = [part_name]
+    if part_name == "all":
+        names = list(PARTS)
+        if importlib.util.find_spec("gymnasium") is None:
+            names.remove("learning")
     modules = {name: importlib.import_module(f"robocov_app.bench.{PARTS[name].module}") for name in names}
     if "cost" in names and not modules["cost"].has_yardstick():
         message = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
@@ -127,7 +129,7 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
 def _measure(
     cases: Sequence[Callable[[], Sequence[Row]]], rows: list[Row], *, quiet: bool
 ) -> KeyboardInterrupt | None:
-    """Append the results of the cases to the rows, and return the exception if the user interrupts it."""
+    """Append the results of the cases to the rows, and return the exception if the user interrupts them."""
     try:
         with show_progress("measuring", len(cases), quiet=quiet) as update:
             for number, case in enumerate(cases, start=1):
@@ -165,14 +167,13 @@ def _print_tables(rows: Sequence[Row]) -> None:
         cells = []
         previous_case = ""
         for row in part_rows:
-            case = row.case or row.name
-            cells.append(
-                (
-                    "" if case == previous_case else case,
-                    row.name if row.case else "",
-                    *_format_measurement(row),
-                )
-            )
+            case = row.case
+            name = row.name
+            if not case:
+                case = row.name
+                name = ""
+            displayed_case = "" if case == previous_case else case
+            cells.append((displayed_case, name, *_format_measurement(row)))
             previous_case = case
         print_table(columns, cells, title=PARTS[part_name].title)
         echo()
@@ -183,12 +184,19 @@ def _format_measurement(row: Row) -> list[str]:
     return [
         format_duration(row.seconds),
         format_duration(row.yardstick_seconds),
-        "" if row.ratio is None else f"{row.ratio:.2f}",
-        "" if row.before is None else f"{row.before:.2f}",
+        _format_ratio(row.ratio),
+        _format_ratio(row.before),
         format_goals(row),
         "" if row.yardstick is None else f"/ {row.yardstick}",
         row.note,
     ]
+
+
+def _format_ratio(ratio: float | None) -> str:
+    """Return a ratio as text; empty for None."""
+    if ratio is None:
+        return ""
+    return f"{ratio:.2f}"
 
 
 def format_goals(row: Row) -> str:
@@ -208,8 +216,10 @@ def format_goals(row: Row) -> str:
         goals.append(f"{row.goal:.3g}")
     if row.goal_seconds is not None:
         goals.append(format_duration(row.goal_seconds))
-    suffix = " missed" if row.met is False else ""
-    return ", ".join(goals) + suffix
+    text = ", ".join(goals)
+    if row.met is False:
+        text += " missed"
+    return text
 
 
 def format_duration(seconds: float | None) -> str:
@@ -233,4 +243,6 @@ def format_duration(seconds: float | None) -> str:
         return ""
     if seconds < 1e-3:
         return f"{seconds * 1e6:.0f} µs"
-    return f"{seconds * 1e3:.1f} ms" if seconds < 1.0 else f"{seconds:.2f} s"
+    if seconds < 1.0:
+        return f"{seconds * 1e3:.1f} ms"
+    return f"{seconds:.2f} s"

@@ -66,7 +66,9 @@ def command(options: Arguments) -> int:
     if not options.json:
         _print_rows(rows)
     notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
-    ending = "Interrupted. Partial results are in" if is_interrupted else "saved in"
+    ending = "saved in"
+    if is_interrupted:
+        ending = "Interrupted. Partial results are in"
     saved = f"{ending} {out}/: {list_files(out)}{options.describe_record()}"
     answer = {"out": str(out), "interrupted": is_interrupted, "runs": rows}
     print_answer(options, answer, *list_density_lines(environment), *notes, saved)
@@ -74,7 +76,7 @@ def command(options: Arguments) -> int:
 
 
 def _check_names(names: Sequence[str]) -> None:
-    """Raise a ParameterError unless there are controllers, each once."""
+    """Raise a ParameterError if there are no controllers, or duplicates."""
     if not names:
         raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
@@ -88,7 +90,8 @@ def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
         del columns["mean time"]
     cells = []
     for row in rows:
-        settling_time = row["settled_at_s"]
-        settled = "not yet" if settling_time is None else f"{settling_time:.1f} s"
+        settled = "not yet"
+        if row["settled_at_s"] is not None:
+            settled = f"{row['settled_at_s']:.1f} s"
         cells.append([cell_format.format(**row, settled=settled) for cell_format in columns.values()])
     print_table([(title, RIGHT if title else BOLD) for title in columns], cells)

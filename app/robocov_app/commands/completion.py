@@ -166,8 +166,10 @@ def _write_fish_script(completions: Mapping[str, _Completions]) -> Iterator[str]
         yield f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{summary}'"
         prefix = f"complete -c robocov -n '__fish_seen_subcommand_from {name}'"
         for option in completion.options:
-            suffix = f" -x -a '{controllers}'" if option in _CONTROLLER_OPTIONS else ""
-            yield f"{prefix} -l {option[2:]}{suffix}"
+            line = f"{prefix} -l {option[2:]}"
+            if option in _CONTROLLER_OPTIONS:
+                line += f" -x -a '{controllers}'"
+            yield line
         words = maps if completion.takes_maps else " ".join(completion.words)
         if words:
             yield f"{prefix} -a '{words}'"

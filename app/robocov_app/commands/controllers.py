@@ -76,8 +76,10 @@ def _format_range(gain: Gain | Option) -> str:
     """Return the values that a gain may have, as text."""
     if isinstance(gain, Option):
         return " | ".join(gain.choices)
-    suffix = ", or null" if gain.optional else ""
-    return f"{gain.low:g} to {gain.high:g}{suffix}"
+    text = f"{gain.low:g} to {gain.high:g}"
+    if gain.optional:
+        text += ", or null"
+    return text
 
 
 def _build_gain_row(gain: Gain | Option) -> dict[str, Any]:

@@ -56,7 +56,9 @@ def command(options: Arguments) -> None:
     cost = build_cost(environment, options.lattice, quiet=options.json)
     try:
         result = cost(positions)
-        timed_result = None if speeds is None else cost(positions, speeds)
+        timed_result = None
+        if speeds is not None:
+            timed_result = cost(positions, speeds)
     except InputError as error:
         raise InputError(f"{options.positions}: {error}") from error
     if options.sites is not None:
@@ -136,11 +138,13 @@ def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
     for speed in values:
         if not 0.0 < speed < np.inf:
             raise ParameterError(f"--speeds: expected a number above 0, got {speed!r} m/s")
-    return np.array(values if len(values) == robots else values * robots)
+    if len(values) == 1:
+        return np.full(robots, values[0])
+    return np.array(values)
 
 
 def _read_positions(path: Path) -> Array:
-    """Read positions, (n, 2) m, from a JSON file. Raises InputError with the place and the value."""
+    """Read positions, (n, 2) m, from a JSON file. Raises InputError with the index and the value."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:

@@ -175,11 +175,11 @@ def build_session(options: Arguments) -> Session:
     from robocov_app.viewer.session.session import Session
 
     robots = options.robots
-    limits = RobotProperties(radius=options.radius)
+    properties = RobotProperties(radius=options.radius)
     if options.team is not None:
         team = read_team(options.team, {"radius": options.radius})
         robots = get_robot_count(team, robots, Arguments.robots, options.team)
-        limits = RobotProperties.from_team(team)
+        properties = RobotProperties.from_team(team)
     first_name, *other_names = options.controllers
     choices = [ControllerChoice(first_name, parse_gains(options.gains))]
     choices += [ControllerChoice(name) for name in other_names]
@@ -190,7 +190,7 @@ def build_session(options: Arguments) -> Session:
         robots,
         options.start,
         options.seed,
-        properties=limits,
+        properties=properties,
         dt=options.dt,
         conditions=conditions,
     )
@@ -237,7 +237,9 @@ def _render(launcher: ViewerLauncher, options: Arguments) -> int:
             count = round(window.lesson.player.duration * HEADLESS_FPS)
         with show_progress("frames", count) as update:
             frames = _draw_frames(window, count, interruption, update, is_whole_tour=options.frames is None)
-            folder = None if result is None else result.staging
+            folder = None
+            if result is not None:
+                folder = result.staging
             save_frames_and_video(frames, folder, options.video, HEADLESS_FPS)
     for target in (options.out, options.video):
         if target is not None:

@@ -43,7 +43,11 @@ def command(options: Arguments) -> int:
     lines = [saved.lesson.title]
     for number, chapter in enumerate(chapters, start=1):
         rows.append({"title": chapter.title, "seconds": chapter.duration, "ends": chapter.ends})
-        end = f"ends after {chapter.duration:.1f} s" if chapter.ends else "never ends"
+        end = "never ends"
+        if chapter.ends:
+            end = f"ends after {chapter.duration:.1f} s"
         lines.append(f"  {number:2}  {chapter.title:44}  {end}")
     print_answer(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
-    return 0 if all(row["ends"] for row in rows) else _NEVER_ENDS
+    if not all(chapter.ends for chapter in chapters):
+        return _NEVER_ENDS
+    return 0

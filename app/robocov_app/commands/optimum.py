@@ -72,8 +72,8 @@ class Arguments(FigureOptions):
             raise InputError("MAP or --run DIR: expected one of the two")
         if self.run is not None:
             self._check_run_options()
-        robots = DEFAULT_ROBOTS if self.robots is None else self.robots
-        require_number("--robots", robots, 1, MAX_ROBOTS, whole=True)
+        if self.robots is not None:
+            require_number("--robots", self.robots, 1, MAX_ROBOTS, whole=True)
         require_number("--restarts", self.restarts, 1, MAX_RESTARTS, whole=True)
         require_number("--lattice", self.lattice, 2, 2048, whole=True)
         require_number("--precision", self.precision, MIN_PRECISION, 1.0)
@@ -106,7 +106,9 @@ def command(options: Arguments) -> None:
     start = time.perf_counter()
     best = _search(options, problem)
     seconds = time.perf_counter() - start
-    bound = _prove_bound(options, problem, best) if options.bound else None
+    bound = None
+    if options.bound:
+        bound = _prove_bound(options, problem, best)
     gaps = _compute_run_gaps(options, problem, best)
     if options.positions is not None:
         _save_positions(options.positions, best.positions)

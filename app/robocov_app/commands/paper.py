@@ -44,9 +44,9 @@ class Arguments(JsonOption):
     figures_only: bool = False
     """Only the figures, without the claims."""
     without_beyond: bool = False
-    """Leave out the part that goes beyond the paper."""
+    """Leave out the questions beyond the paper."""
     beyond_only: bool = False
-    """Only the figures and the part beyond the paper; pages and claims.json leave the paper's claims out."""
+    """Only the figures and the questions beyond the paper; pages and claims.json omit the paper's claims."""
     workers: int | None = None
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
@@ -94,8 +94,12 @@ class _Outcome:
     @property
     def runs(self) -> int:
         """Number of runs."""
-        runs = self.figure_runs if self.paper is None else self.paper.runs
-        return runs if self.beyond is None else runs + self.beyond.runs
+        runs = self.figure_runs
+        if self.paper is not None:
+            runs = self.paper.runs
+        if self.beyond is not None:
+            runs += self.beyond.runs
+        return runs
 
 
 def command(options: Arguments) -> int:
@@ -137,18 +141,17 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
 
     if not expected.left:
         return f"all {expected.runs:,} runs are done"
+    counts = f"{expected.runs:,} runs"
     finished = expected.runs - expected.left
-    reused = f", {finished:,} of them done already" if finished else ""
+    if finished:
+        counts += f", {finished:,} of them done already"
     seconds_per_run = ", ".join(
         f"{name} {seconds:.2f} s" for name, seconds in expected.seconds_per_run.items()
     )
     time = f"{format_duration(expected.seconds)} on {workers} processes"
     if on_cluster:
         time = f"{format_duration(expected.seconds * workers)} of computing, on a Dask cluster"
-    return (
-        f"{expected.runs:,} runs{reused}, about {time} (measured: {seconds_per_run} a run); "
-        "Ctrl-C keeps finished runs"
-    )
+    return f"{counts}, about {time} (measured: {seconds_per_run} a run); Ctrl-C keeps finished runs"
 
 
 def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:
@@ -173,7 +176,9 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
         paper = parts.run_paper(out, plan, runner)
         paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.gains)
         study_pages.write_claims(out, paper_claims)
-    figure_runs = parts.run_figures(out, plan, runner) if paper is None else paper.figures
+        figure_runs = paper.figures
+    else:
+        figure_runs = parts.run_figures(out, plan, runner)
     if options.includes_beyond:
         beyond = parts.run_beyond(out, plan, runner, paper)
         beyond_claims = list(judge_beyond_claims(beyond))

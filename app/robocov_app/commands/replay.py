@@ -181,13 +181,16 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
         if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
             raise InputError(f"--out: {out}: expected another folder than that of the run")
     runs = []
-    runs_on_one_map = []
+    roster_runs = []
     for saved in saved_runs:
         history = saved.history or CostHistory(*np.empty((4, 0)))
         runs.append(Run(saved.record, history, {}))
         # Robots may have failed at other positions in each run. Distances refer to the map without them.
         environment = build_roster(saved.record).environment
-        runs_on_one_map.append(Run(replace(saved.record, environment=environment), history, {}))
+        roster_runs.append(Run(replace(saved.record, environment=environment), history, {}))
+    runs_on_one_map = None
+    if len(runs) > 1:
+        runs_on_one_map = roster_runs
     with create_result(out, "replay", overwrite=options.overwrite) as result, Interruption() as interruption:
         content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
         write_json(result.staging / REPLAY_FILE, content)
@@ -198,9 +201,11 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
             options.video.build_settings(),
             interruption,
             quiet=options.json,
-            runs_on_one_map=runs_on_one_map if len(runs) > 1 else None,
+            runs_on_one_map=runs_on_one_map,
         )
-    ending = "Interrupted. Partial results are in" if interruption.requested else "saved in"
+    ending = "saved in"
+    if interruption.requested:
+        ending = "Interrupted. Partial results are in"
     answer = {"out": str(out), "interrupted": interruption.requested}
     print_answer(options, answer, f"{ending} {out}/: {list_files(out)}")
     return INTERRUPTED if interruption.requested else 0

@@ -51,16 +51,21 @@ def command(options: Arguments) -> None:
     """Run `robocov report`."""
     if not options.folders:
         raise ParameterError("DIR: expected the folder of a run, a comparison or a sweep")
-    first = options.folders[0]
-    is_session = first.suffix == _SESSION_SUFFIX
-    default_target = first.with_suffix(".html") if is_session else first / REPORT_FILE
-    target = options.out or default_target
+    target = options.out or _choose_target(options.folders[0])
+    is_session = options.folders[0].suffix == _SESSION_SUFFIX
     if options.out is not None or is_session:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
         scratch = Path(temporary)
         sections = [section for path in options.folders for section in _find_sections(path, scratch)]
         _write_report(options, sections, target, scratch)
+
+
+def _choose_target(source: Path) -> Path:
+    """Return the default file of a page about a folder or a session."""
+    if source.suffix == _SESSION_SUFFIX:
+        return source.with_suffix(".html")
+    return source / REPORT_FILE
 
 
 def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
@@ -95,8 +100,10 @@ def _write_report(
     page = build_report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
     # The report in the folder of a run is registered as one of its files, so that it is replaced with it.
-    is_in_run_folder = target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep"
-    _write_page(data, target, options.folders[0] if is_in_run_folder else None)
+    run_folder = None
+    if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
+        run_folder = options.folders[0]
+    _write_page(data, target, run_folder)
     counts = []
     lines = []
     for (folder, _), result, shown in zip(sections, results, page.shown, strict=True):
@@ -159,7 +166,9 @@ def _write_page(data: bytes, target: Path, run_folder: Path | None) -> None:
 
 def _name_folder(folder: Path, scratch: Path) -> str:
     """Return the path of a folder, relative to the scratch folder if it is in there."""
-    return str(folder.relative_to(scratch) if folder.is_relative_to(scratch) else folder)
+    if folder.is_relative_to(scratch):
+        folder = folder.relative_to(scratch)
+    return str(folder)
 
 
 def _count_runs(result: ReportedResult, folder: str, shown: int) -> dict[str, Any]:

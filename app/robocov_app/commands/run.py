@@ -75,7 +75,9 @@ def _describe_run(run: Run) -> list[str]:
     history = run.history
     summary = run.summary
     path_lengths = summary["path_length_m"]
-    settling_time = summary["settled_at_s"]
+    settled = "not yet"
+    if summary["settled_at_s"] is not None:
+        settled = f"after {summary['settled_at_s']:.1f} s"
     lines = [
         f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s",
         f"  mean distance   {summary['mean_distance_m']:.3f} m   "
@@ -90,7 +92,7 @@ def _describe_run(run: Run) -> list[str]:
     if summary["uncovered_area_m2"] > 0:
         lines.append(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
     lines += [
-        f"  settled         {'not yet' if settling_time is None else f'after {settling_time:.1f} s'}",
+        f"  settled         {settled}",
         f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:z.3f} m)",
         f"  path length     {sum(path_lengths) / len(path_lengths):.2f} m per robot",
     ]

@@ -109,9 +109,11 @@ def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
     from robocov_app.sweep.progress import format_duration
 
     lines = [f"{name:<20} {count:>7}" for name, count in estimate.axes.items()]
+    runs = f"{'runs':<20} {estimate.runs:>7}"
     finished = estimate.runs - estimate.left
-    note = f"   ({finished} of them done already)" if finished else ""
-    lines.append(f"{'runs':<20} {estimate.runs:>7}{note}")
+    if finished:
+        runs += f"   ({finished} of them done already)"
+    lines.append(runs)
     lines += estimate.notes
     if estimate.error is not None:
         lines.append(f"the trial run, {estimate.run}, failed: {estimate.error}")
@@ -139,7 +141,10 @@ def _sweep(options: Arguments, study: Study, out: Path) -> int:
     )
     runs = len(study)
     lines = _describe_totals(totals, runs)
-    lines += _describe_interruption(totals, runs, out) if totals.interrupted else [_describe_tables(out)]
+    if totals.interrupted:
+        lines += _describe_interruption(totals, runs, out)
+    else:
+        lines.append(_describe_tables(out))
     print_answer(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
     if totals.interrupted:
         return INTERRUPTED
@@ -148,8 +153,10 @@ def _sweep(options: Arguments, study: Study, out: Path) -> int:
 
 def _describe_totals(totals: Totals, runs: int) -> list[str]:
     """Return the totals of a sweep as lines of text."""
-    reused = f", {totals.reused} reused" if totals.reused else ""
-    lines = [f"{totals.done} runs done{reused}"]
+    counts = f"{totals.done} runs done"
+    if totals.reused:
+        counts += f", {totals.reused} reused"
+    lines = [counts]
     if totals.failed:
         lines.append(f"{totals.failed} of {runs} runs failed:")
         lines += [f"  {run}: {error}" for run, error in totals.errors.items()]
@@ -173,6 +180,8 @@ def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
 
 def _describe_tables(out: Path) -> str:
     """Return the paths of the written tables as a line of text."""
+    text = f"the table is {out / SWEEP_TABLE_FILE}"
     parquet = out / SWEEP_PARQUET_FILE
-    suffix = f", and as Parquet {parquet}" if parquet.exists() else ""
-    return f"the table is {out / SWEEP_TABLE_FILE}{suffix}"
+    if parquet.exists():
+        text += f", and as Parquet {parquet}"
+    return text

@@ -56,7 +56,9 @@ def command(options: Arguments) -> int:
         if not options.json:
             _print_outcome(name, outcome)
     print_answer(options, {"maps": rows}, indent=1)
-    return 0 if all(row["valid"] for row in rows) else _INVALID
+    if not all(row["valid"] for row in rows):
+        return _INVALID
+    return 0
 
 
 def _check(name: str) -> MapReport | InputError:
@@ -131,9 +133,12 @@ def _display(
     console: Console, title: str, outcome: MapReport | InputError, previous: MapReport | None = None
 ) -> None:
     """Display the outcome of one map."""
-    is_valid = isinstance(outcome, MapReport)
-    verdict = "valid" if is_valid else "invalid"
-    color = "green" if is_valid else "red"
+    if isinstance(outcome, MapReport):
+        verdict = "valid"
+        color = "green"
+    else:
+        verdict = "invalid"
+        color = "red"
     console.print(f"{title}: {verdict}", style=f"bold {color}", soft_wrap=True)
     for line in _format_outcome(outcome, previous):
         console.print(line, soft_wrap=True)
@@ -191,8 +196,10 @@ def format_report(report: MapReport, previous: MapReport | None = None) -> Itera
         previous = report
     lines = _mark_changed_rows(_format_rows(report), _format_rows(previous))
     for warning in report.warnings:
-        suffix = "" if warning in previous.warnings else " (new)"
-        lines.append(("warning", f"{warning}{suffix}"))
+        text = warning
+        if warning not in previous.warnings:
+            text += " (new)"
+        lines.append(("warning", text))
     lines += [("no longer", warning) for warning in previous.warnings if warning not in report.warnings]
     width = max(len(title) for title, _ in lines)
     for title, value in lines:
@@ -204,7 +211,10 @@ def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]
     lines = []
     for title, value in rows.items():
         previous_value = previous_rows.get(title, "none")
-        lines.append((title, value if value == previous_value else f"{value}, was {previous_value}"))
+        text = value
+        if value != previous_value:
+            text += f", was {previous_value}"
+        lines.append((title, text))
     for title, previous_value in previous_rows.items():
         if title not in rows:
             lines.append((title, f"none, was {previous_value}"))

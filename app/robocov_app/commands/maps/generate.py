@@ -127,8 +127,9 @@ def command(options: Arguments) -> None:
     is_quiet = options.json or not options.writes_folder
     with show_progress("generating", len(tasks), quiet=is_quiet) as update:
         for number, task in enumerate(tasks, start=1):
-            path = out / f"{task.name}.json" if out is not None and options.writes_folder else out
-            if path is not None and options.writes_folder:
+            path = out
+            if out is not None and options.writes_folder:
+                path = out / f"{task.name}.json"
                 _check_replaced_map(path)
             environment = _build_map(task)
             environments.append(environment)
@@ -150,8 +151,10 @@ def _build_map(task: _MapTask) -> Environment:
         return task.build()
     except ParameterError as error:
         # The message begins with the name of the parameter.
-        suffix = "" if task.seed is None else f" (seed {task.seed})"
-        raise ParameterError(f"--{error}{suffix}") from None
+        message = f"--{error}"
+        if task.seed is not None:
+            message += f" (seed {task.seed})"
+        raise ParameterError(message) from None
 
 
 def _save_sheet(options: Arguments, path: Path, environments: list[Environment]) -> None:
@@ -164,8 +167,9 @@ def _save_sheet(options: Arguments, path: Path, environments: list[Environment])
 
 def _describe_map(row: dict[str, Any]) -> str:
     """Return the properties of a map as a line of text."""
-    gap = row["narrowest_gap_m"]
-    passages = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
+    passages = "no passage"
+    if row["narrowest_gap_m"] is not None:
+        passages = f"narrowest gap {row['narrowest_gap_m']:.3f} m"
     obstacles = format_count(row["obstacles"], "obstacle")
     free_area = f"{row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"
     return f"{row['file']}: {free_area}, {passages}, {obstacles}, {row['vertices']} vertices"

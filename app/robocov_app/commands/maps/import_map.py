@@ -18,7 +18,7 @@ from robocov_app.terminal.progress import show_progress
 
 @dataclass
 class Arguments(JsonOption):
-    """Convert a foreign map file to a map of robocov, and report dropped, repaired and changed parts.
+    """Convert a foreign map file to a map of robocov, and report dropped, repaired and changed elements.
 
     The format is detected from the content, otherwise from the suffix. Inapplicable options are rejected.
 
@@ -59,7 +59,9 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> None:
     """Run `robocov import`."""
-    out = Path(f"{options.file.stem}.json") if options.out is None else options.out
+    out = options.out
+    if out is None:
+        out = Path(f"{options.file.stem}.json")
     _check_options(options, out)
     is_quiet = options.json or not sys.stderr.isatty()
     with show_progress("importing", 3, quiet=is_quiet) as update:
