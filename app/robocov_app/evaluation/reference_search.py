@@ -20,7 +20,7 @@ from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.terminal.interruption import Interruption
 
 REFERENCE_FORMAT = "robocov-reference 1"
-"""Part of every digest. Change it whenever the search gives other results."""
+"""Beginning of the text that is hashed. Change it whenever the search gives other results."""
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 
@@ -39,7 +39,7 @@ class ReferenceQuery:
     lattice : int
         Sites along a side of the lattice on which the cost is computed.
     restarts : int
-        Number of descents, of which the best counts.
+        Number of descents; the best one is used.
     seed : int
     """
 
@@ -51,7 +51,7 @@ class ReferenceQuery:
     seed: int = 0
 
     @property
-    def digest(self) -> str:
+    def input_hash(self) -> str:
         """Hash of all inputs. The starts of the map are ignored: the placement does not depend on them."""
         inputs = {**asdict(self), "document": {**self.document, "starts": None}}
         text = f"{REFERENCE_FORMAT}{json.dumps(inputs, sort_keys=True)}"

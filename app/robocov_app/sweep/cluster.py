@@ -88,7 +88,9 @@ class Cluster(Executor):
     @property
     def waiting_reason(self) -> str:
         """Reason why no worker is running; empty if one is."""
-        return "" if self.threads else f"no workers are connected to {self._address}; waiting"
+        if self.threads:
+            return ""
+        return f"no workers are connected to {self._address}; waiting"
 
     def _start(self, task: Task) -> None:
         # A unique key prevents Dask from returning the result of another program on the cluster.

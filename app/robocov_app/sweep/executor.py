@@ -118,7 +118,9 @@ class Executor(ABC):
         if isinstance(outcome, LostWorker):
             failure = self._handle_lost_worker(task, outcome, had_others=had_others)
             self._start_tasks()
-            return None if failure is None else (task, failure)
+            if failure is None:
+                return None
+            return task, failure
         self._consecutive_ends = 0
         self._start_tasks()
         return task, outcome

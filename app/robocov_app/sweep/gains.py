@@ -56,7 +56,7 @@ def build_gains(
     sampling : Sampling or None
         How ranges are sampled.
     path : tuple of str and int
-        Where the gains are in the study, for messages.
+        Path of the gains in the study, for messages.
 
     Returns
     -------

@@ -34,7 +34,7 @@ _ROW_FILE = "row.json"
 """File in the folder of a run with its figures in the table and the checksums of its other files."""
 _ROW_FORMAT = "robocov-row"
 _ROW_VERSION = 2
-_DIGEST_BYTES = 16
+_CHECKSUM_BYTES = 16
 _TEMPORARY_NAME = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
@@ -57,7 +57,7 @@ class Entry(NamedTuple):
 
 
 class DamagedRunError(ValueError):
-    """The folder of a run exists, but is not as it was written."""
+    """The folder of a run exists, but its content has changed since it was written."""
 
 
 @dataclass
@@ -110,7 +110,9 @@ class Survey:
                 names = f"{names} and {unnamed} more"
             runs = format_count(len(self.damaged), "damaged run")
             lines.append(f"{runs} will be repeated: {names}")
-        decision = "will be used nevertheless" if keep_versions else "will be repeated"
+        decision = "will be repeated"
+        if keep_versions:
+            decision = "will be used nevertheless"
         for differences, count in self.outdated.items():
             lines.append(f"{format_count(count, 'run')} made with {differences} {decision}")
         if self.outdated and not keep_versions:
@@ -191,7 +193,7 @@ class Ledger:
         Raises
         ------
         DamagedRunError
-            If the entry, or with `checks_files` any file of the run, is not as it was written.
+            If the entry, or with `checks_files` any file of the run, has changed since it was written.
         """
         folder = self.runs_folder / task.name
         if not os.path.lexists(folder):
@@ -200,13 +202,13 @@ class Ledger:
             row = json.loads(_read_file(folder / _ROW_FILE))
             figures = row["figures"]
             error = row["error"]
-            _require(row["format"] == _ROW_FORMAT and row["digest"] == task.digest)
+            _require(row["format"] == _ROW_FORMAT and row["digest"] == task.input_hash)
             _require(all(value is None or type(value) in (int, float) for value in figures.values()))
             _require(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
                 versions = _read_format_1_versions(folder, figures, error)
                 return Entry(figures, error, versions, has_checksums=False)
-            _require(row.pop("check_sum") == _compute_checksum(row))
+            _require(row.pop("check_sum") == _compute_row_checksum(row))
             if checks_files:
                 _check_files(folder, row["files"])
             return Entry(figures, error, row["versions"])
@@ -231,15 +233,13 @@ class Ledger:
         row: dict[str, Any] = {
             "format": _ROW_FORMAT,
             "version": _ROW_VERSION,
-            "digest": task.digest,
+            "digest": task.input_hash,
             "versions": dict(outcome.versions),
             "figures": dict(outcome.figures),
             "error": outcome.error,
-            "files": {
-                name: (len(content), _compute_digest(content)) for name, content in outcome.files.items()
-            },
+            "files": {name: _describe_file(content) for name, content in outcome.files.items()},
         }
-        row["check_sum"] = _compute_checksum(row)
+        row["check_sum"] = _compute_row_checksum(row)
         row_content = (json.dumps(row, allow_nan=False) + "\n").encode()
         files = {**outcome.files, _ROW_FILE: row_content}
         try:
@@ -294,7 +294,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     Raises
     ------
     InputError
-        If the folder contains something else than a sweep.
+        If the folder contains anything but a sweep.
     OutputError
         If it cannot be written to.
     """
@@ -362,10 +362,15 @@ def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str
 
 
 def _check_files(folder: Path, files: Mapping[str, tuple[int, str]]) -> None:
-    """Raise DamagedRunError if a file does not have its size and digest."""
-    for name, (size, digest) in files.items():
+    """Raise DamagedRunError if a file does not have its size and checksum."""
+    for name, (size, checksum) in files.items():
         content = _read_file(folder / name)
-        _require(len(content) == size and _compute_digest(content) == digest)
+        _require(len(content) == size and _compute_file_checksum(content) == checksum)
+
+
+def _describe_file(content: bytes) -> tuple[int, str]:
+    """Return the size of a file and its checksum."""
+    return len(content), _compute_file_checksum(content)
 
 
 def _require(is_valid: bool) -> None:
@@ -380,12 +385,12 @@ def _read_file(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _compute_digest(content: bytes) -> str:
-    return blake2b(content, digest_size=_DIGEST_BYTES).hexdigest()
+def _compute_file_checksum(content: bytes) -> str:
+    return blake2b(content, digest_size=_CHECKSUM_BYTES).hexdigest()
 
 
-def _compute_checksum(row: Mapping[str, Any]) -> str:
-    return _compute_digest(json.dumps(row, sort_keys=True, allow_nan=False).encode())
+def _compute_row_checksum(row: Mapping[str, Any]) -> str:
+    return _compute_file_checksum(json.dumps(row, sort_keys=True, allow_nan=False).encode())
 
 
 def _remove(path: Path) -> None:

@@ -125,7 +125,9 @@ class _WorkerProcess:
 
     def _end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its exit status and the end of its error output."""
-        status = 0 if self._process is None else end_process(self._process)
+        status = 0
+        if self._process is not None:
+            status = end_process(self._process)
         self._process = None
         self._error_output.seek(0)
         output = self._error_output.read()[-_MAX_OUTPUT_CHARS:]

@@ -104,8 +104,9 @@ def _format_group(group: Mapping[str, Any]) -> str:
         if name != "count":
             text = value if isinstance(value, str) else f"{value:g}"
             differences.append(f"{name.replace('_', ' ')} {text} {UNITS[name]}")
-    description = f"with {', '.join(differences)}" if differences else "as the rest"
-    return f"{group['count']} {description}"
+    if not differences:
+        return f"{group['count']} as the rest"
+    return f"{group['count']} with {', '.join(differences)}"
 
 
 def parse_condition_axes(conditions: Mapping[str, Any]) -> dict[str, list[ParameterValue]]:
@@ -231,7 +232,9 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
         seed=seed,
     )
     conditions.check_team(robots)
-    return None if conditions.is_ideal else conditions
+    if conditions.is_ideal:
+        return None
+    return conditions
 
 
 def build_swept_team(robots: int, parameters: Mapping[str, ParameterValue]) -> Team:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 LINE_INTERVAL_S = 10.0
-"""Time between two lines where there is no terminal."""
+"""Time between two lines if there is no terminal."""
 _MIN_WHOLE_RATE_PER_S = 10.0
 """Higher rates are printed as whole numbers."""
 _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
@@ -41,7 +41,7 @@ class SweepProgress:
     lost_workers : int
         Number of workers that have ended during a run.
     waiting_reason : str
-        Reason why no worker is running; empty where one is.
+        Reason why no worker is running; empty if one is.
     start_time : float
         Time at which the first run was started, on the clock of `time.perf_counter`, s.
     """
@@ -63,18 +63,24 @@ class SweepProgress:
     def rate(self) -> float:
         """Runs per second; 0 before the first one."""
         seconds = time.perf_counter() - self.start_time
-        return (self.done + self.failed) / seconds if seconds > 0 else 0.0
+        if seconds <= 0:
+            return 0.0
+        return (self.done + self.failed) / seconds
 
     @property
     def remaining_time(self) -> float | None:
         """Estimate of the time to the end, s; None before the first run."""
-        return (self.total - self.finished) / self.rate if self.rate else None
+        if not self.rate:
+            return None
+        return (self.total - self.finished) / self.rate
 
     def describe_outlook(self) -> str:
         """Return the remaining time as text, or the reason why all runs wait; empty if neither is known."""
         if self.waiting_reason:
             return self.waiting_reason
-        return f"{format_duration(self.remaining_time)} left" if self.remaining_time else ""
+        if not self.remaining_time:
+            return ""
+        return f"{format_duration(self.remaining_time)} left"
 
     def describe(self) -> str:
         """Return the numbers of runs as text."""

@@ -261,7 +261,7 @@ class Study:
     def _resolve_teams(self) -> None:
         """Combine the parameters of the robots and the conditions."""
         names = list(TEAM_PARAMETERS)
-        # Defaults are left out, so that tasks without these parameters keep their digests.
+        # Defaults are left out, so that tasks without these parameters keep their hashes.
         names += [name for name, default in KINEMATIC_DEFAULTS.items() if getattr(self, name) != default]
         axes = {
             name: parse_values(getattr(self, name), ("team", name), partial(parse_parameter, name))
@@ -337,8 +337,9 @@ class Study:
     def list_starts(self, study_map: StudyMap) -> tuple[str, ...]:
         """Return the names of the starts of a map that are used."""
         environment = study_map.environment
-        starts = tuple(environment.starts) if self.starts == (ALL_STARTS,) else tuple(self.starts)
-        return starts or (environment.start().name,)
+        if self.starts == (ALL_STARTS,):
+            return tuple(environment.starts)
+        return tuple(self.starts) or (environment.start().name,)
 
     def load_controller_class(self, controller: str) -> type[Any]:
         """Return the class of a controller, from the text that the study contains."""

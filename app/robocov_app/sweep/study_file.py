@@ -186,8 +186,10 @@ def list_study_keys() -> dict[str, str]:
 def _list_keys(table: _TableSchema, prefix: str) -> Iterator[tuple[str, str]]:
     for key, schema in table.keys.items():
         name = prefix + key.replace(_ANY_KEY, "NAME")
-        suffix = ", required" if key in table.required else ""
-        yield name, schema.expected + suffix
+        description = schema.expected
+        if key in table.required:
+            description += ", required"
+        yield name, description
         if isinstance(schema, _TableSchema):
             yield from _list_keys(schema, f"{name}.")
 
@@ -237,9 +239,11 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     reader = _SchemaReader()
     values = reader.read(document, _STUDY, ())
     if reader.mistakes:
+        message = f"{where}: {reader.mistakes[0]}"
         others = len(reader.mistakes) - 1
-        suffix = f" (and {others} more)" if others else ""
-        raise InputError(f"{where}: {reader.mistakes[0]}{suffix}")
+        if others:
+            message += f" (and {others} more)"
+        raise InputError(message)
     try:
         return Study(**_convert_to_arguments(values, folder), folder=folder)
     except InputError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 from robocov.errors import ParameterError
 from robocov_app.sweep.gains import Gains
@@ -45,11 +45,10 @@ def require_few_runs(
     factors = [f"{_format_number(counts[name])} {name}" for name in varied[:_MAX_LISTED_FACTORS]]
     if sets_of_gains > 1:
         factors.append(f"{_format_number(sets_of_gains)} sets of gains")
-    breakdown = f" ({' x '.join(factors)})" if factors else ""
-    raise ParameterError(
-        f"runs: expected at most {max_runs}, got {_format_number(runs)}{breakdown}. "
-        f"max_runs in the study allows more, up to {MAX_MAX_RUNS}."
-    )
+    message = f"runs: expected at most {max_runs}, got {_format_number(runs)}"
+    if factors:
+        message += f" ({' x '.join(factors)})"
+    raise ParameterError(f"{message}. max_runs in the study allows more, up to {MAX_MAX_RUNS}.")
 
 
 def count_values(values: object) -> int:
@@ -57,8 +56,9 @@ def count_values(values: object) -> int:
     if isinstance(values, range):
         # It may be too long for `len`. The negative signs round the quotient up.
         return max(-(-(values.stop - values.start) // values.step), 0)
-    is_list = isinstance(values, Sequence) and not isinstance(values, str)
-    return len(cast("Sequence[object]", values)) if is_list else 1
+    if isinstance(values, Sequence) and not isinstance(values, str):
+        return len(values)
+    return 1
 
 
 def _count_gains(specification: Any, sampling: Sampling | None) -> int:
@@ -83,4 +83,6 @@ def _format_number(count: int) -> str:
     """Format a number, which may be too large for a float."""
     if count < 10**9:
         return str(count)
-    return f"{count:.3g}" if count < 10**300 else "more than 1e300"
+    if count < 10**300:
+        return f"{count:.3g}"
+    return "more than 1e300"

@@ -120,7 +120,9 @@ def get_gain_column(name: str) -> str:
     other_columns = (*_RUN_COLUMNS, _DURATION_COLUMN, *RESULT_COLUMNS, *_FINAL_COLUMNS)
     other_names = {column.name for column in other_columns}
     other_names |= {name_parameter_column(parameter) for parameter in UNITS}
-    return f"gain_{name}" if name in other_names else name
+    if name in other_names:
+        return f"gain_{name}"
+    return name
 
 
 def build_row(task: Task, entry: Entry) -> dict[str, Any]:
@@ -212,14 +214,12 @@ class Table:
     def _replace_files(self) -> None:
         """Replace the files of an earlier sweep by those of this one, in quick succession."""
         temporary_names = {}
-        with _report_write_errors(
-            self._folder / (SWEEP_PARQUET_FILE if self._has_parquet else SWEEP_TABLE_FILE)
-        ):
+        main_file = SWEEP_PARQUET_FILE if self._has_parquet else SWEEP_TABLE_FILE
+        with _report_write_errors(self._folder / main_file):
             if self._has_parquet:
                 temporary_names[SWEEP_PARQUET_FILE] = _TEMPORARY_PARQUET_FILE
-                self._write_parquet(
-                    self._folder / (SWEEP_TABLE_FILE if self.is_replaced else _TEMPORARY_CSV_FILE)
-                )
+                csv_file = SWEEP_TABLE_FILE if self.is_replaced else _TEMPORARY_CSV_FILE
+                self._write_parquet(self._folder / csv_file)
             if not self.is_replaced:
                 temporary_names[SWEEP_TABLE_FILE] = _TEMPORARY_CSV_FILE
             if self._study is not None and not self._has_study(self._study):

@@ -21,11 +21,11 @@ from robocov_app.sweep.study import Study
 
 MAX_CACHED_MAPS = 4
 """Number of maps that a process keeps in memory. Tasks come map by map."""
-_DIGEST_FORMAT = "robocov-task 1"
+_HASH_FORMAT = "robocov-task 1"
 """Beginning of the text that is hashed. Results of other versions are distinguished by their versions."""
 _MAX_NAME_CHARS = 24
 """Maximum length of each name in the name of a folder."""
-_NAME_DIGEST_CHARS = 10
+_NAME_HASH_CHARS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,8 @@ class Task:
         Rates at which the cost is evaluated and the trajectories are saved.
     metrics : bool
         Whether the metrics of `robocov.metrics.run_metrics` are computed, too.
-    digest : str
-        Hash of all inputs. Tasks with the same digest have the same result.
+    input_hash : str
+        SHA-256 of all inputs. Tasks with the same hash have the same result.
     """
 
     map: str
@@ -78,14 +78,14 @@ class Task:
     cost_hz: float
     record_hz: float
     metrics: bool = False
-    digest: str = ""
+    input_hash: str = ""
 
     @property
     def name(self) -> str:
         """Name of the folder of the run, valid on any system."""
         controller = self.controller.rpartition(":")[2]
         parts = [_to_file_name(part) for part in (self.map, controller, self.robots, self.start, self.seed)]
-        return "-".join([*parts, self.digest[:_NAME_DIGEST_CHARS]])
+        return "-".join([*parts, self.input_hash[:_NAME_HASH_CHARS]])
 
     def build_environment(self) -> Environment:
         """Build the map. The maps of the latest tasks are kept in memory."""
@@ -101,7 +101,7 @@ class Task:
         Raises
         ------
         InputError
-            If the scenario is not possible, for example because there is no room for the robots.
+            If the scenario is not possible, for example because the robots do not fit into the free space.
         """
         return Scenario(
             self.build_environment(),
@@ -150,7 +150,7 @@ class _TaskController(NamedTuple):
     source : ControllerSource or None
     gains : dict of str to float, str or None
     hashed_inputs : dict
-        Inputs that the digests of its tasks depend on.
+        Inputs that the hashes of its tasks depend on.
     """
 
     name: str
@@ -179,12 +179,12 @@ def generate_tasks(study: Study) -> Iterator[Task]:
         "record_hz": study.record_hz,
     }
     if study.metrics:
-        # The entry is left out otherwise, so that earlier tasks without metrics keep their digests.
+        # The entry is left out otherwise, so that earlier tasks without metrics keep their hashes.
         settings["metrics"] = True
     controllers = _list_controllers(study)
     for study_map in study.maps:
         document = json.dumps(to_json(study_map.environment), ensure_ascii=False, allow_nan=False)
-        document_digest = _digest_text(document)
+        document_hash = _hash_text(document)
         starts = study.list_starts(study_map)
         combinations = product(study.robots, study.teams, starts, study.seeds, controllers)
         for robots, team, start, seed, controller in combinations:
@@ -196,14 +196,14 @@ def generate_tasks(study: Study) -> Iterator[Task]:
                 "start": start,
                 "seed": seed,
             }
-            hashed_inputs = {**inputs, **controller.hashed_inputs, "document": document_digest}
+            hashed_inputs = {**inputs, **controller.hashed_inputs, "document": document_hash}
             yield Task(
                 **inputs,
                 controller=controller.name,
                 source=controller.source,
                 gains=controller.gains,
                 document=document,
-                digest=_digest_text(_DIGEST_FORMAT + json.dumps(hashed_inputs, sort_keys=True)),
+                input_hash=_hash_text(_HASH_FORMAT + json.dumps(hashed_inputs, sort_keys=True)),
             )
 
 
@@ -212,13 +212,13 @@ def _list_controllers(study: Study) -> list[_TaskController]:
     controllers = []
     for name in study.controllers:
         source = study.sources.get(name)
-        # The text of a controller counts, wherever its file is.
+        # The text of a controller counts, not the path of its file.
         hashed_source: dict[str, Any] = {"source": None, "path": None}
         if source is not None:
-            hashed_source["source"] = _digest_text(source.text)
+            hashed_source["source"] = _hash_text(source.text)
             if source.modules:
                 hashed_source["modules"] = {
-                    module_name: _digest_text(module.text) for module_name, module in source.modules.items()
+                    module_name: _hash_text(module.text) for module_name, module in source.modules.items()
                 }
         for choice in study.get_gains(name).choices:
             gains = dict(choice)
@@ -227,5 +227,5 @@ def _list_controllers(study: Study) -> list[_TaskController]:
     return controllers
 
 
-def _digest_text(text: str) -> str:
+def _hash_text(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()

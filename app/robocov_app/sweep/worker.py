@@ -223,8 +223,8 @@ class CommunicationMeter:
     """Counts the bytes that robots send, whether they are received or not.
 
     Each robot sends its position at the rate of the conditions, or in each control step. Robots that share
-    maps also send each cell of their map that has changed, whoever measured it, and with each plan the
-    positions at which they know others to be.
+    maps also send each cell of their map that has changed, even if another robot measured it, and with each
+    plan the known positions of others.
 
     Attributes
     ----------

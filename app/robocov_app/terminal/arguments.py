@@ -144,7 +144,9 @@ def _explain_unexpected_argument(word: str, options: list[str]) -> str:
             if option in ("--controller", "--controllers"):
                 return f"{text}: did you mean {option} {word}?"
     similar = get_close_matches(f"--{word}", options, n=1, cutoff=_MIN_SIMILARITY)
-    return f"{text}: did you mean {similar[0]}?" if similar else text
+    if not similar:
+        return text
+    return f"{text}: did you mean {similar[0]}?"
 
 
 def _list_option_names(kind: Any) -> list[str]:
@@ -232,7 +234,7 @@ def _takes_many_values(hint: Any) -> bool:
 
 
 def _arrange_help(kind: type[T]) -> type[T]:
-    """Put the most used options first in the help, and drop default values that say nothing."""
+    """Put the most used options first in the help, and drop uninformative default values."""
     for group in (kind, *list_option_groups(kind)):
         owner: Any = group
         hints = get_type_hints(owner, include_extras=True)
@@ -253,7 +255,7 @@ def _make_help_settings(option: Any) -> Any:
 
 
 def _format_default(label: str) -> str:
-    """Return the hint at a default value; empty if it says nothing."""
+    """Return the hint at a default value; empty for values such as None."""
     if label in ("", "None", "False"):
         return ""
     if "." in label:

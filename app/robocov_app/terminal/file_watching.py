@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 POLLING_INTERVAL_S = 0.25
-"""Time between two looks at the files; one takes microseconds."""
+"""Time between two checks of the files; one takes microseconds."""
 SETTLING_TIME_S = 0.1
 """Time during which a file must not change: editors write in pieces, or remove and rename."""
 MAX_SETTLING_TIME_S = 2.0
@@ -17,7 +17,7 @@ _State: TypeAlias = tuple[int, int, int, int] | None
 def watch_files(
     paths: Sequence[Path], *, sleep: Callable[[float], None] = time.sleep
 ) -> Iterator[tuple[Path, ...]]:
-    """Watch files or links for ever.
+    """Watch files or links forever.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _wait_for_end_of_changes(
 
 
 def _get_state(path: Path) -> _State:
-    """Return what changes when a file is written or replaced; None if it does not exist."""
+    """Return properties that change when a file is written or replaced; None if it does not exist."""
     try:
         status = path.stat()
     except (OSError, ValueError):

@@ -97,13 +97,13 @@ def check_output_file(
     path : Path
         The file.
     alternative : str
-        Way out in the message, such as ``another --out``.
+        Suggested alternative in the message, such as ``another --out``.
     overwrite : bool
         Whether an existing file may be replaced.
     source : Path or None
         File that the command reads, which is never replaced.
     source_kind : str
-        What the source is, for the message.
+        Kind of the source, for the message.
 
     Raises
     ------

@@ -30,8 +30,8 @@ def test_every_combination_is_tried() -> None:
 
 def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
     """What was done before there were conditions is not done again."""
-    assert [task.digest for task in generate_tasks(build_small_study())] == [
-        task.digest for task in generate_tasks(build_small_study(conditions={}))
+    assert [task.input_hash for task in generate_tasks(build_small_study())] == [
+        task.input_hash for task in generate_tasks(build_small_study(conditions={}))
     ]
     assert "loss" not in next(generate_tasks(build_small_study())).team
 

@@ -65,7 +65,7 @@ def test_a_run_replaces_an_earlier_one(tmp_path: Path, task: Task) -> None:
 def test_runs_with_unreadable_rows_count_as_not_done(tmp_path: Path, task: Task, content: str) -> None:
     with open_ledger(tmp_path, STUDY) as ledger:
         ledger.store(task, DONE)
-        (tmp_path / "runs" / task.name / "row.json").write_text(content.replace("DIGEST", task.digest))
+        (tmp_path / "runs" / task.name / "row.json").write_text(content.replace("DIGEST", task.input_hash))
         assert ledger.read_entry(task) is None
         ledger.store(task, DONE)
         assert ledger.read_entry(task) is not None

@@ -177,7 +177,7 @@ def test_a_team_of_groups() -> None:
 def test_metrics_are_another_task() -> None:
     tasks = [next(generate_tasks(build_small_study(metrics=value))) for value in (False, True)]
     assert [task.metrics for task in tasks] == [False, True]
-    assert tasks[0].digest != tasks[1].digest
+    assert tasks[0].input_hash != tasks[1].input_hash
     with pytest.raises(ParameterError, match="metrics: expected true or false, got 1"):
         build_small_study(metrics=1)
 

@@ -91,7 +91,7 @@ def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
     assert len(simulate(task)) == 11
 
 
-def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) -> None:
+def test_the_same_inputs_have_the_same_hash_and_others_do_not(tmp_path: Path) -> None:
     tasks = {task.name: task for task in generate_tasks(build_small_study())}
     assert set(tasks) == {task.name for task in generate_tasks(build_small_study())}
     for changes in (
@@ -153,7 +153,7 @@ def test_names_of_folders_are_fit_for_any_system() -> None:
         assert task.name.isascii()
         assert not set(task.name) & set('/\\:*?"<>| ')
         assert len(task.name) < 120
-        assert task.name.endswith(task.digest[:10])
+        assert task.name.endswith(task.input_hash[:10])
 
 
 def test_a_bundled_map_is_carried_whole() -> None:

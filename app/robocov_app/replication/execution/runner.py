@@ -150,7 +150,7 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
     notes = []
 
     def store(task: Task, outcome: worker.Outcome) -> None:
-        for ledger in ledgers[task.digest]:
+        for ledger in ledgers[task.input_hash]:
             ledger.store(task, outcome)
 
     with ExitStack() as stack:
@@ -158,8 +158,8 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
             ledger = stack.enter_context(open_ledger(get_study_folder(folder, name), study.to_json()))
             survey = ledger.survey(generate_tasks(study), keep_versions=options.keep_versions)
             for task in compress(generate_tasks(study), survey.is_left):
-                tasks[task.digest] = task
-                ledgers.setdefault(task.digest, []).append(ledger)
+                tasks[task.input_hash] = task
+                ledgers.setdefault(task.input_hash, []).append(ledger)
             notes += [f"{name}: {line}" for line in survey.describe(keep_versions=options.keep_versions)]
         if not tasks and not notes:
             return

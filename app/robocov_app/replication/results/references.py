@@ -73,7 +73,7 @@ def _load_reference(path: Path, query: ReferenceQuery) -> ReferencePlacement | N
     """Return the stored answer to a query, None if there is no readable one."""
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
-        if content["digest"] == query.digest:
+        if content["digest"] == query.input_hash:
             positions = tuple((float(x), float(y)) for x, y in content["positions_m"])
             return ReferencePlacement(
                 float(content["mean_distance_m"]), positions, float(content["agreement"])
@@ -84,7 +84,7 @@ def _load_reference(path: Path, query: ReferenceQuery) -> ReferencePlacement | N
 def _save_reference(path: Path, query: ReferenceQuery, answer: ReferencePlacement) -> None:
     content = {
         "format": REFERENCE_FORMAT,
-        "digest": query.digest,
+        "digest": query.input_hash,
         "map": query.document.get("name"),
         "robots": query.robots,
         "radius_m": query.radius,

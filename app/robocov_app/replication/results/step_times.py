@@ -103,13 +103,13 @@ def measure_step_times(
     step_times = {}
     for robots, controllers in controllers_by_size.items():
         names = list(dict.fromkeys((BASELINE, *controllers)))
-        digest = _compute_digest(robots, names, plan)
+        input_hash = _hash_inputs(robots, names, plan)
         entry = stored.get(str(robots))
-        if entry is None or entry["digest"] != digest:
+        if entry is None or entry["digest"] != input_hash:
             seconds = _measure(robots, names, plan, is_stopped, clock)
             if seconds is None:
                 break
-            entry = {"digest": digest, "seconds_per_step": seconds}
+            entry = {"digest": input_hash, "seconds_per_step": seconds}
             stored[str(robots)] = entry
             _save_entries(path, stored, plan)
         times = {name: tuple(seconds) for name, seconds in entry["seconds_per_step"].items()}
@@ -117,7 +117,7 @@ def measure_step_times(
     return step_times
 
 
-def _compute_digest(robots: int, controllers: Sequence[str], plan: Plan) -> str:
+def _hash_inputs(robots: int, controllers: Sequence[str], plan: Plan) -> str:
     """Return a hash of everything that step times depend on, except for the machine."""
     gains = {name: dict(get_gain_values(make_controller(name))) for name in controllers}
     content = [
