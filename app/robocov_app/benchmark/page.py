@@ -13,6 +13,7 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.ratings import Rating, format_number
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
@@ -54,6 +55,8 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 PLOT_SIZE_PX = (560, 350)
 """Size of a plot. It is large, because there are many labels."""
+YARDSTICKS = ("rapf", "atlas", "oracle")
+"""Controllers whose gaps are shown next to those of incomplete entries, over the same runs."""
 _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
 _DPI = 72.0
@@ -89,10 +92,15 @@ class _Entries(NamedTuple):
 
     styles: Mapping[str, CurveStyle]
     information: Mapping[str, str]
+    yardsticks: Sequence[str]
+    """Labels of the entries of `YARDSTICKS`."""
 
 
 def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     """Build the page of some results, with a section for each track.
+
+    Entries are ranked by their scores, if they are complete. Each is rated over its own runs, so that no
+    entry changes the figures of another one.
 
     Parameters
     ----------
@@ -109,7 +117,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     Raises
     ------
     ParameterError
-        If the results have no run in common.
+        If the results contain no run of the suite.
     """
     labels = ratings.label_results(results)
     styles = choose_curve_styles([result["entry"]["controller"] for result in results])
@@ -117,13 +125,14 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     entries = _Entries(
         styles=dict(zip(labels, styles, strict=True)),
         information=dict(zip(labels, information, strict=True)),
+        yardsticks=_find_yardsticks(results, labels),
     )
     tracks = {
-        name: sorted(track_ratings, key=_sort_by_gap)
+        name: sorted(track_ratings, key=_sort_by_score)
         for name, track_ratings in ratings.build_ratings(results).items()
     }
     if not tracks:
-        raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
+        raise ParameterError("DIR: the results contain no run of the suite, so there is nothing to compare")
     page = load_template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
@@ -132,6 +141,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         marks=MARKER_PATHS,
         styles=entries.styles,
         overview=_build_overview(labels, tracks),
+        anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=ratings.NOTES,
         method=list(dict.fromkeys(sentence for result in results for sentence in result["method"])),
@@ -140,50 +150,108 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     return escape_controls(page)
 
 
-def _sort_by_gap(rating: Rating) -> tuple[bool, float]:
-    """Return a sort key: the lowest gap first, controllers without a gap last."""
-    gap = rating.gap.estimate
-    return bool(np.isnan(gap)), gap
+def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> list[str]:
+    """Return the labels of the yardsticks among the results, with their default gains."""
+    yardsticks = []
+    for result, label in zip(results, labels, strict=True):
+        entry = result["entry"]
+        if entry["controller"] in YARDSTICKS and not entry["set"]:
+            yardsticks.append(label)
+    return yardsticks
+
+
+def _sort_by_score(rating: Rating) -> tuple[bool, float]:
+    """Return a sort key: complete ratings first, among them the highest score."""
+    return not rating.is_complete, -rating.score
 
 
 def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
-    """Build the table of median gaps on all tracks, sorted by the mean rank."""
-    gaps: dict[tuple[str, str], float] = {}
-    ranks: dict[str, list[int]] = {}
+    """Build the table of scores and gaps on all tracks.
+
+    Entries with all runs of all tracks on the page come first, ranked by their mean scores.
+    """
+    by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
-        for rank, rating in enumerate(track_ratings):
-            gaps[rating.label, name] = rating.gap.estimate
-            ranks.setdefault(rating.label, []).append(rank)
-    rated = [label for label in labels if label in ranks]
+        for rating in track_ratings:
+            by_label[rating.label][name] = rating
+    scores = {}
+    for label, label_ratings in by_label.items():
+        is_complete = all(rating.is_complete for rating in label_ratings.values())
+        if is_complete and label_ratings.keys() == tracks.keys():
+            scores[label] = float(np.mean([rating.score for rating in label_ratings.values()]))
+    ranked = sorted(scores, key=lambda label: -scores[label])
+    not_ranked = [label for label in labels if label not in scores and by_label[label]]
     rows = []
-    for label in sorted(rated, key=lambda label: np.mean(ranks[label])):
-        cells = [format_number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks]
-        rows.append((label, *cells))
+    for rank, label in enumerate(ranked, start=1):
+        cells = _build_overview_cells(by_label[label], tracks)
+        rows.append((label, str(rank), f"{100.0 * scores[label]:.1f}", *cells))
+    for label in not_ranked:
+        cells = _build_overview_cells(by_label[label], tracks)
+        rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
-    return PageTable("Median gap to the best placement known, %", ("Controller", *headings), rows)
+    head = ("Controller", "Rank", "Score, %", "Runs", "Contacts", "At rest", *headings)
+    return PageTable("Scores, and median gaps to the best placement known in % by tracks", head, rows)
+
+
+def _build_overview_cells(
+    label_ratings: Mapping[str, Rating], tracks: Mapping[str, Sequence[Rating]]
+) -> list[str]:
+    """Return the number of runs, contacts, runs at rest, and the gap on each track that is complete."""
+    rows = [row for rating in label_ratings.values() for row in rating.rows]
+    run_count = sum(rating.run_count for rating in label_ratings.values())
+    suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)
+    contacts = sum(row["contacts"] > 0 for row in rows)
+    at_rest = sum(row["settled_at_s"] is not None for row in rows)
+    cells = [f"{run_count} of {suite_run_count}"]
+    cells += [f"{count / max(1, len(rows)):.0%}" for count in (contacts, at_rest)]
+    for name in tracks:
+        rating = label_ratings.get(name)
+        gap = np.nan
+        if rating is not None and rating.is_complete:
+            gap = 100.0 * rating.gap.estimate
+        cells.append(format_number(gap, ".1f"))
+    return cells
 
 
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
     """Build the variables of a track's section in the template."""
-    family_head, family_rows = ratings.build_family_rows(track_ratings)
-    rows = [ratings.build_rating_row(rating, entries.information[rating.label]) for rating in track_ratings]
+    ranked = [rating for rating in track_ratings if rating.is_complete]
+    family_head, family_rows = ratings.build_family_rows(ranked)
+    rows = [ratings.build_rating_row(rating, entries.information[rating.label]) for rating in ranked]
     return {
         "name": name,
         "title": suite.format_heading(name),
-        "summary": _summarize_track(name, track_ratings),
+        "summary": _summarize_track(name),
         "table": PageTable("Ratings", ratings.HEAD, rows, frozenset({1})),
         "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
-        "plots": _build_plots(name, track_ratings, entries),
+        "incomplete": _build_incomplete_table(track_ratings, entries),
+        "plots": _build_plots(name, ranked, entries),
     }
 
 
-def _summarize_track(name: str, track_ratings: Sequence[Rating]) -> str:
+def _summarize_track(name: str) -> str:
     track = suite.TRACKS[name]
-    run_count = len(track_ratings[0].rows) + track_ratings[0].failed
-    map_count = len({row["map"] for rating in track_ratings for row in rating.rows})
-    runs = f"{format_count(run_count, 'run')} on {format_count(map_count, 'map')}"
+    run_count = len(ratings.list_run_keys(name))
+    runs = f"{format_count(run_count, 'run')} on {format_count(len(track.maps), 'map')}"
     team = f"{format_count(track.robots, 'robot')}, {track.duration:g} s"
-    return f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries."
+    return f"{track.summary.capitalize()}; {team}. {runs}, the same for all ranked entries."
+
+
+def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
+    """Build the table of the entries that lack runs, next to the gaps of yardsticks over the same runs."""
+    yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
+    rows = []
+    for rating in track_ratings:
+        if rating.is_complete:
+            continue
+        keys = [ratings.get_run_key(row) for row in rating.rows]
+        gaps = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
+        cells = [format_number(100.0 * each.compute_median("gap"), ".1f") for each in gaps]
+        runs = f"{rating.run_count} of {len(ratings.list_run_keys(rating.track))}"
+        rows.append((rating.label, entries.information[rating.label], runs, *cells))
+    head = ("Controller", "Knows", "Runs", "Gap, %", *(f"{each.label}, %" for each in yardsticks))
+    caption = "Incomplete entries, not ranked: median gaps over their own runs"
+    return PageTable(caption, head, rows, frozenset({1}))
 
 
 def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
@@ -351,3 +419,21 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
     head = ("Controller", "Name", "Code", "Gains", "Made with")
     return PageTable("Entries", head, rows, frozenset({1, 2, 3, 4}))
+
+
+def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
+    """Build the table of the runs to look into: teams that never moved, or ended far above RAPF."""
+    rapf: Mapping[str, Any] = {"rows": []}
+    for result in results:
+        if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:
+            rapf = result
+    rows = []
+    for result, label in zip(results, labels, strict=True):
+        runs_by_reason: dict[str, list[str]] = {}
+        for anomaly in find_anomalies(result, rapf):
+            place = f"{anomaly.track}, {anomaly.map}, seed {anomaly.seed}"
+            runs_by_reason.setdefault(anomaly.reason, []).append(place)
+        for reason, runs in runs_by_reason.items():
+            rows.append((label, str(len(runs)), reason, runs[0]))
+    head = ("Controller", "Runs", "What happened", "First run")
+    return PageTable("Runs to look into", head, rows, frozenset({2, 3}))

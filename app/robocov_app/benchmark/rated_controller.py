@@ -1,7 +1,7 @@
 """The controller that the benchmark rates, and the runs that are selected for it."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -78,29 +78,50 @@ class RatedController:
         InputError
             If a map of the suite has changed.
         """
-        is_oracle = self.controller == ORACLE
-        name = self.controller
-        folder = Path()
-        if is_oracle:
-            name = _ORACLE_NAME
-            folder = Path(__file__).parent
-        # Check the controller first: building the maps takes seconds.
-        try:
-            make_controller(str(folder / name) if is_oracle else name, dict(self.gains))
-        except ParameterError as error:
-            raise ParameterError(f"--controller: {error}") from None
-        gains = {name: dict(self.gains)} if self.gains else {}
+        self._check_controller()
         for track, names, seeds in selection.list_runs():
             maps = []
             for map_name in names:
                 environment = suite.load_suite_map(map_name)
-                if is_oracle:
+                if self.controller == ORACLE:
                     environment = _add_placements(environment, track, map_name)
                 maps.append(StudyMap(map_name, environment))
-            yield (
-                track,
-                suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder),
-            )
+            yield track, self.build_study(track, maps, seeds)
+
+    def build_study(self, track: str, maps: Sequence[StudyMap], seeds: Sequence[int]) -> Study:
+        """Build the sweep of the controller on some maps, under the conditions of a track.
+
+        Parameters
+        ----------
+        track : str
+        maps : sequence of StudyMap
+            Any maps.
+        seeds : sequence of int
+
+        Returns
+        -------
+        Study
+        """
+        name, folder = self._locate()
+        gains = {name: dict(self.gains)} if self.gains else {}
+        return suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder)
+
+    def _locate(self) -> tuple[str, Path]:
+        """Return the name of the controller, and the folder that a relative path of its file starts from."""
+        if self.controller == ORACLE:
+            return _ORACLE_NAME, Path(__file__).parent
+        return self.controller, Path()
+
+    def _check_controller(self) -> None:
+        """Raise ParameterError if the controller or one of its gains is unknown or invalid.
+
+        It is checked before the maps are built, which takes seconds.
+        """
+        name, folder = self._locate()
+        try:
+            make_controller(str(folder / name) if self.controller == ORACLE else name, dict(self.gains))
+        except ParameterError as error:
+            raise ParameterError(f"--controller: {error}") from None
 
     def describe(self, study: Study) -> dict[str, Any]:
         """Describe the controller for a result.

@@ -185,6 +185,24 @@ def read_result(path: Path) -> dict[str, Any]:
     return result
 
 
+def check_gaps(result: Mapping[str, Any], path: Path) -> None:
+    """Raise InputError if the gaps of a result are not those of its costs.
+
+    Parameters
+    ----------
+    result : Mapping
+        As returned by `read_result`.
+    path : Path
+        Its file, for the message.
+    """
+    for k, row in enumerate(result["rows"]):
+        if "error" in row:
+            continue
+        for name, value in compute_gaps(row["track"], row["map"], row).items():
+            if row[name] != value:
+                raise InputError(f"{path}: rows[{k}]: {name}: expected {value} by its cost, got {row[name]}")
+
+
 _HEAD_TYPES = {"entry": dict, "selection": dict, "versions": dict, "rows": list, "method": list}
 _ENTRY_TYPES = {
     "controller": str,

@@ -29,6 +29,8 @@ ROBOT_RADIUS_M = 0.1
 TEAM_SIZE = 6
 _FIRST_SEED = 7001
 """Seed of the first map of a kind. The seeds of the tuning maps start at 1."""
+MIN_NEW_SEED = 1_000_000
+"""Minimum seed of maps that are not part of the suite."""
 _COST_RATE_HZ = 2.0
 _BUNDLED = (
     "blocks-a",

@@ -1,44 +1,239 @@
-"""Verifying a result of the benchmark: a sample of its runs is executed again."""
+"""Verifying a result of the benchmark: runs are repeated, robots are isolated, and new maps are tried.
 
-from collections.abc import Iterable, Iterator, Mapping
+All choices are made from a seed that the verifier draws, so that nobody can prepare for them.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.errors import InputError
-from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov.controllers.base import Information
+from robocov.errors import InputError, format_count
+from robocov.mapfile import to_json
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.guarded_runs import GuardedProcesses, ObservedRun, ReplayAnswer
+from robocov_app.benchmark.isolation import Decisions, build_replay, find_difference
+from robocov_app.benchmark.new_maps import (
+    MIN_P_VALUE,
+    TRACK,
+    NewMap,
+    NewMapComparison,
+    compare_gaps,
+    draw_new_maps,
+)
+from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
+from robocov_app.evaluation.reference_search import ReferenceQuery, answer_queries
 from robocov_app.sweep.ledger import describe_version_differences
-from robocov_app.sweep.local_pool import LocalPool
 from robocov_app.sweep.progress import SweepProgress, report_progress
-from robocov_app.sweep.study import Study
-from robocov_app.sweep.sweeping import execute_tasks
+from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
 
+MAX_SEED = 2**63 - 1
 RunKey: TypeAlias = tuple[str, str, int]
 """Track, map and seed of a run."""
+NEW_MAP = "new map"
+"""Stands for the track in the keys of runs on new maps."""
+CHANGED_FRACTION = 0.05
+"""The probability to miss changed rows is given for one row, and for this fraction of all rows."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run, and are not compared."""
+_DESCRIBED = ("label", "information", "gains")
+"""Parts of an entry that describe its controller."""
+_POLL_INTERVAL_S = 0.2
+"""Time between two checks for an interruption."""
+_SAMPLE_STREAM = 0
+_ROBOT_STREAM = 1
+_MAP_STREAM = 2
+
+
+@dataclass(frozen=True)
+class VerificationOptions:
+    """Extent of a verification.
+
+    Attributes
+    ----------
+    sample : int
+        Number of runs to repeat.
+    robots : int
+        Number of robots to isolate in each run.
+    new_maps : int
+        Number of maps to draw.
+    seed : int or None
+        Seed of all choices; by default it is drawn.
+    workers : int
+        Maximum number of processes at a time.
+    """
+
+    sample: int = 10
+    robots: int = 2
+    new_maps: int = 5
+    seed: int | None = None
+    workers: int = 1
+
+
+@dataclass(frozen=True)
+class RunCheck:
+    """A repeated run, and what its robots do without the knowledge of others.
+
+    Attributes
+    ----------
+    outcome : Outcome or None
+        None if its process ended.
+    robots : int
+        Number of isolated robots, or of teams in processes of their own.
+    differences : list of str
+        Everything that is not as it should be, apart from the figures of the run.
+    """
+
+    outcome: Outcome | None
+    robots: int
+    differences: list[str]
+
+
+@dataclass
+class Verification:
+    """What a verification found.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of all choices, with which the verification can be repeated.
+    rows : int
+        Number of rows of the result.
+    runs : int
+        Number of runs of the suite that were repeated.
+    robots : int
+        Number of robots whose decisions were repeated in processes of their own.
+    teams : int
+        Number of runs in which a process received the observations of the whole team instead.
+    new_maps : int
+        Number of new maps that were tried.
+    comparison : NewMapComparison or None
+        Comparison of new maps with the suite.
+    differences : list of str
+        Everything that is not as it should be.
+    """
+
+    seed: int
+    rows: int
+    runs: int = 0
+    robots: int = 0
+    teams: int = 0
+    new_maps: int = 0
+    comparison: NewMapComparison | None = None
+    differences: list[str] = field(default_factory=list)
+
+    def count(self, check: RunCheck, *, is_new: bool, is_joint: bool) -> None:
+        """Count a checked run and its robots.
+
+        Parameters
+        ----------
+        check : RunCheck
+        is_new : bool
+            Whether the run was on a new map.
+        is_joint : bool
+            Whether a process received the observations of the whole team.
+        """
+        if is_new:
+            self.new_maps += 1
+        else:
+            self.runs += 1
+        if is_joint:
+            self.teams += check.robots
+        else:
+            self.robots += check.robots
+
+    def compute_miss_probability(self, changed: int) -> float:
+        """Compute the probability that none of the changed rows was among the repeated runs.
+
+        Parameters
+        ----------
+        changed : int
+            Number of changed rows.
+
+        Examples
+        --------
+        >>> Verification(seed=0, rows=400, runs=4).compute_miss_probability(1)
+        0.99
+        """
+        if changed + self.runs > self.rows:
+            return 0.0
+        return math.comb(self.rows - changed, self.runs) / math.comb(self.rows, self.runs)
+
+    def describe(self) -> list[str]:
+        """Return what was checked, in sentences."""
+        lines = [
+            f"{self.runs} of {format_count(self.rows, 'run')} repeated. {self._describe_missing()}",
+            *self._describe_isolation(),
+        ]
+        if self.comparison is not None:
+            lines.append(self._describe_new_maps(self.comparison))
+        lines.append(f"All choices are by --seed {self.seed}.")
+        return lines
+
+    def _describe_missing(self) -> str:
+        """Return the probabilities to miss changed rows as text."""
+        many = max(1, round(CHANGED_FRACTION * self.rows))
+        one_missed = self.compute_miss_probability(1)
+        text = f"One changed row passes with a probability of {one_missed:.1%}"
+        if many > 1:
+            text += f", {many} of them with {self.compute_miss_probability(many):.1%}"
+        return f"{text}."
+
+    def _describe_isolation(self) -> Iterator[str]:
+        """Yield which robots were isolated."""
+        if self.robots:
+            robots = format_count(self.robots, "robot")
+            yield f"{robots} repeated in processes that receive only the observations of one robot."
+        if self.teams:
+            teams = format_count(self.teams, "team")
+            yield (
+                f"{teams} repeated in processes that receive the observations of all robots, because the "
+                "robots share maps or decide together: limits of communication are not checked."
+            )
+
+    def _describe_new_maps(self, comparison: NewMapComparison) -> str:
+        """Return the comparison with new maps as a sentence."""
+        text = (
+            f"{format_count(self.new_maps, 'new map')}: median gap {comparison.new_gap:.1%}, on the maps of "
+            f"the same families in the suite {comparison.suite_gap:.1%}, p = {comparison.p_value:.2g}"
+        )
+        if comparison.min_p_value >= MIN_P_VALUE:
+            text += " (too few runs in the result to show a difference)"
+        return f"{text}."
 
 
 def verify_result(
     path: Path,
     *,
     controller: str | None = None,
-    sample: int = 5,
-    seed: int = 0,
-    workers: int = 1,
+    options: VerificationOptions | None = None,
     quiet: bool = False,
     stop: Interruption,
-) -> tuple[int, list[str]]:
-    """Verify a result by executing some of its runs again.
+) -> Verification:
+    """Verify a result.
 
-    The gaps of all rows are recomputed as well, and missing rows are found. No code that a result refers to
-    is executed: the controller of a user has to be named, and its source code must have the digest of the
-    result.
+    1. The gaps of all rows are recomputed, and missing rows are found.
+    2. A sample of the runs is repeated, and must give the same figures, bit for bit.
+    3. In these runs, the decisions of some robots are repeated in processes of their own, which receive only
+       the observations of one robot (`robocov_app.benchmark.isolation`).
+    4. The controller runs on new maps; it must not be clearly worse there than on the maps of the suite
+       (`robocov_app.benchmark.new_maps`).
+
+    No code that a result refers to is executed: the controller of a user has to be named, and its source code
+    must have the digest of the result.
 
     Parameters
     ----------
@@ -46,37 +241,101 @@ def verify_result(
         A result, or a folder that contains one.
     controller : str, optional
         The controller as ``FILE.py:CLASS``, if it is a user's.
-    sample : int
-        Number of runs to execute.
-    seed : int
-        Seed of the sample.
-    workers : int
-        Maximum number of processes.
+    options : VerificationOptions, optional
     quiet : bool
         Show no progress.
     stop : Interruption
 
     Returns
     -------
-    tuple of int and list of str
-        Number of executed runs, and all differences.
+    Verification
 
     Raises
     ------
     InputError
         If the result cannot be read, or the controller is not the one that was rated.
+    OutputError
+        If a process of the verification fails.
     """
+    options = options or VerificationOptions()
+    seed = secrets.randbelow(MAX_SEED) if options.seed is None else options.seed
     result = read_result(path)
-    studies = _build_studies(result, path, controller)
+    rated = _find_controller(result, path, controller)
+    studies = dict(rated.build_studies(_get_selection(result)))
+    description = _describe_controller(rated, studies, result, path)
     tasks = _index_tasks(studies)
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
-    differences = list(_compare_without_running(result, rows, tasks))
-    sampled = _sample_runs(rows.keys() & tasks.keys(), sample, seed)
-    progress = SweepProgress(len(sampled))
-    differences += _repeat_runs(
-        {key: tasks[key] for key in sampled}, rows, progress, workers=workers, quiet=quiet, stop=stop
+    verification = Verification(seed, rows=len(rows))
+    verification.differences += _compare_descriptions(result["entry"], description)
+    verification.differences += _compare_without_running(result, rows, tasks)
+
+    sampled = _sample_runs(
+        rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
     )
-    return progress.finished, list(dict.fromkeys(differences))
+    new_maps = _draw_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
+    new_tasks = _index_new_tasks(rated, new_maps)
+    checker = _RunChecker(
+        information=description["information"],
+        is_joint=rated.controller == ORACLE or description["information"] == "shared map",
+        robots=options.robots,
+        seed=seed,
+    )
+    chosen_tasks = {key: tasks[key] for key in sampled} | new_tasks
+    new_outcomes: dict[RunKey, Outcome | None] = {}
+    progress = SweepProgress(len(chosen_tasks))
+    with report_progress("verify", progress, quiet=quiet) as reporter:
+        for key, check in _check_runs(checker, chosen_tasks, options.workers, stop):
+            verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
+            verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
+            if key in new_tasks:
+                new_outcomes[key] = check.outcome
+            progress.done += 1
+            reporter.update(progress)
+    if new_outcomes and not stop.requested:
+        gaps = _compute_new_gaps(new_maps, new_outcomes, options.workers, stop)
+        verification.comparison = compare_gaps(result["rows"], gaps)
+        verification.differences += _describe_comparison(verification.comparison)
+    verification.differences = list(dict.fromkeys(verification.differences))
+    return verification
+
+
+def _create_generator(seed: int, *stream: int) -> np.random.Generator:
+    return np.random.default_rng([seed, *stream])
+
+
+def _find_controller(result: Mapping[str, Any], path: Path, controller: str | None) -> RatedController:
+    """Return the controller of a result; raise InputError if it is a user's and was not named."""
+    entry = result["entry"]
+    name = controller or entry["controller"]
+    if entry["source_sha256"] and controller is None:
+        raise InputError(f"{path}: its controller {name} is a file; pass --controller FILE.py:CLASS")
+    return RatedController(name, entry["set"])
+
+
+def _get_selection(result: Mapping[str, Any]) -> Selection:
+    selected = result["selection"]
+    return Selection(selected["quick"], tuple(selected["tracks"]), tuple(selected["maps"]))
+
+
+def _describe_controller(
+    rated: RatedController, studies: Mapping[str, Study], result: Mapping[str, Any], path: Path
+) -> dict[str, Any]:
+    """Return the description of a controller, after checking that it is the rated one."""
+    description = rated.describe(next(iter(studies.values())))
+    if description["source_sha256"] != result["entry"]["source_sha256"]:
+        raise InputError(
+            f"{path}: --controller: {rated.controller} is not the source that was rated: its digest differs"
+        )
+    return description
+
+
+def _compare_descriptions(entry: Mapping[str, Any], description: Mapping[str, Any]) -> list[str]:
+    """List the differences between the entry of a result and its controller."""
+    return [
+        f"entry: {name}: expected {description[name]}, got {entry[name]}"
+        for name in _DESCRIBED
+        if entry[name] != description[name]
+    ]
 
 
 def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
@@ -88,48 +347,155 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
     return tasks
 
 
-def _repeat_runs(
-    tasks: Mapping[RunKey, Task],
-    rows: Mapping[RunKey, Row],
-    progress: SweepProgress,
-    *,
-    workers: int,
-    quiet: bool,
-    stop: Interruption,
-) -> list[str]:
-    """Execute tasks again, and list the differences from their rows."""
-    differences: list[str] = []
-    keys_by_name = {task.name: key for key, task in tasks.items()}
+def _draw_maps(
+    rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
+) -> list[NewMap]:
+    """Draw new maps of the families of a result. The oracle knows no best placement for them."""
+    if rated.controller == ORACLE or TRACK not in studies:
+        return []
+    families = dict.fromkeys(suite.FAMILY_OF[study_map.name] for study_map in studies[TRACK].maps)
+    return draw_new_maps(list(families), count, rng)
 
-    def compare(task: Task, outcome: Outcome) -> None:
-        key = keys_by_name[task.name]
-        track = key[0]
-        row = build_row(track, task, outcome, outcome.files.get(EFFORT_FILE, b"{}"))
-        differences.extend(_list_differences(key, rows[key], row))
 
-    def open_pool() -> LocalPool:
-        return LocalPool(min(workers, len(tasks)))
+def _index_new_tasks(rated: RatedController, new_maps: Sequence[NewMap]) -> dict[RunKey, Task]:
+    """Return the tasks of the runs on new maps."""
+    tasks = {}
+    for new_map in new_maps:
+        study = rated.build_study(TRACK, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed])
+        tasks[NEW_MAP, new_map.name, new_map.start_seed] = next(iter(generate_tasks(study)))
+    return tasks
 
-    with report_progress("verify", progress, quiet=quiet) as reporter:
-        for _ in execute_tasks(tasks.values(), open_pool, progress, stop, compare):
-            reporter.update(progress)
+
+class _RunChecker:
+    """Repeats runs, and isolates some of their robots.
+
+    Parameters
+    ----------
+    information : Information
+        The information that the controller declares.
+    is_joint : bool
+        Whether robots are not isolated.
+    robots : int
+        Number of robots that are isolated in each run.
+    seed : int
+        Seed of the choice of robots.
+    """
+
+    def __init__(self, information: Information, *, is_joint: bool, robots: int, seed: int) -> None:
+        self.is_joint = is_joint
+        self.processes = GuardedProcesses()
+        self._information = information
+        self._robots = robots
+        self._seed = seed
+
+    def check(self, key: RunKey, task: Task) -> tuple[RunKey, RunCheck]:
+        """Repeat a run and isolate its robots; return its key and the check. Called in threads."""
+        run = self.processes.ask(task)
+        if not isinstance(run, ObservedRun):
+            return key, RunCheck(None, 0, ["its process ended"])
+        differences = [f"its controller tried {violation}" for violation in run.violations]
+        if run.outcome.error is not None:
+            return key, RunCheck(run.outcome, 0, differences)
+        robots = self._choose_robots(task)
+        for robot in robots:
+            differences += self._isolate(task, run, robot)
+        return key, RunCheck(run.outcome, len(robots), differences)
+
+    def _choose_robots(self, task: Task) -> list[int | None]:
+        """Return the numbers of the robots to isolate; None stands for the whole team."""
+        if not self._robots:
+            return []
+        if self.is_joint:
+            return [None]
+        rng = self._create_generator(task)
+        return sorted(rng.permutation(task.robots)[: self._robots].tolist())
+
+    def _create_generator(self, task: Task) -> np.random.Generator:
+        return _create_generator(self._seed, _ROBOT_STREAM, int(task.digest[:12], 16))
+
+    def _isolate(self, task: Task, run: ObservedRun, robot: int | None) -> list[str]:
+        """Repeat the decisions of a robot, and list the differences."""
+        replay = build_replay(task, run.transcript, self._information, robot, self._create_generator(task))
+        answer = self.processes.ask(replay)
+        if not isinstance(answer, ReplayAnswer):
+            answer = ReplayAnswer(Decisions(), [])
+        differences = [f"its controller tried {violation}" for violation in answer.violations]
+        difference = find_difference(run.transcript, replay, answer.decisions)
+        if difference is not None:
+            differences.append(difference)
+        return differences
+
+
+def _check_runs(
+    checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, stop: Interruption
+) -> Iterator[tuple[RunKey, RunCheck]]:
+    """Yield the checks of runs as they are finished, until all are there or `stop` is requested."""
+    if not tasks:
+        return
+    pool = ThreadPoolExecutor(min(workers, len(tasks)))
+    try:
+        pending = {pool.submit(checker.check, key, task) for key, task in tasks.items()}
+        while pending and not stop.requested:
+            done, pending = wait(pending, timeout=_POLL_INTERVAL_S, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        checker.processes.kill()
+        pool.shutdown()
+
+
+def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
+    """List the differences of a run: to its row, and those of its robots."""
+    differences = [f"{_format_key(key)}: {difference}" for difference in check.differences]
+    if row is not None and check.outcome is not None:
+        effort = check.outcome.files.get(EFFORT_FILE, b"{}")
+        differences += _list_differences(key, row, build_row(key[0], task, check.outcome, effort))
     return differences
 
 
-def _build_studies(result: Mapping[str, Any], path: Path, controller: str | None) -> dict[str, Study]:
-    """Return the sweeps of a result by track, after checking that the controller is the rated one."""
-    entry = result["entry"]
-    name = controller or entry["controller"]
-    if entry["source_sha256"] and controller is None:
-        raise InputError(f"{path}: its controller {name} is a file; pass --controller FILE.py:CLASS")
-    selected = result["selection"]
-    selection = Selection(selected["quick"], tuple(selected["tracks"]), tuple(selected["maps"]))
-    rated = RatedController(name, entry["set"])
-    studies = dict(rated.build_studies(selection))
-    any_study = next(iter(studies.values()))
-    if rated.describe(any_study)["source_sha256"] != entry["source_sha256"]:
-        raise InputError(f"{path}: --controller: {name} is not the source that was rated: its digest differs")
-    return studies
+def _compute_new_gaps(
+    new_maps: Sequence[NewMap],
+    outcomes: Mapping[RunKey, Outcome | None],
+    workers: int,
+    stop: Interruption,
+) -> list[tuple[str, float]]:
+    """Search the best placements for new maps; return the family and the gap of each run."""
+    robots = suite.TRACKS[TRACK].survivors
+    queries = {
+        new_map.name: ReferenceQuery(
+            to_json(new_map.environment),
+            robots,
+            radius=suite.ROBOT_RADIUS_M,
+            lattice=suite.LATTICE,
+            restarts=RESTARTS,
+        )
+        for new_map in new_maps
+    }
+    references = dict(answer_queries(queries, workers, stop))
+    gaps = []
+    for new_map in new_maps:
+        outcome = outcomes.get((NEW_MAP, new_map.name, new_map.start_seed))
+        reference = references.get(new_map.name)
+        if reference is None:
+            continue
+        gap = math.inf
+        if outcome is not None and outcome.error is None and not outcome.figures["uncovered_area_m2"]:
+            cost = outcome.figures["mean_distance_m"]
+            assert cost is not None
+            gap = cost / reference.mean_distance - 1.0
+        gaps.append((new_map.family, gap))
+    return gaps
+
+
+def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
+    """Return a difference if a controller is clearly worse on new maps."""
+    if comparison is None or not comparison.is_worse:
+        return []
+    return [
+        f"new maps: median gap {comparison.new_gap:.1%} instead of {comparison.suite_gap:.1%} "
+        f"(p = {comparison.p_value:.2g}): the controller or its gains are fitted to the maps of the suite"
+    ]
 
 
 def _compare_without_running(
@@ -139,6 +505,8 @@ def _compare_without_running(
     versions = describe_version_differences(result["versions"])
     if versions:
         yield f"made with {versions}"
+    if len(rows) < len(result["rows"]):
+        yield f"{format_count(len(result['rows']) - len(rows), 'row')} of runs that have another row"
     for key in tasks:
         if key not in rows:
             yield f"{_format_key(key)}: missing row"
@@ -150,10 +518,10 @@ def _compare_without_running(
             yield from _list_differences(key, row, compute_gaps(row["track"], row["map"], row))
 
 
-def _sample_runs(keys: Iterable[RunKey], sample: int, seed: int) -> list[RunKey]:
+def _sample_runs(keys: Iterable[RunKey], sample: int, rng: np.random.Generator) -> list[RunKey]:
     """Return a random sample of runs in their sorted order."""
     ordered = sorted(keys)
-    chosen = np.random.default_rng(seed).permutation(len(ordered))[:sample].tolist()
+    chosen = rng.permutation(len(ordered))[:sample].tolist()
     return [ordered[k] for k in sorted(chosen)]
 
 

@@ -17,7 +17,7 @@ FAILED = 1
 _OPTIONS_BY_ACTION = {
     "run": ("controller", "set", "track", "maps", "quick", "out", "workers", "scheduler"),
     "suite": (),
-    "verify": ("paths", "controller", "sample", "seed", "workers"),
+    "verify": ("paths", "controller", "sample", "robots", "new_maps", "seed", "workers"),
     "page": ("paths", "alone", "out", "title"),
     "references": ("out", "workers"),
 }
@@ -29,7 +29,8 @@ class Arguments(JsonOption):
     """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best placements known.
 
     `robocov benchmark --controller NAME --out DIR` executes the runs, and resumes after any interruption;
-    DIR/result.json is small, and `robocov benchmark verify DIR` repeats a sample of its runs, bit for bit.
+    DIR/result.json is small. `robocov benchmark verify DIR` repeats a sample of its runs, bit for bit, calls
+    the controller for single robots in processes of their own, and runs it on new maps.
     `robocov benchmark page DIR ... --out FILE.html` compares results with those of the built-in controllers,
     which the package contains; without DIR it shows these alone. `suite` lists tracks and families;
     `references` computes missing best placements of the suite. The controller `oracle` knows them.
@@ -60,10 +61,14 @@ class Arguments(JsonOption):
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
     """Address of a Dask scheduler whose workers do the runs."""
-    sample: int = 5
+    sample: int = 10
     """Number of runs to repeat."""
-    seed: int = 0
-    """Seed of the sample."""
+    robots: int = 2
+    """Number of robots to isolate in each of these runs."""
+    new_maps: int = 5
+    """Number of new maps to run the controller on, at most one of each family."""
+    seed: int | None = None
+    """Seed of the sample, the robots and the new maps; by default a new one is drawn."""
     alone: bool = False
     """Leave the built-in controllers out of the page."""
     title: str = "Benchmark of coverage controllers"
@@ -73,7 +78,10 @@ class Arguments(JsonOption):
         if self.workers is not None:
             require_number("--workers", self.workers, 1, 1024, whole=True)
         require_number("--sample", self.sample, 0, 1_000_000, whole=True)
-        require_number("--seed", self.seed, 0, 2**63 - 1, whole=True)
+        require_number("--robots", self.robots, 0, 1_000_000, whole=True)
+        require_number("--new-maps", self.new_maps, 0, 1_000_000, whole=True)
+        if self.seed is not None:
+            require_number("--seed", self.seed, 0, 2**63 - 1, whole=True)
         self._check_applicable_options()
         if self.action == "run" and self.controller is None:
             raise ParameterError("--controller: expected the name of one, or FILE.py:CLASS, got none")
@@ -86,7 +94,7 @@ class Arguments(JsonOption):
                 default = type(self).__dataclass_fields__[name].default
                 is_given = getattr(self, name) != default
                 if is_given and name not in _OPTIONS_BY_ACTION[self.action]:
-                    option = "DIR" if name == "paths" else f"--{name}"
+                    option = "DIR" if name == "paths" else f"--{name.replace('_', '-')}"
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
 
     def _check_paths(self) -> None:
@@ -172,28 +180,42 @@ def _print_suite(options: Arguments) -> int:
 
 
 def _verify(options: Arguments) -> int:
-    """Repeat some runs of a result, and print the differences."""
-    from robocov_app.benchmark.verification import verify_result
+    """Verify a result, and print the differences."""
+    from robocov_app.benchmark.verification import VerificationOptions, verify_result
     from robocov_app.sweep.local_pool import count_processors
 
     path = options.paths[0]
+    extent = VerificationOptions(
+        sample=options.sample,
+        robots=options.robots,
+        new_maps=options.new_maps,
+        seed=options.seed,
+        workers=options.workers or count_processors(),
+    )
     with Interruption() as interruption:
-        count, differences = verify_result(
-            path,
-            controller=options.controller,
-            sample=options.sample,
-            seed=options.seed,
-            workers=options.workers or count_processors(),
-            stop=interruption,
-            quiet=options.json,
+        verification = verify_result(
+            path, controller=options.controller, options=extent, stop=interruption, quiet=options.json
         )
         if interruption.requested:
             return INTERRUPTED
-    verdict = "identical, bit for bit"
+    differences = verification.differences
+    verdict = "Verified: no difference."
     if differences:
-        verdict = format_count(len(differences), "difference")
-    answer = {"path": str(path), "runs": count, "differences": differences}
-    print_answer(options, answer, *differences, f"{format_count(count, 'run')} repeated: {verdict}")
+        verdict = f"Not verified: {format_count(len(differences), 'difference')}."
+    comparison = verification.comparison
+    answer = {
+        "path": str(path),
+        "seed": verification.seed,
+        "runs": verification.runs,
+        "rows": verification.rows,
+        "probability_to_miss_one_row": verification.compute_miss_probability(1),
+        "robots": verification.robots,
+        "teams": verification.teams,
+        "new_maps": verification.new_maps,
+        "new_maps_p_value": None if comparison is None else comparison.p_value,
+        "differences": differences,
+    }
+    print_answer(options, answer, *differences, *verification.describe(), verdict)
     return FAILED if differences else 0
 
 
@@ -201,12 +223,14 @@ def _write_page(options: Arguments) -> int:
     """Write the page that compares results."""
     from robocov.files.writing import replace_file
     from robocov_app.benchmark.page import build_page
-    from robocov_app.benchmark.results import load_bundled_results, read_result
+    from robocov_app.benchmark.results import check_gaps, load_bundled_results, read_result
     from robocov_app.commands.report import check_target
 
     target = options.out or Path("benchmark.html")
     check_target(target, overwrite=False)
     results = [read_result(path) for path in options.paths]
+    for path, result in zip(options.paths, results, strict=True):
+        check_gaps(result, path)
     if not options.alone:
         results += load_bundled_results(results)
     data = build_page(results, options.title).encode("utf-8", "replace")

@@ -6,10 +6,10 @@ import gc
 import io
 import threading
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from robocov.errors import RobocovError
 from robocov.files.result_names import COST_FILE, ERROR_FILE, RECORD_FILE, RUN_FILE
 from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.metrics.run_metrics import compute_final_metrics
+from robocov.observation import Snapshot
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
@@ -54,6 +55,8 @@ CELL_BYTES = 5
 """Size of a cell of a map with its number."""
 REPORT_BYTES = 28
 """Size of the position of a robot at some time."""
+Watch: TypeAlias = Callable[[Snapshot], object]
+"""Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
 _RESULTS_VERSION = 4
 """Increased whenever the same inputs give other results. 4: noise and message loss are drawn with NumPy."""
@@ -90,12 +93,14 @@ class Outcome:
     versions: Mapping[str, str] = field(default_factory=list_result_versions)
 
 
-def perform(task: Task) -> Outcome:
+def perform(task: Task, watch: Watch | None = None) -> Outcome:
     """Execute a task. Any error of the run is part of the outcome.
 
     Parameters
     ----------
     task : Task
+    watch : callable or None
+        Called with the snapshot of each step.
 
     Returns
     -------
@@ -107,7 +112,7 @@ def perform(task: Task) -> Outcome:
         was_enabled = gc.isenabled()
         gc.disable()
         try:
-            return _perform(task)
+            return _perform(task, watch)
         except BaseException as error:  # A controller of the user may raise anything.
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return build_failure(message, traceback.format_exc())
@@ -118,10 +123,10 @@ def perform(task: Task) -> Outcome:
                 gc.enable()
 
 
-def _perform(task: Task) -> Outcome:
+def _perform(task: Task, watch: Watch | None) -> Outcome:
     """Simulate and evaluate a run, and build its files."""
     cost = prepare_cost(task)
-    record, effort = _simulate_and_measure(task)
+    record, effort = _simulate_and_measure(task, watch)
     history = compute_cost_history(record, cost, task.cost_hz)
     # Figures are computed from all steps, of which the saved record contains only some.
     summary = replace_non_finite(summarize(record, history))
@@ -201,7 +206,7 @@ def simulate(task: Task) -> Record:
     return record
 
 
-def _simulate_and_measure(task: Task) -> tuple[Record, dict[str, float | None]]:
+def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Record, dict[str, float | None]]:
     """Simulate a run; return its record, and the content of ``effort.json``."""
     scenario = task.build_scenario()
     with provide_modules({} if task.source is None else task.source.modules):
@@ -213,6 +218,8 @@ def _simulate_and_measure(task: Task) -> tuple[Record, dict[str, float | None]]:
                 gc.collect(0)
             if step and task.metrics:
                 meter.count()
+            if watch is not None:
+                watch(simulation.observe_and_decide())
             return False
 
         record = scenario.run(simulation, should_stop=measure_step)

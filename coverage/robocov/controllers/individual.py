@@ -1,6 +1,6 @@
 """Controllers of a single robot, and the adapter that calls them for each robot of a team."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Protocol, runtime_checkable
@@ -209,7 +209,12 @@ class IndividualControllerAdapter:
             return IndividualMemories([None] * len(team))
         return IndividualMemories([begin(number, team) for number in range(len(team))])
 
-    def decide(self, seen: Observations, memory: IndividualMemories | None) -> Decision:
+    def decide(
+        self,
+        seen: Observations,
+        memory: IndividualMemories | None,
+        robots: Iterable[int] | None = None,
+    ) -> Decision:
         """Call the individual controller for each robot.
 
         Parameters
@@ -217,6 +222,8 @@ class IndividualControllerAdapter:
         seen : Observations
         memory : IndividualMemories or None
             None if the robots remember nothing.
+        robots : iterable of int or None
+            Numbers of the robots for which it is called; by default all. The forces of the others are 0.
 
         Returns
         -------
@@ -237,14 +244,14 @@ class IndividualControllerAdapter:
             reported_positions=seen.reported_positions,
             density=seen.density,
         )
-        forces = np.empty_like(seen.positions)
-        memories = []
-        messages = []
-        for robot in range(len(forces)):
-            own = _build_view(seen, cells, robot, memory.by_robot[robot])
+        forces = np.zeros_like(seen.positions)
+        memories = list(memory.by_robot)
+        messages: list[Sequence[Message]] = [()] * len(forces)
+        for robot in range(len(forces)) if robots is None else robots:
+            own = _build_view(seen, cells, robot, memories[robot])
             forces[robot] = self._call_controller(own)
-            memories.append(own.memory)
-            messages.append(own.sent_messages)
+            memories[robot] = own.memory
+            messages[robot] = own.sent_messages
         return Decision(
             forces=forces,
             goals=cells.centroid,

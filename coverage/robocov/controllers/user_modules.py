@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
 
-_MODULE_PREFIX = "robocov_user_"
+MODULE_PREFIX = "robocov_user_"
 """Prefix of the names of modules that are loaded from users' files."""
 _LIBRARY_FOLDER = str(Path(__file__).parents[1])
 _PACKAGE_FOLDERS = frozenset(("site-packages", "dist-packages"))
@@ -122,7 +122,7 @@ def _list_calls(error: BaseException) -> list[_Call]:
 
 
 def _is_in_user_file(call: _Call) -> bool:
-    return call.module.startswith(_MODULE_PREFIX)
+    return call.module.startswith(MODULE_PREFIX)
 
 
 def load_class(name: str, source: ControllerSource | None) -> type[Any]:
@@ -185,7 +185,7 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
     if not modules:
         _add_import_folder(Path(path).parent)
     # Each file gets its own name, so two files called mine.py do not replace each other.
-    module_name = f"{_MODULE_PREFIX}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
+    module_name = f"{MODULE_PREFIX}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

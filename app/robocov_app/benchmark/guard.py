@@ -1,0 +1,121 @@
+"""Watching the code of a user's controller for channels that no robot has: files, connections, processes.
+
+The guard is a tripwire for mistakes and plain cheating, not a sandbox: only verify controllers that you would
+also run. It uses the audit events of Python. An action counts if a function of the controller's own modules
+is its cause, except for what happens inside a compiler, or while an installed package is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from robocov.controllers.user_modules import MODULE_PREFIX
+
+_COMPILERS = frozenset(("numba", "llvmlite"))
+"""Packages that may write files and load libraries while they compile a function of the controller."""
+_IMPORT_MODULE = "importlib._bootstrap"
+"""Module of Python that executes imports."""
+_DATA_FOLDER = str(Path(__file__).parent)
+"""Folder of the suite's references and of the bundled results, which a controller must not read."""
+_MAX_VIOLATIONS = 20
+_FORBIDDEN_PREFIXES = (
+    "ctypes.dlopen",
+    "mmap.",
+    "os.exec",
+    "os.fork",
+    "os.link",
+    "os.mkdir",
+    "os.posix_spawn",
+    "os.remove",
+    "os.rename",
+    "os.rmdir",
+    "os.spawn",
+    "os.symlink",
+    "os.system",
+    "os.truncate",
+    "os.utime",
+    "shutil.",
+    "socket.",
+    "sqlite3.",
+    "subprocess.",
+    "_thread.start_new_thread",
+    "_posixsubprocess.",
+)
+"""Beginnings of the names of audit events that a controller must not cause."""
+_WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+class Guard:
+    """Forbids the modules of a controller to use channels that no robot has.
+
+    Parameters
+    ----------
+    modules : collection of str
+        Names of the controller's own modules and packages. Files of the user are always included.
+
+    Attributes
+    ----------
+    violations : list of str
+        What the controller tried, each only once.
+    """
+
+    def __init__(self, modules: Collection[str] = ()) -> None:
+        self.violations: list[str] = []
+        self._modules = frozenset(modules)
+
+    def install(self) -> None:
+        """Start to watch this process. A hook cannot be removed again."""
+        # Compiled modules of the user are not written to disk.
+        sys.dont_write_bytecode = True
+        sys.addaudithook(self._audit)
+
+    def _audit(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Receive an audit event; raise PermissionError if a controller must not cause it."""
+        action = _describe_action(event, arguments)
+        if action is None or not self._is_caused_by_controller(sys._getframe(1)):
+            return
+        if action not in self.violations and len(self.violations) < _MAX_VIOLATIONS:
+            self.violations.append(action)
+        raise PermissionError(f"a controller must not do this: {action}")
+
+    def _is_caused_by_controller(self, frame: FrameType | None) -> bool:
+        """Return whether a function of the controller is the cause of what a frame does."""
+        while frame is not None:
+            module = str(frame.f_globals.get("__name__", ""))
+            package = module.partition(".")[0]
+            if package in _COMPILERS or module == _IMPORT_MODULE:
+                return False
+            if module.startswith(MODULE_PREFIX) or module in self._modules or package in self._modules:
+                return True
+            frame = frame.f_back
+        return False
+
+
+def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
+    """Return what an audit event is about, None if a controller may cause it."""
+    if event == "open":
+        return _describe_opening(*arguments[:3])
+    if event.startswith(_FORBIDDEN_PREFIXES):
+        detail = next((str(value) for value in arguments if isinstance(value, str | bytes | Path)), "")
+        return f"{event} {detail}".strip()
+    return None
+
+
+def _describe_opening(path: Any, mode: Any, flags: Any) -> str | None:
+    """Return a description of opening a file, None if a controller may open it."""
+    if isinstance(path, int):
+        return None
+    name = os.path.realpath(os.fsdecode(path))
+    writes = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
+    if isinstance(mode, str):
+        writes = writes or any(letter in mode for letter in "wax+")
+    if writes:
+        return f"writing {name}"
+    if name.startswith(_DATA_FOLDER) and not name.endswith((".py", ".pyc")):
+        return f"reading {name}"
+    return None

@@ -1,0 +1,182 @@
+"""Runs and replays in guarded processes: the service, and the program that asks it."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from robocov.controllers import inform_controller, make_controller
+from robocov.controllers.individual import IndividualControllerAdapter
+from robocov.controllers.registry import load_controller_class
+from robocov.controllers.user_modules import explain_fault, provide_modules
+from robocov.errors import OutputError, RobocovError
+from robocov_app.benchmark.guard import Guard
+from robocov_app.benchmark.isolation import Decisions, Replay, Transcript
+from robocov_app.jobs.messages import READY, Channel, receive
+from robocov_app.jobs.processes import ask_process, end_process, start_process
+from robocov_app.sweep.tasks import Task
+from robocov_app.sweep.worker import EFFORT_FILE, Outcome, perform
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedRun:
+    """A run that was repeated in a guarded process.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    transcript : Transcript
+    violations : list of str
+        What its controller tried although no robot can do it.
+    """
+
+    outcome: Outcome
+    transcript: Transcript
+    violations: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayAnswer:
+    """The answer to a replay.
+
+    Attributes
+    ----------
+    decisions : Decisions
+    violations : list of str
+        What the controller tried although no robot can do it.
+    """
+
+    decisions: Decisions
+    violations: list[str]
+
+
+Answer: TypeAlias = ObservedRun | ReplayAnswer | None
+"""The answer of a guarded process; None if it ended before."""
+
+
+class GuardedService:
+    """Service of a process that repeats one run, or one replay, under a guard."""
+
+    failure_message = "the verification failed"
+
+    def __call__(self, questions: list[Task | Replay], channel: Channel) -> ObservedRun | ReplayAnswer:
+        """Execute a task and observe it, or call the controller for the observations of a replay."""
+        question = questions[-1]
+        task = question if isinstance(question, Task) else question.task
+        guard = Guard(_list_modules(task))
+        guard.install()
+        if isinstance(question, Task):
+            transcript = Transcript()
+            # The results have the same figures without the files of the run.
+            outcome = perform(question, transcript.add)
+            return ObservedRun(replace(outcome, files=_select_files(outcome)), transcript, guard.violations)
+        decisions = _decide_again(question)
+        return ReplayAnswer(decisions, guard.violations)
+
+
+def _list_modules(task: Task) -> set[str]:
+    """Return the names of the modules that belong to a controller outside robocov."""
+    if task.source is not None:
+        return set(task.source.modules)
+    package = load_controller_class(task.controller).__module__.partition(".")[0]
+    return {package} - {"robocov", "robocov_app"}
+
+
+def _select_files(outcome: Outcome) -> dict[str, bytes]:
+    """Return the files of a run that the row of a result is made from."""
+    return {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
+
+
+def _decide_again(replay: Replay) -> Decisions:
+    """Call the controller of a replay for each of its observations."""
+    task = replay.task
+    decisions = Decisions()
+    with provide_modules({} if task.source is None else task.source.modules):
+        try:
+            for decision in _generate_decisions(replay):
+                decisions.forces.append(np.asarray(decision.forces, dtype=np.float64).copy())
+                goals = decision.goals
+                decisions.goals.append(None if goals is None else np.asarray(goals, dtype=np.float64).copy())
+        except RobocovError as error:
+            return replace(decisions, problem=str(error))
+        except BaseException as error:  # A controller of the user may raise anything.
+            fault = explain_fault(f"controller {task.controller!r}", error)
+            return replace(decisions, problem=str(fault))
+    return decisions
+
+
+def _generate_decisions(replay: Replay) -> Iterator[Any]:
+    """Yield the decisions of a replay."""
+    task = replay.task
+    controller: Any = make_controller(task.controller, task.gains, source=task.source)
+    if replay.environment is not None:
+        controller = inform_controller(controller, replay.environment)
+    region = replay.observations[0].region
+    memory = controller.begin(region, task.build_scenario().team)
+    is_individual = isinstance(controller, IndividualControllerAdapter)
+    for observations in replay.observations:
+        if is_individual and replay.robot is not None:
+            # The observations of the other robots are not real, so it is not called for them.
+            decision = controller.decide(observations, memory, [replay.robot])
+        else:
+            decision = controller.decide(observations, memory)
+        memory = decision.memory
+        yield decision
+
+
+class GuardedProcesses:
+    """Starts guarded processes, each of which answers one question and receives nothing else."""
+
+    def __init__(self) -> None:
+        self._processes: set[subprocess.Popen[bytes]] = set()
+        self._is_stopped = False
+        self._lock = threading.Lock()
+
+    def ask(self, question: Task | Replay) -> Answer:
+        """Ask a new process, and wait for its answer. Several threads may ask at the same time.
+
+        Parameters
+        ----------
+        question : Task or Replay
+
+        Returns
+        -------
+        Answer
+            None if the process ended without an answer.
+
+        Raises
+        ------
+        OutputError
+            If the service failed, which is not the fault of a controller.
+        """
+        with tempfile.TemporaryFile() as errors:
+            with self._lock:
+                if self._is_stopped:
+                    return None
+                process = start_process(f"{__name__}:GuardedService", stderr=errors)
+                self._processes.add(process)
+            try:
+                assert process.stdout is not None
+                if receive(process.stdout) != READY:
+                    return None
+                reply = ask_process(process, question)
+            finally:
+                end_process(process)
+                with self._lock:
+                    self._processes.discard(process)
+        if reply is not None and reply.answer is None:
+            raise OutputError(f"the run cannot be repeated: {reply.problem}")
+        return None if reply is None else reply.answer
+
+    def kill(self) -> None:
+        """End all processes; no other one is started."""
+        with self._lock:
+            self._is_stopped = True
+            for process in self._processes:
+                process.kill()

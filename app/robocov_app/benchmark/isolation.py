@@ -1,0 +1,275 @@
+"""Checking that robots use nothing but their own observations: the decisions of single robots are repeated.
+
+A run is observed first: the transcript contains the observations and the decisions of all steps. Then the
+controller is called again in a new process for each robot that is checked, with the observations of this
+robot alone. The simulation depends on the controller only through its decisions. Therefore, if the forces and
+goals are the same in all steps, bit for bit, then the run would have been the same if each of these robots
+had been driven by a process of its own.
+
+What a process receives depends on the information that the controller declares:
+
+==========  ===========================================================================================
+own         The state and measurements of one robot, and the positions of the robots that it hears.
+whole map   The same, and the map.
+shared map  The observations of all robots, because robots share maps: that a controller knows no more
+            than the robots have measured is checked, the limits of their communication are not.
+==========  ===========================================================================================
+
+The oracle receives the observations of all robots and the map. In the rows of all other robots there are
+values that say nothing: positions drawn by the verifier, no velocity, no obstacle, an empty scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.controllers.base import Information
+from robocov.environment import Environment
+from robocov.observation import Observations, Scans, Snapshot
+from robocov.observation.neighbors import Neighbors
+from robocov.observation.region import Region
+from robocov_app.sweep.tasks import Task
+
+_FAILED_ATTEMPTS = 1000
+"""Number of points that are drawn before a region counts as too thin to draw points in."""
+
+
+@dataclass(eq=False)
+class Transcript:
+    """Observations and decisions of a run, for all of its steps.
+
+    Attributes
+    ----------
+    observations : list of Observations
+    working : list of (n,) bool array or None
+        Masks of the robots that work; None: all.
+    forces : list of (n, 2) array, N
+    goals : list of (n, 2) array or None, m
+    """
+
+    observations: list[Observations] = field(default_factory=list)
+    working: list[BoolArray | None] = field(default_factory=list)
+    forces: list[Array] = field(default_factory=list)
+    goals: list[Array | None] = field(default_factory=list)
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Add a step."""
+        self.observations.append(snapshot.seen)
+        self.working.append(snapshot.working)
+        self.forces.append(snapshot.decision.forces)
+        self.goals.append(snapshot.decision.goals)
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """The observations for which a controller is called again, in a process of its own.
+
+    Attributes
+    ----------
+    task : Task
+        The run, from which the controller and the team are taken.
+    robot : int or None
+        Number of the robot that is checked; None: the whole team.
+    observations : sequence of Observations
+    environment : Environment or None
+        The map, if the controller may know it.
+    """
+
+    task: Task
+    robot: int | None
+    observations: Sequence[Observations]
+    environment: Environment | None
+
+
+@dataclass(frozen=True, eq=False)
+class Decisions:
+    """Decisions in a replay.
+
+    Attributes
+    ----------
+    forces : list of (n, 2) array, N
+    goals : list of (n, 2) array or None, m
+    problem : str
+        Error of the controller that ended the replay; empty if there was none.
+    """
+
+    forces: list[Array] = field(default_factory=list)
+    goals: list[Array | None] = field(default_factory=list)
+    problem: str = ""
+
+
+def hide_others(observations: Observations, robot: int, substitutes: Array) -> Observations:
+    """Return the observations of one robot, with values that say nothing in the rows of the others.
+
+    Parameters
+    ----------
+    observations : Observations
+    robot : int
+    substitutes : (n, 2) array, m
+        Positions of robots that it does not hear.
+
+    Returns
+    -------
+    Observations
+    """
+    count = len(observations.positions)
+    is_own = np.arange(count) == robot
+    is_known = is_own.copy()
+    # A robot that receives messages knows the positions in them only.
+    if observations.reported_positions is None or observations.neighbors.is_complete:
+        is_known[observations.neighbors.list_neighbors(robot)] = True
+    hidden = replace(
+        observations,
+        positions=_freeze(np.where(is_known[:, None], observations.positions, substitutes)),
+        velocities=_freeze(np.where(is_own[:, None], observations.velocities, 0.0)),
+        obstacle_points=_freeze(np.where(is_own[:, None], observations.obstacle_points, np.nan)),
+    )
+    if observations.max_speeds is not None:
+        is_audible = is_own.copy()
+        is_audible[observations.neighbors.list_neighbors(robot)] = True
+        own_speed = observations.max_speeds[robot]
+        hidden.max_speeds = _freeze(np.where(is_audible, observations.max_speeds, own_speed))
+    if observations.steering is not None:
+        hidden.steering = _freeze(np.where(is_own[:, None], observations.steering, 0.0))
+    if observations.scans is not None:
+        hidden.scans = _hide_scans(observations.scans, is_own)
+    return _hide_links(hidden, robot)
+
+
+def _hide_scans(scans: Scans, is_own: BoolArray) -> Scans:
+    """Return scans in which the other robots see nothing, not even free space."""
+    distances = np.where(is_own[:, None], scans.distances, 0.0)
+    return Scans(_freeze(distances), _freeze(scans.hit & is_own[:, None]))
+
+
+def _hide_links(observations: Observations, robot: int) -> Observations:
+    """Return observations without the links and the messages that a robot does not know.
+
+    If robots know the current positions of those that they hear, a robot also knows which of them hear each
+    other.
+    """
+    neighbors = observations.neighbors
+    if neighbors.indptr is None or neighbors.indices is None:
+        return observations
+    start, stop = neighbors.indptr[robot : robot + 2]
+    first, second = neighbors.list_pairs()
+    is_known_link = first == robot
+    if observations.reported_positions is None:
+        is_heard = np.zeros(neighbors.count, dtype=bool)
+        is_heard[neighbors.indices[start:stop]] = True
+        is_heard[robot] = True
+        is_known_link = is_heard[first] & is_heard[second]
+    links = Neighbors.from_pairs(
+        neighbors.count, first[is_known_link], second[is_known_link], neighbors.ranges
+    )
+    hidden = replace(observations, neighbors=links)
+    if observations.reported_positions is not None:
+        hidden.reported_positions = observations.reported_positions[start:stop].copy()
+    if observations.report_ages is not None:
+        hidden.report_ages = observations.report_ages[start:stop].copy()
+    return hidden
+
+
+def _freeze(array: Any) -> Any:
+    array.setflags(write=False)
+    return array
+
+
+def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Array:
+    """Draw positions in a region that stand for those of unknown robots, (n, 2) m."""
+    low_x, low_y, high_x, high_y = region.bounds
+    for _ in range(_FAILED_ATTEMPTS):
+        points = rng.uniform((low_x, low_y), (high_x, high_y), size=(16 * count, 2))
+        inside = points[region.contains(points)]
+        if len(inside) >= count:
+            return np.asarray(inside[:count])
+    return np.repeat(region.centroid[None], count, axis=0)
+
+
+def build_replay(
+    task: Task, transcript: Transcript, information: Information, robot: int | None, rng: np.random.Generator
+) -> Replay:
+    """Build the replay that checks a robot of a run.
+
+    Parameters
+    ----------
+    task : Task
+    transcript : Transcript
+    information : Information
+        The information that the controller declares, which decides what its process receives.
+    robot : int or None
+        Number of the robot; None: the process receives the observations of all robots.
+    rng : Generator
+        Draws the positions of unknown robots.
+
+    Returns
+    -------
+    Replay
+    """
+    environment = None
+    if information == "whole map":
+        environment = task.build_environment().static
+    observations = transcript.observations
+    if robot is not None:
+        substitutes = draw_substitutes(observations[0].region, task.robots, rng)
+        observations = [hide_others(each, robot, substitutes) for each in observations]
+    return Replay(task, robot, observations, environment)
+
+
+def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions) -> str | None:
+    """Find the first difference between the decisions of a run and those of a replay.
+
+    Parameters
+    ----------
+    transcript : Transcript
+    replay : Replay
+    decisions : Decisions
+
+    Returns
+    -------
+    str or None
+        Description of the difference; None if there is none. Decisions of failed robots do not count.
+    """
+    count = len(transcript.forces[0])
+    checked = np.arange(count) if replay.robot is None else np.array([replay.robot])
+    for step, observations in enumerate(transcript.observations):
+        working = transcript.working[step]
+        robots = checked if working is None else checked[working[checked]]
+        if step >= len(decisions.forces):
+            reason = decisions.problem or "the process ended"
+            return f"{_format_robot(replay.robot)} in a process of its own: {reason}"
+        is_same = _have_same_rows(transcript.forces[step], decisions.forces[step], robots)
+        is_same &= _have_same_rows(transcript.goals[step], decisions.goals[step], robots)
+        if not is_same.all():
+            robot = int(robots[~is_same][0])
+            return (
+                f"robot {robot + 1} decides otherwise from {observations.time:.2f} s on "
+                f"if its process receives only {_describe_knowledge(replay)}"
+            )
+    return None
+
+
+def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -> BoolArray:
+    """Return for which robots two arrays have the same bits, (k,)."""
+    if expected is None or actual is None:
+        return np.full(len(robots), expected is actual)
+    pairs = zip(expected[robots], actual[robots], strict=True)
+    return np.array([first.tobytes() == second.tobytes() for first, second in pairs], dtype=bool)
+
+
+def _format_robot(robot: int | None) -> str:
+    return "the team" if robot is None else f"robot {robot + 1}"
+
+
+def _describe_knowledge(replay: Replay) -> str:
+    knowledge = "the observations of the team"
+    if replay.robot is not None:
+        knowledge = "its own observations"
+    if replay.environment is not None:
+        knowledge += " and the map"
+    return knowledge

@@ -1,0 +1,307 @@
+"""Cheating controllers and changed results do not pass a verification, honest ones do."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from swept import HEAD, PULL
+
+from robocov.controllers import CONTROLLERS
+from robocov.generator import GENERATORS
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.guarded_runs import _decide_again
+from robocov_app.benchmark.isolation import Replay, Transcript, build_replay, find_difference
+from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
+from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov_app.benchmark.results import RESULT_FILE
+from robocov_app.benchmark.running import run_benchmark
+from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
+from robocov_app.sweep.tasks import Task, generate_tasks
+from robocov_app.sweep.worker import perform
+from robocov_app.terminal.interruption import Interruption
+
+MAP = "blocks-a"
+SMALL = VerificationOptions(sample=1, robots=1, new_maps=0)
+
+GLOBAL = """
+POSITIONS = {}
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        POSITIONS[own.number] = own.position
+        return sum(own.position - other for other in POSITIONS.values())
+"""
+"""Robots learn from a variable of the module where all others are."""
+
+ON_DISK = """
+FOLDER = Path(__file__).parent
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        try:
+            (FOLDER / str(own.number)).write_text(str(own.position))
+        except PermissionError:
+            pass
+        return own.centroid - own.position
+"""
+
+READER = """
+from robocov_app.benchmark import suite
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        references = suite.SUITE_FILE.read_text()
+        return own.centroid - own.position
+"""
+
+FRAMES = """
+import sys
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        frame = sys._getframe()
+        while frame is not None:
+            for value in frame.f_locals.values():
+                if type(value).__name__ == "Simulation":
+                    return value.positions.mean(axis=0) - own.position
+            frame = frame.f_back
+        return own.centroid - own.position
+"""
+"""Robots look for the simulation on the stack."""
+
+JOINT = """
+import numpy as np
+import robocov as rc
+
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        return rc.Decision(seen.positions.mean(axis=0) - seen.positions)
+"""
+"""Uses the rows of all robots, not only of those that are heard."""
+
+IMPORTS = HEAD.partition("@dataclass")[0]
+
+
+@pytest.fixture(autouse=True)
+def _short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures"):
+        track = suite.TRACKS[name]
+        failures = tuple((robot, 0.5) for robot, _ in track.failures)
+        changed = replace(track, duration=1.5, seeds=(0,), maps=(MAP,), failures=failures)
+        if name == "short-range":
+            # On a small map, the robots of the start would hear each other anyway.
+            changed = replace(changed, changes={"communication_range": 0.5})
+        monkeypatch.setitem(suite.TRACKS, name, changed)  # type: ignore[arg-type]
+
+
+def build_task(controller: str, track: str) -> Task:
+    studies = dict(RatedController(controller, {}).build_studies(Selection(tracks=(track,), maps=(MAP,))))
+    return next(iter(generate_tasks(studies[track])))
+
+
+def isolate(controller: str, track: str, robot: int | None) -> str | None:
+    """Return how the decisions of a robot differ in a process of its own, without starting one."""
+    task = build_task(controller, track)
+    transcript = Transcript()
+    outcome = perform(task, transcript.add)
+    assert outcome.error is None
+    information = CONTROLLERS[controller].information if controller in CONTROLLERS else "own"
+    replay = build_replay(task, transcript, information, robot, np.random.default_rng(0))
+    return find_difference(transcript, replay, _decide_again(replay))
+
+
+SLOW = ("atlas", "adaptive", "boosting", "visibility", "geodesic-lloyd", "diffeomorphism", "barrier")
+ISOLATED = [
+    pytest.param(name, track, id=f"{name}-{track}", marks=[pytest.mark.slow] if name in SLOW else [])
+    for name, kind in CONTROLLERS.items()
+    for track in ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
+    if kind.information != "shared map"
+]
+
+
+@pytest.mark.parametrize(("controller", "track"), ISOLATED)
+def test_robots_of_built_in_controllers_decide_by_their_own_observations(
+    controller: str, track: str
+) -> None:
+    assert isolate(controller, track, robot=2) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["atlas-shared", "voronoi-graph"])
+def test_teams_that_share_maps_decide_by_the_observations_of_the_team(controller: str) -> None:
+    assert isolate(controller, "short-range", robot=None) is None
+
+
+def test_a_robot_does_not_receive_what_others_know() -> None:
+    task = build_task("atlas", "short-range")
+    transcript = Transcript()
+    perform(task, transcript.add)
+    replay = build_replay(task, transcript, "own", 2, np.random.default_rng(0))
+    for seen, hidden in zip(transcript.observations, replay.observations, strict=True):
+        neighbors = seen.neighbors.list_neighbors(2)
+        strangers = np.setdiff1d(np.arange(6), [2, *neighbors])
+        assert (hidden.positions[neighbors] == seen.positions[neighbors]).all()
+        assert (hidden.positions[strangers] != seen.positions[strangers]).all()
+        others = np.arange(6) != 2
+        assert (hidden.velocities[others] == 0.0).all()
+        assert np.isnan(hidden.obstacle_points[others]).all()
+        assert (hidden.velocities[2] == seen.velocities[2]).all()
+        if seen.scans is not None:
+            assert hidden.scans is not None and (hidden.scans.distances[others] == 0.0).all()
+        assert hidden.neighbors.list_neighbors(2).tolist() == neighbors.tolist()
+        assert not any(len(hidden.neighbors.list_neighbors(stranger)) for stranger in strangers)
+
+
+@pytest.mark.parametrize("code", [GLOBAL, FRAMES, JOINT], ids=["module variable", "stack", "all rows"])
+def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(IMPORTS + code)
+    difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
+    assert difference is not None
+    assert "robot 3 decides otherwise from" in difference
+    assert difference.endswith("if its process receives only its own observations")
+
+
+def rate(folder: Path, code: str, track: str) -> tuple[Path, str]:
+    """Write a controller and rate it; return the folder of its result, and its name."""
+    (folder / "mine.py").write_text(IMPORTS + code)
+    name = f"{folder / 'mine.py'}:Mine"
+    with Interruption() as stop:
+        selection = Selection(tracks=(track,), maps=(MAP,))
+        run_benchmark(RatedController(name, {}), selection, folder / "out", stop=stop, workers=1, quiet=True)
+    return folder / "out", name
+
+
+def verify(folder: Path, name: str, options: VerificationOptions = SMALL) -> Verification:
+    with Interruption() as stop:
+        return verify_result(folder, controller=name, options=options, stop=stop, quiet=True)
+
+
+@pytest.mark.parametrize(
+    ("code", "track", "expected"),
+    [
+        (HEAD.removeprefix(IMPORTS) + PULL, "ideal", None),
+        (GLOBAL, "short-range", "decides otherwise"),
+        (ON_DISK, "ideal", "its controller tried writing"),
+        (READER, "ideal", "its controller tried reading"),
+    ],
+    ids=["honest", "module variable", "disk", "references"],
+)
+def test_only_honest_controllers_are_verified(
+    code: str, track: str, expected: str | None, tmp_path: Path
+) -> None:
+    folder, name = rate(tmp_path, code, track)
+    verification = verify(folder, name)
+    assert verification.runs == 1
+    if expected is None:
+        assert verification.differences == []
+        assert verification.robots == 1
+    else:
+        assert any(expected in difference for difference in verification.differences)
+
+
+def test_an_entry_with_other_information_is_not_verified(tmp_path: Path) -> None:
+    folder, name = rate(tmp_path, HEAD.removeprefix(IMPORTS) + PULL, "ideal")
+    result = json.loads((folder / RESULT_FILE).read_text())
+    result["entry"]["information"] = "whole map"
+    (folder / RESULT_FILE).write_text(json.dumps(result))
+    verification = verify(folder, name, VerificationOptions(sample=0, robots=0, new_maps=0))
+    assert verification.differences == ["entry: information: expected own, got whole map"]
+
+
+def test_seeds_are_drawn_unless_one_is_given(tmp_path: Path) -> None:
+    folder, name = rate(tmp_path, HEAD.removeprefix(IMPORTS) + PULL, "ideal")
+    nothing = VerificationOptions(sample=0, robots=0, new_maps=0)
+    first, second = verify(folder, name, nothing).seed, verify(folder, name, nothing).seed
+    assert first != second
+    assert verify(folder, name, replace(nothing, seed=7)).seed == 7
+
+
+def test_the_probability_to_miss_changed_rows_is_that_of_drawing_without_them() -> None:
+    verification = Verification(seed=0, rows=10, runs=3)
+    rng = np.random.default_rng(0)
+    missed = [not {0, 1} & set(rng.permutation(10)[:3].tolist()) for _ in range(4000)]
+    assert verification.compute_miss_probability(2) == pytest.approx(np.mean(missed), abs=0.03)
+    assert replace(verification, runs=10).compute_miss_probability(1) == 0.0
+
+
+def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
+    rng = np.random.default_rng(0)
+    names = [name for names in suite.FAMILIES.values() for name in names]
+    return [
+        {"track": TRACK, "map": name, "seed": seed, "gap": gap + spread * rng.random()}
+        for name, seed in product(names, (0, 1))
+    ]
+
+
+@pytest.fixture
+def _whole_track(monkeypatch: pytest.MonkeyPatch) -> None:
+    maps = tuple(name for names in suite.FAMILIES.values() for name in names)
+    monkeypatch.setitem(suite.TRACKS, TRACK, replace(suite.TRACKS[TRACK], maps=maps))  # type: ignore[arg-type]
+
+
+@pytest.mark.usefixtures("_whole_track")
+def test_controllers_that_know_the_maps_of_the_suite_are_worse_on_new_ones() -> None:
+    families = list(GENERATORS)
+    known = compare_gaps(build_rows(0.0, 0.001), [(family, 0.02) for family in families])
+    assert known is not None and known.is_worse
+    assert known.new_gap == 0.02
+    failed = compare_gaps(build_rows(0.1, 0.1), [(family, math.inf) for family in families])
+    assert failed is not None and failed.is_worse
+    equal = compare_gaps(build_rows(0.1, 0.1), [(family, 0.15) for family in families])
+    assert equal is not None and not equal.is_worse
+
+
+@pytest.mark.usefixtures("_whole_track")
+def test_new_maps_that_are_like_those_of_the_suite_rarely_differ() -> None:
+    rng = np.random.default_rng(1)
+    p_values = []
+    for _ in range(60):
+        comparison = compare_gaps(
+            build_rows(0.0, 1.0), [(family, float(rng.random(2).mean())) for family in GENERATORS]
+        )
+        assert comparison is not None
+        p_values.append(comparison.p_value)
+    assert min(p_values) > MIN_P_VALUE
+    assert 0.2 < np.median(p_values) < 0.8
+
+
+def test_few_rows_cannot_show_a_difference() -> None:
+    rows = [{"track": TRACK, "map": MAP, "seed": 0, "gap": 0.0}]
+    assert compare_gaps(rows, [("polygons", 0.5)]) is None
+    comparison = compare_gaps(rows, [("bundled", 0.5)])
+    assert comparison is not None and comparison.min_p_value == 0.5 and not comparison.is_worse
+
+
+def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
+    new_maps = draw_new_maps(list(suite.FAMILIES), 4, np.random.default_rng(3))
+    assert len({new_map.family for new_map in new_maps}) == 4
+    hashes = {frozen["sha256"] for frozen in suite.load_frozen_maps().values()}
+    for new_map in new_maps:
+        assert new_map.name not in suite.FAMILY_OF
+        assert suite.compute_map_hash(new_map.environment) not in hashes
+        assert len(new_map.environment.start().sample(6, seed=new_map.start_seed)) == 6
+
+
+def test_a_process_that_ended_is_a_difference() -> None:
+    task = build_task("rapf", "ideal")
+    transcript = Transcript()
+    perform(task, transcript.add)
+    replay = Replay(task, 1, transcript.observations, None)
+    decisions = _decide_again(replace(replay, observations=replay.observations[:5]))
+    difference = find_difference(transcript, replay, decisions)
+    assert difference == "robot 2 in a process of its own: the process ended"
