@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import html
 import json
 import os
 import re
@@ -12,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from hypothesis import strategies as st
 from swept import HEAD, PULL, DirectExecutor
 
 from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.page import ParetoPoint, build_page, find_pareto_front, place_labels
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import (
@@ -33,7 +35,7 @@ from robocov_app.benchmark.results import (
     read_result,
 )
 from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
-from robocov_app.benchmark.verification import verify_result
+from robocov_app.benchmark.verification import VerificationOptions, verify_result
 from robocov_app.cli import main
 from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.terminal.interruption import Interruption
@@ -45,10 +47,9 @@ MAPS = ("blocks-a", "blocks-b")
 def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of one second, in this process."""
     for name in ("ideal", "lossy"):
-        track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,))
+        track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,), maps=MAPS)
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
-    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", DirectExecutor)
 
 
 def run_short_benchmark(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:
@@ -59,9 +60,12 @@ def run_short_benchmark(out: Path, controller: str = "rapf", *tracks: str, **gai
     return result
 
 
-def verify(out: Path, **options: Any) -> tuple[int, list[str]]:
+def verify(out: Path, sample: int, controller: str | None = None) -> tuple[int, list[str]]:
+    """Repeat some runs; return their number and the differences."""
+    options = VerificationOptions(sample=sample, robots=0, new_maps=0)
     with Interruption() as stop:
-        return verify_result(out, stop=stop, quiet=True, **options)
+        verification = verify_result(out, controller=controller, options=options, stop=stop, quiet=True)
+    return verification.runs, verification.differences
 
 
 def forge(out: Path, change: Any) -> None:
@@ -113,11 +117,14 @@ def test_bundled_results_are_complete() -> None:
 @pytest.mark.slow
 def test_bundled_results_are_reproducible() -> None:
     path = ENTRIES / "rapf.json.gz"
+    options = VerificationOptions(sample=2, robots=1, new_maps=1, seed=3, workers=2)
     with Interruption() as stop:
-        count, differences = verify_result(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
-    assert count == 2
+        verification = verify_result(path, options=options, quiet=True, stop=stop)
+    assert verification.runs == 2
+    assert verification.robots == 3
+    assert verification.comparison is not None
     # Libraries of linear algebra may round the last bit differently on other processors.
-    for difference in differences:
+    for difference in verification.differences:
         numbers = re.search(r": expected ([\d.e-]+), got ([\d.e-]+)$", difference)
         are_close = numbers and float(numbers[1]) == pytest.approx(float(numbers[2]), rel=1e-3)
         assert difference.startswith("made with") or are_close, difference
@@ -167,8 +174,100 @@ def test_forged_results_are_detected(tmp_path: Path) -> None:
     ):
         (out / RESULT_FILE).write_text(honest)
         forge(out, change)
-        _, differences = verify(out, sample=9)
+        _, differences = verify(out, sample=9 if "work_J" in message else 0)
         assert any(message in difference for difference in differences), message
+
+
+@pytest.mark.usefixtures("short_runs")
+def test_the_page_rejects_gaps_that_do_not_follow_from_costs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    run_short_benchmark(out)
+    forge(out, lambda result: result["rows"][0].update(gap=0.01))
+    message = complaint(
+        capsys, "benchmark", "page", str(out), "--alone", "--out", str(tmp_path / "page.html")
+    )
+    assert "rows[0]: gap: expected" in message
+
+
+def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: Path) -> None:
+    results = load_bundled_results()
+    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
+    few = {**rapf, "rows": rapf["rows"][:3], "entry": {**rapf["entry"], "label": "Few"}}
+    ratings_alone = ratings.build_ratings(results)
+    ratings_with_few = ratings.build_ratings([*results, few])
+    for track, track_ratings in ratings_alone.items():
+        assert track_ratings == ratings_with_few[track][: len(track_ratings)]
+    tables = [build_tables(results), build_tables([*results, few])]
+    assert tables[0].overview == tables[1].overview[:-1]
+    assert tables[1].overview[-1][:4] == ("Few", "–", "–", "3 of 345")
+    assert [row[0] for row in tables[1].ideal] == [row[0] for row in tables[0].ideal]
+    assert "Few" not in [row[0] for row in tables[1].ideal]
+    incomplete = tables[1].incomplete
+    assert [row[:3] for row in incomplete] == [("Few", "own", "3 of 142")]
+    # RAPF is shown next to it, over the same runs.
+    assert incomplete[0][3] in incomplete[0][4:]
+
+
+class PageTables(NamedTuple):
+    overview: list[tuple[str, ...]]
+    ideal: list[tuple[str, ...]]
+    incomplete: list[tuple[str, ...]]
+
+
+def build_tables(results: list[dict[str, Any]]) -> PageTables:
+    """Return rows of the tables on the page of some results."""
+    tables: dict[str, list[tuple[str, ...]]] = {}
+    for part in re.findall(r"<table>.*?</table>", build_page(results, "Test"), re.DOTALL):
+        caption = html.unescape(re.search(r"<caption><span>(.*?)</span>", part)[1])  # type: ignore[index]
+        rows = []
+        for row in re.findall(r"<tr>(.*?)</tr>", part.partition("<tbody>")[2]):
+            cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)
+            rows.append(tuple(html.unescape(re.sub(r"<svg.*?</svg>", "", cell)) for cell in cells))
+        tables.setdefault(caption.partition(",")[0].partition(":")[0], rows)
+    return PageTables(tables["Scores"], tables["Ratings"], tables.get("Incomplete entries", []))
+
+
+def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:
+    row = {"gap": 0.25, "contacts": 0, "settled_at_s": 9.0}
+    assert ratings.compute_score(row) == 0.8
+    assert ratings.compute_score({**row, "contacts": 1}) == 0.4
+    assert ratings.compute_score({**row, "settled_at_s": None}) == 0.4
+    assert ratings.compute_score({**row, "gap": None}) == 0.0
+    two_runs = ratings.Rating("", "ideal", [{**row, "map": "rooms", "seed": 0}], failed=1)
+    assert two_runs.score == 0.4
+
+
+def test_intervals_are_given_from_12_maps_on() -> None:
+    rows = [{"map": str(k), "gap": 0.1 * k} for k in range(ratings.MIN_INTERVAL_MAPS)]
+    assert np.isfinite(ratings.Rating("", "ideal", rows, 0).gap.low)
+    few = ratings.Rating("", "ideal", rows[1:], 0).gap
+    assert np.isnan(few.low) and few.estimate == pytest.approx(0.6)
+
+
+def test_teams_that_never_move_or_end_far_above_rapf_are_found() -> None:
+    def build_result(costs: list[float], path_length: float = 5.0) -> dict[str, Any]:
+        rows = [
+            {
+                "track": "ideal",
+                "map": f"map {k}",
+                "seed": 0,
+                "mean_distance_m": cost,
+                "path_length_m": path_length,
+            }
+            for k, cost in enumerate(costs)
+        ]
+        return {"rows": [*rows, {"track": "ideal", "map": "failed", "seed": 0, "error": "it failed"}]}
+
+    rapf = build_result([1.0, 1.0, 1.0])
+    assert find_anomalies(rapf, rapf) == []
+    (anomaly,) = find_anomalies(build_result([0.5, 0.5, 1.5]), rapf)
+    assert anomaly == ("ideal", "map 2", 0, "cost more than 1.2 times that of RAPF")
+    # A controller that is usually worse than RAPF is no surprise.
+    assert find_anomalies(build_result([1.5, 1.5, 1.5]), rapf) == []
+    at_rest = find_anomalies(build_result([0.9, 0.9, 0.9], path_length=0.01), rapf)
+    assert {anomaly.reason for anomaly in at_rest} == {"at rest from the start"} and len(at_rest) == 3
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -181,7 +280,7 @@ def test_controllers_in_files_are_verified_only_if_named_and_unchanged(
     run_short_benchmark(out, f"{mine}:Mine")
     assert str(tmp_path) not in (out / RESULT_FILE).read_text()
     assert "pass --controller FILE.py:CLASS" in complaint(capsys, "benchmark", "verify", str(out))
-    assert verify(out, controller=f"{mine}:Mine", sample=1) == (1, [])
+    assert verify(out, sample=1, controller=f"{mine}:Mine") == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
     message = complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
     assert "is not the source that was rated" in message
@@ -309,7 +408,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 @pytest.mark.slow
 @pytest.mark.xdist_group("browser")
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver")
-def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
+def test_the_page_in_a_browser(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    track = replace(suite.TRACKS["ideal"], seeds=(0,), maps=("rooms", "polygons-7001"))
+    monkeypatch.setitem(suite.TRACKS, "ideal", track)  # type: ignore[arg-type]
     results = []
     for k, name in enumerate(("rapf", "lloyd", "atlas")):
         rows = [
@@ -323,7 +424,7 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
                 "mean_distance_m": 2.0,
                 "mean_distance_over_run_m": 3.0,
                 "near_final_s": 9.0,
-                "settled_at_s": 8.0 if k else None,
+                "settled_at_s": 8.0,
                 "path_length_m": 8.0 - k,
                 "work_J": 50.0,
                 "told_bytes": 4e5 * (k + 1),
@@ -350,6 +451,6 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
     assert [cell.text for cell in browser.all("#overview tbody th")] == labels
     gaps = [
         float(cell.text.split()[0])
-        for cell in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(4)")
+        for cell in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(5)")
     ]
     assert gaps == np.sort(gaps).tolist()

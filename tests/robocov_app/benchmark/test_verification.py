@@ -135,9 +135,7 @@ ISOLATED = [
 
 
 @pytest.mark.parametrize(("controller", "track"), ISOLATED)
-def test_robots_of_built_in_controllers_decide_by_their_own_observations(
-    controller: str, track: str
-) -> None:
+def test_robots_of_built_in_controllers_decide_by_their_own_observations(controller: str, track: str) -> None:
     assert isolate(controller, track, robot=2) is None
 
 
