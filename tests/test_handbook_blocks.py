@@ -50,7 +50,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder; sweeps in this process, tracks of half a second."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
-    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", DirectExecutor)
     for name in suite.QUICK_TRACKS:
         track = replace(suite.TRACKS[name], duration=0.5, maps=suite.TRACKS[name].maps[:1])
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
