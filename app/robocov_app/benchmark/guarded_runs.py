@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 import threading
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -103,6 +104,7 @@ def _decide_again(replay: Replay) -> Decisions:
                 decisions.forces.append(np.asarray(decision.forces, dtype=np.float64).copy())
                 goals = decision.goals
                 decisions.goals.append(None if goals is None else np.asarray(goals, dtype=np.float64).copy())
+                decisions.messages.append(deepcopy(decision.messages))
         except RobocovError as error:
             return replace(decisions, problem=str(error))
         except BaseException as error:  # A controller of the user may raise anything.

@@ -2,26 +2,28 @@
 
 A run is observed first: the transcript contains the observations and the decisions of all steps. Then the
 controller is called again in a new process for each robot that is checked, with the observations of this
-robot alone. The simulation depends on the controller only through its decisions. Therefore, if the forces and
-goals are the same in all steps, bit for bit, then the run would have been the same if each of these robots
-had been driven by a process of its own.
+robot alone. The simulation depends on the controller only through its decisions. Therefore, if the forces,
+goals and messages are the same in all steps, bit for bit, then the run would have been the same if each of
+these robots had been driven by a process of its own.
 
 What a process receives depends on the information that the controller declares:
 
 ==========  ===========================================================================================
-own         The state and measurements of one robot, and the positions of the robots that it hears.
+own         The state and measurements of one robot, the positions of the robots that it hears, and the
+            messages that it has received.
+shared map  The same: maps are shared by messages.
 whole map   The same, and the map.
-shared map  The observations of all robots, because robots share maps: that a controller knows no more
-            than the robots have measured is checked, the limits of their communication are not.
 ==========  ===========================================================================================
 
-The oracle receives the observations of all robots and the map. In the rows of all other robots there are
-values that say nothing: positions drawn by the verifier, no velocity, no obstacle, an empty scan.
+The built-in controllers that read the maps of other robots directly, and the oracle, receive the observations
+of all robots: that they know no more than the robots have measured is checked, the limits of communication
+are not. In the rows of all other robots there are values that say nothing: positions drawn by the verifier,
+no velocity, no obstacle, an empty scan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +32,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.base import Information
 from robocov.environment import Environment
-from robocov.observation import Observations, Scans, Snapshot
+from robocov.observation import Message, Observations, Scans, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov_app.sweep.tasks import Task
@@ -50,12 +52,14 @@ class Transcript:
         Masks of the robots that work; None: all.
     forces : list of (n, 2) array, N
     goals : list of (n, 2) array or None, m
+    messages : list of sequence of sequence of Message
     """
 
     observations: list[Observations] = field(default_factory=list)
     working: list[BoolArray | None] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
     goals: list[Array | None] = field(default_factory=list)
+    messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
 
     def add(self, snapshot: Snapshot) -> None:
         """Add a step."""
@@ -63,6 +67,7 @@ class Transcript:
         self.working.append(snapshot.working)
         self.forces.append(snapshot.decision.forces)
         self.goals.append(snapshot.decision.goals)
+        self.messages.append(snapshot.decision.messages)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +99,14 @@ class Decisions:
     ----------
     forces : list of (n, 2) array, N
     goals : list of (n, 2) array or None, m
+    messages : list of sequence of sequence of Message
     problem : str
         Error of the controller that ended the replay; empty if there was none.
     """
 
     forces: list[Array] = field(default_factory=list)
     goals: list[Array | None] = field(default_factory=list)
+    messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
     problem: str = ""
 
 
@@ -138,6 +145,10 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
         hidden.steering = _freeze(np.where(is_own[:, None], observations.steering, 0.0))
     if observations.scans is not None:
         hidden.scans = _hide_scans(observations.scans, is_own)
+    if observations.messages:
+        hidden.messages = [observations.messages[k] if k == robot else () for k in range(count)]
+    if observations.send_limits is not None:
+        hidden.send_limits = _freeze(np.where(is_own, observations.send_limits, 0))
     return _hide_links(hidden, robot)
 
 
@@ -245,6 +256,7 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
             return f"{_format_robot(replay.robot)} in a process of its own: {reason}"
         is_same = _have_same_rows(transcript.forces[step], decisions.forces[step], robots)
         is_same &= _have_same_rows(transcript.goals[step], decisions.goals[step], robots)
+        is_same &= _have_same_messages(transcript.messages[step], decisions.messages[step], robots)
         if not is_same.all():
             robot = int(robots[~is_same][0])
             return (
@@ -260,6 +272,71 @@ def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -
         return np.full(len(robots), expected is actual)
     pairs = zip(expected[robots], actual[robots], strict=True)
     return np.array([first.tobytes() == second.tobytes() for first, second in pairs], dtype=bool)
+
+
+def _have_same_messages(
+    expected: Sequence[Sequence[Message]], actual: Sequence[Sequence[Message]], robots: Any
+) -> BoolArray:
+    """Return for which robots the messages are the same, (k,)."""
+    if not expected and not actual:
+        return np.ones(len(robots), dtype=bool)
+    is_same = []
+    for robot in robots:
+        own_expected = expected[robot] if expected else ()
+        own_actual = actual[robot] if actual else ()
+        is_same.append(is_same_content(_list_contents(own_expected), _list_contents(own_actual)))
+    return np.array(is_same, dtype=bool)
+
+
+def _list_contents(messages: Sequence[Message]) -> list[tuple[int, Any]]:
+    return [(message.size, message.payload) for message in messages]
+
+
+def is_same_content(first: Any, second: Any) -> bool:
+    """Return whether two objects have the same content, bit for bit.
+
+    Arrays, containers and objects with attributes are compared by their content, floats by their bits.
+
+    Parameters
+    ----------
+    first, second : object
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_same_content([1.0, {"map": np.zeros(3)}], [1.0, {"map": np.zeros(3)}])
+    True
+    >>> is_same_content((0.0,), (-0.0,))
+    False
+    """
+    if type(first) is not type(second):
+        return False
+    if isinstance(first, np.ndarray):
+        if first.dtype != second.dtype or first.shape != second.shape:
+            return False
+        if first.dtype.hasobject:
+            return is_same_content(first.tolist(), second.tolist())
+        return bool(first.tobytes() == second.tobytes())
+    if isinstance(first, float):
+        return bool(first.hex() == second.hex())
+    if isinstance(first, Mapping):
+        return is_same_content(list(first.items()), list(second.items()))
+    if isinstance(first, list | tuple):
+        pairs = zip(first, second, strict=False)
+        return len(first) == len(second) and all(is_same_content(*pair) for pair in pairs)
+    if isinstance(first, str | bytes | int | None | set | frozenset):
+        return bool(first == second)
+    return _get_attributes(first) == {} or is_same_content(_get_attributes(first), _get_attributes(second))
+
+
+def _get_attributes(value: Any) -> dict[str, Any]:
+    """Return the attributes of an object, also those in slots."""
+    names = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+    attributes = {name: getattr(value, name) for name in names if hasattr(value, name)}
+    return {**attributes, **getattr(value, "__dict__", {})}
 
 
 def _format_robot(robot: int | None) -> str:

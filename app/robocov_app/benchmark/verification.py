@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from robocov.controllers import CONTROLLERS, get_information
 from robocov.controllers.base import Information
 from robocov.errors import InputError, format_count
 from robocov.mapfile import to_json
@@ -201,7 +202,7 @@ class Verification:
             teams = format_count(self.teams, "team")
             yield (
                 f"{teams} repeated in processes that receive the observations of all robots, because the "
-                "robots share maps or decide together: limits of communication are not checked."
+                "robots read the maps of others, or decide together: limits of communication are not checked."
             )
 
     def _describe_new_maps(self, comparison: NewMapComparison) -> str:
@@ -276,7 +277,7 @@ def verify_result(
     new_tasks = _index_new_tasks(rated, new_maps)
     checker = _RunChecker(
         information=description["information"],
-        is_joint=rated.controller == ORACLE or description["information"] == "shared map",
+        is_joint=rated.controller == ORACLE or reads_shared_maps(rated.controller),
         robots=options.robots,
         seed=seed,
     )
@@ -297,6 +298,22 @@ def verify_result(
         verification.differences += _describe_comparison(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
     return verification
+
+
+def reads_shared_maps(controller: str) -> bool:
+    """Return whether a controller reads the maps of other robots without messages.
+
+    Parameters
+    ----------
+    controller : str
+        Name of the controller.
+
+    Returns
+    -------
+    bool
+        False for a user's controller, whose robots have to send messages.
+    """
+    return controller in CONTROLLERS and get_information(CONTROLLERS[controller]) == "shared map"
 
 
 def _create_generator(seed: int, *stream: int) -> np.random.Generator:

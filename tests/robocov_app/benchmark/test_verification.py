@@ -17,7 +17,13 @@ from robocov.controllers import CONTROLLERS
 from robocov.generator import GENERATORS
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.guarded_runs import _decide_again
-from robocov_app.benchmark.isolation import Replay, Transcript, build_replay, find_difference
+from robocov_app.benchmark.isolation import (
+    Replay,
+    Transcript,
+    build_replay,
+    find_difference,
+    is_same_content,
+)
 from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE
@@ -93,6 +99,27 @@ class Mine:
         return rc.Decision(seen.positions.mean(axis=0) - seen.positions)
 """
 """Uses the rows of all robots, not only of those that are heard."""
+
+WITH_MESSAGES = """
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        own.send([own.number, own.position], size=24)
+        heard = [message.payload[1] for message in own.messages]
+        return own.centroid - own.position + 0.1 * sum(own.position - position for position in heard)
+"""
+
+FALSE_MESSAGES = """
+POSITIONS = {}
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        POSITIONS[own.number] = own.position
+        own.send([sum(POSITIONS.values())], size=16)
+        return sum((message.payload[0] for message in own.messages), own.centroid) - own.position
+"""
+"""Robots send what they learn from a variable of the module; the forces follow from the messages."""
 
 IMPORTS = HEAD.partition("@dataclass")[0]
 
@@ -172,6 +199,33 @@ def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, 
     assert difference is not None
     assert "robot 3 decides otherwise from" in difference
     assert difference.endswith("if its process receives only its own observations")
+
+
+@pytest.mark.parametrize("track", ["ideal", "short-range", "lossy"])
+def test_robots_may_send_messages(track: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(IMPORTS + WITH_MESSAGES)
+    assert isolate(f"{tmp_path / 'mine.py'}:Mine", track, robot=2) is None
+
+
+def test_messages_with_hidden_knowledge_are_found(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
+    difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
+    assert difference is not None and "decides otherwise" in difference
+
+
+def test_contents_are_compared_bit_for_bit() -> None:
+    class Note:
+        __slots__ = ("text",)
+
+        def __init__(self, text: str) -> None:
+            self.text = text
+
+    assert is_same_content({"a": [np.zeros(2), Note("x")]}, {"a": [np.zeros(2), Note("x")]})
+    assert not is_same_content({"a": [np.zeros(2), Note("x")]}, {"a": [np.zeros(2), Note("y")]})
+    assert not is_same_content([1], [1, 2])
+    assert not is_same_content(1, 1.0)
+    assert not is_same_content(np.zeros(2), np.zeros((2, 1)))
+    assert not is_same_content(np.array([0.0]), np.array([-0.0]))
 
 
 def rate(folder: Path, code: str, track: str) -> tuple[Path, str]:
