@@ -337,9 +337,11 @@ class Study:
     def list_starts(self, study_map: StudyMap) -> tuple[str, ...]:
         """Return the names of the starts of a map that are used."""
         environment = study_map.environment
-        if self.starts == (ALL_STARTS,):
-            return tuple(environment.starts)
-        return tuple(self.starts) or (environment.start().name,)
+        starts = tuple(self.starts)
+        if starts == (ALL_STARTS,):
+            starts = tuple(environment.starts)
+        # A map without starts has one by default.
+        return starts or (environment.start().name,)
 
     def load_controller_class(self, controller: str) -> type[Any]:
         """Return the class of a controller, from the text that the study contains."""
