@@ -159,3 +159,23 @@ def test_later_changes_of_a_slider_are_another_event():
         session.set_controller(pane, LLOYD)
     texts = [event.text for event in session.timeline.events]
     assert texts == ["limits changed", "limits changed", "Lloyd takes over", "Lloyd takes over"]
+
+
+def test_a_branch_lists_the_controllers_that_it_ran():
+    """Those of a later branch are not those of the branch that it left."""
+    session = start_session(LLOYD, RAPF)
+    advance_with_costs(session, 20)
+    session.set_controller(session.timeline.panes[0], RPF)
+    advance_with_costs(session, 20)
+    session.remove_pane(session.timeline.panes[1])
+    advance_with_costs(session, 20)
+    session.undo()
+    session.undo()
+    session.timeline.finish_seek()
+    advance_with_costs(session, 40)
+    session.timeline.cache_present()
+    branches = session.timeline.document.list_branches()
+    controllers = [{pane: choice.name for pane, choice in branch.controllers.items()} for branch in branches]
+    assert controllers == [{0: "lloyd", 1: "rapf"}, {0: "rpf"}]
+    assert "Lloyd" in branches[0].describe_end(session.timeline.scenario.dt)
+    assert {ghost.controller for ghost in session.timeline.ghosts} == {"rpf"}

@@ -123,7 +123,7 @@ def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_pat
     timeline = Session.open(load_session(path)).timeline
     dt = timeline.scenario.dt
     descriptions = [branch.describe_end(dt) for branch in timeline.document.list_branches()]
-    assert sorted(descriptions) == ["0.5 s", "0.5 s · 2.517 m"]
+    assert sorted(descriptions) == ["0.5 s", "0.5 s · RAPF 2.517 m"]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from robocov.controllers import CONTROLLERS
 from robocov_app.toolkit.widgets.tool_tip import TIP_DELAY_S
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
 from robocov_app.viewer.panel.panel import ViewerPanel, label_controllers
+from robocov_app.viewer.session.playback import Playback
 
 # the panel
 
@@ -26,6 +27,28 @@ def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     assert driver.find("entry", "k_att") is None
     driver.choose("controller:0", "Lloyd")
     assert driver.session.timeline.panes[0].controller.name == "lloyd"
+
+
+def test_the_menu_shows_the_controller_of_a_branch_that_takes_long_to_reach(
+    driver: Driver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The state of the branch is reached some frames after the command."""
+    driver.session.playback.is_playing = True
+    driver.frames(20)
+    driver.session.playback.is_playing = False
+    driver.choose("controller:0", "RPF")
+    driver.choose("controller:0", "Lloyd")
+    driver.key("ctrl+z", times=2)
+    monkeypatch.setattr("robocov_app.viewer.session.playback.SEEK_SLICE_S", 0.0)
+    monkeypatch.setattr(Playback, "seek_seconds", 0.0)
+    for _ in range(3):
+        driver.key("alt+left")
+        driver.frames(60)
+        assert not driver.session.timeline.is_seeking
+        displayed = driver.session.displayed.get_setup(driver.session.timeline.panes[0]).controller
+        menu = driver.find("menu", "controller:0")
+        assert menu is not None
+        assert menu.value == displayed.label
 
 
 def test_user_controllers_with_equal_labels_have_unique_menu_entries(tmp_path: Path) -> None:

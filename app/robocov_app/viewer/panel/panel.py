@@ -116,7 +116,17 @@ class ViewerPanel(CommandPanel):
             self.ui.stop_typing()
         viewer = self.viewer
         session = viewer.session
-        content = (viewer.revision, self.tab, viewer.view.theme, session.playback.is_playing, id(self.report))
+        setups = tuple(session.displayed.get_setup(pane) for pane in session.timeline.panes)
+        content = (
+            viewer.revision,
+            self.tab,
+            viewer.view.theme,
+            session.playback.is_playing,
+            id(self.report),
+            # A seek ends some frames after the command that started it.
+            session.timeline.past_version,
+            setups,
+        )
         is_running = session.playback.is_playing and not session.timeline.is_settled
         is_old = is_running and self._age_s >= _REDRAW_INTERVAL_S
         if content != self.drawn_state or is_old:

@@ -6,7 +6,7 @@ child.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from operator import attrgetter
@@ -14,7 +14,7 @@ from typing import NamedTuple, Self
 
 from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.edits import Restart, SessionEdit
+from robocov_app.viewer.session.edits import RemovePane, Restart, SessionEdit, SetController
 from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
 from robocov_app.viewer.session.past.curves import Curve, SessionEvent
 from robocov_app.viewer.session.past.states import RunState
@@ -55,8 +55,6 @@ class Node:
         Cost curves by pane and quantity.
     trails : dict
         Trajectories in the time span of the node, by pane; like the states, they are not in files.
-    controllers : dict
-        Controllers by pane.
     automatic_events : set of AutomaticEvent
         Robots that failed or joined by themselves.
     """
@@ -73,7 +71,7 @@ class Node:
     cached_states: list[RunState] = field(default_factory=list, repr=False)
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
     trails: dict[int, list[TrailSection]] = field(default_factory=dict, repr=False)
-    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)
+
     automatic_events: set[AutomaticEvent] = field(default_factory=set, repr=False)
 
     @property
@@ -124,11 +122,14 @@ class Branch(NamedTuple):
         Its last step.
     description : str
         Its name, or the description of the last edit.
+    controllers : mapping of int to ControllerChoice
+        Controllers at its end, by pane.
     """
 
     node: Node
     last_step: int
     description: str
+    controllers: Mapping[int, ControllerChoice]
 
     def describe_end(self, dt: float) -> str:
         """Describe the time and the mean distances at the end of the branch.
@@ -147,10 +148,8 @@ class Branch(NamedTuple):
         for (pane, quantity), curve in sorted(self.node.curves.items()):
             if quantity != "distance" or not len(curve):
                 continue
-            # The controllers of a file are only known after its edits have been repeated.
-            controller = self.node.controllers.get(pane)
-            label = controller.label if controller else ""
-            parts.append(f"{label} {curve.interpolate(time):.3f} m".lstrip())
+            if pane in self.controllers:
+                parts.append(f"{self.controllers[pane].label} {curve.interpolate(time):.3f} m")
         return " · ".join(parts)
 
 
@@ -225,8 +224,21 @@ class SessionDocument:
             # If a child starts at the end of its parent, the branch goes on with the child.
             children = [child for child in self.nodes if child.parent is node]
             if all(child.branch_step < node.last_step for child in children):
-                branches.append(Branch(node, node.last_step, node.name or node.description))
+                controllers = self.find_controllers(node)
+                branches.append(Branch(node, node.last_step, node.name or node.description, controllers))
         return branches
+
+    def find_controllers(self, node: Node) -> dict[int, ControllerChoice]:
+        """Return the controllers at the end of a node, by pane."""
+        path = self.get_path(node)
+        controllers = dict(enumerate(path[0].require_scenario().controllers))
+        for ancestor in path:
+            for edit in ancestor.edits:
+                if isinstance(edit, SetController):
+                    controllers[edit.pane] = edit.controller
+                elif isinstance(edit, RemovePane):
+                    controllers.pop(edit.pane, None)
+        return controllers
 
     def find_branch(self, name: str) -> Branch:
         """Return the branch with a name, or with a number from 1 on.

@@ -138,7 +138,7 @@ def build_present(
 
 
 def cache_present(document: SessionDocument, present: Present) -> None:
-    """Store the states, curves and controllers of the present in the nodes on the path to it.
+    """Store the states, trails and curves of the present in the nodes on the path to it.
 
     They are used when the timeline returns to this branch from another one.
 
@@ -161,7 +161,7 @@ def cache_present(document: SessionDocument, present: Present) -> None:
             node.trails[pane.number] = merge_sections(
                 pane.trail.extract(node.first_step * dt, end_time), node.trails.get(pane.number, [])
             )
-            node.controllers[pane.number] = pane.controller
+
             for quantity, curve in pane.curves.items():
                 merged = curve.extract(node.first_step * dt, end_time)
                 merged.extend(node.curves[pane.number, quantity])

@@ -50,7 +50,7 @@ def _build_branch_curves(
     branch_last_steps = document.get_last_steps(branch.node, branch.last_step)
     path = document.get_path(branch.node)
     ghosts = []
-    for pane, controller in branch.node.controllers.items():
+    for pane, controller in branch.controllers.items():
         for quantity in QUANTITIES:
             curve = Curve()
             for node in path:
