@@ -44,6 +44,8 @@ class SharedWindow:
         Thread for reading and writing files.
     state : dict
         State of the window that pages show besides its frames: cursor, title, saved files and clipboard.
+    uploads : dict
+        Times at which uploaded files were written, s since the epoch, by their names.
     """
 
     pages: Pages
@@ -54,6 +56,7 @@ class SharedWindow:
     state: dict[str, Any] = field(
         default_factory=lambda: {"cursor": "default", "title": "robocov", "saved": ()}
     )
+    uploads: dict[str, float] = field(default_factory=dict)
 
 
 class _EventBudget:
@@ -208,6 +211,8 @@ class Conversation:
             self._page.notify(str(error))
             report(str(error))
             return
+        with suppress(OSError):
+            self._shared.uploads[path.name] = path.stat().st_mtime
         self._shared.window_input.put(events.Uploaded(path=str(path)))
 
     # Messages to the page.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
@@ -111,13 +113,25 @@ def check_name(name: str) -> None:
         raise TransferError(f"{name}: expected a map, an image or a session (.robocov)")
 
 
-def list_saved(folder: Path, since: float) -> tuple[str, ...]:
-    """Return the names of the files and folders that windows saved since a time, the newest first."""
+def list_saved(
+    folder: Path, since: float, uploads: Mapping[str, float] = MappingProxyType({})
+) -> tuple[str, ...]:
+    """Return the names of the files and folders that windows saved since a time, the newest first.
+
+    Parameters
+    ----------
+    folder : Path
+    since : float
+        The time, s since the epoch.
+    uploads : mapping of str to float
+        Times at which uploaded files were written, by their names. They are left out until they are saved.
+    """
     try:
         offered = [path for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES) if _is_offered(path)]
         dated_names = [(path.stat().st_mtime, path.name) for path in offered]
     except OSError:
         return ()
+    dated_names = [(time, name) for time, name in dated_names if uploads.get(name) != time]
     recent = sorted((pair for pair in dated_names if pair[0] >= since), reverse=True)
     return tuple(name for _, name in recent[:_MAX_OFFERED])
 

@@ -6,7 +6,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from robocov.errors import RobocovError
@@ -126,7 +125,6 @@ class Pages:
         self.people: list[dict[str, Any]] = []
         self._on_control_change = on_control_change
         self._pages: list[Page] = []
-        self._numbers = count(1)
 
     def __iter__(self) -> Iterator[Page]:
         return iter(self._pages)
@@ -160,7 +158,7 @@ class Pages:
         earlier = self._find(page_id, is_teacher=is_teacher)
         if earlier is None and not is_teacher and self._count_viewers() >= MAX_VIEWERS:
             raise NoPlaceError(f"All {MAX_VIEWERS} places for viewers are taken. Trying again …")
-        number = next(self._numbers)
+        number = self._find_free_number()
         role = "Teacher" if is_teacher else "Viewer"
         page = Page(connection, number, is_teacher, f"{role} {number}", page_id)
         self._pages.append(page)
@@ -231,6 +229,14 @@ class Pages:
             if page_id and page.page_id == page_id and page.is_teacher == is_teacher:
                 return page
         return None
+
+    def _find_free_number(self) -> int:
+        """Return the lowest number that no page has, so that a page keeps its number when it is reloaded."""
+        used = {page.number for page in self._pages}
+        number = 1
+        while number in used:
+            number += 1
+        return number
 
     def _count_viewers(self) -> int:
         return sum(not page.is_teacher for page in self._pages)

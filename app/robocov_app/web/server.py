@@ -163,7 +163,7 @@ class WebDisplay:
             self._loop.call_soon_threadsafe(delivery.has_work.set)
         if monotonic() - self._files_listed_at >= SAVED_FILES_INTERVAL_S:
             self._files_listed_at = monotonic()
-            self.saved_files = list_saved(self.shared.folder, self._created_at)
+            self.saved_files = list_saved(self.shared.folder, self._created_at, self.shared.uploads)
         state = {
             "cursor": _CSS_CURSORS.get(cursor, "default"),
             "title": next(iter(pygame.display.get_caption()), "robocov"),

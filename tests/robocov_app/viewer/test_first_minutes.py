@@ -21,7 +21,7 @@ from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import ViewerLauncher, ViewerSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.files.workspace import SessionWorkspace, find_recoverable_drafts
-from robocov_app.viewer.window.status import describe_cursor, list_facts, suggest_actions
+from robocov_app.viewer.window.status import describe_cursor, suggest_actions
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
 
@@ -142,15 +142,6 @@ def test_a_controller_name_is_not_cut_beside_a_large_cost(tmp_path: Path, drawn_
         drawn_texts.clear()
         driver.window.draw()
         assert "RAPF  4.023  +117 %" in drawn_texts
-
-
-def test_a_low_frame_rate_comes_before_the_cursor_in_the_status_line(tmp_path: Path) -> None:
-    with open_viewer(tmp_path) as driver:
-        driver.move(*driver.pixel(MIDDLE))
-        slow = list_facts(driver.viewer, 9.0, 60.0, None)
-        fast = list_facts(driver.viewer, 60.0, 60.0, None)
-        assert slow.index("9 fps") < slow.index(describe_cursor(driver.viewer))
-        assert fast.index("60 fps") > fast.index(describe_cursor(driver.viewer))
 
 
 def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None:

@@ -219,11 +219,11 @@ def test_displayed_values_can_be_typed():
     assert parameter.format() == "0.125"
     assert parameter.parse(parameter.format()) == 0.125
     unlimited = replace(parameter, value=None)
-    assert unlimited.format() == "none"
-    assert unlimited.parse("none") is None
+    assert unlimited.format() == "unlimited"
+    assert unlimited.parse("unlimited") is None
 
 
-@pytest.mark.parametrize("text", ["none", " None ", "null", "no limit", "inf", "∞", ""])
+@pytest.mark.parametrize("text", ["unlimited", "none", " None ", "null", "no limit", "inf", "∞", ""])
 def test_no_limit_can_be_typed_in_several_ways(text):
     assert build_parameter(1.0, 0.0, 9.0, optional=True).parse(text) is None
 
@@ -239,8 +239,8 @@ def test_invalid_numbers_are_rejected(text):
         build_parameter(1.0, 0.0, 9.0).parse(text)
 
 
-def test_the_message_for_optional_gains_names_none():
-    with pytest.raises(ParameterError, match="expected a number, or none"):
+def test_the_message_for_optional_gains_names_the_way_to_have_no_limit():
+    with pytest.raises(ParameterError, match="expected a number, or unlimited"):
         build_parameter(1.0, 0.0, 9.0, optional=True).parse("many")
 
 

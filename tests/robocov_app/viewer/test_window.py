@@ -222,6 +222,7 @@ def test_held_keys_repeat_steps_but_not_screenshots(driver: Driver, tmp_path: Pa
     for code, name in ((pygame.K_F12, ""), (pygame.K_PERIOD, ".")):
         for _ in range(5):
             driver.post(pygame.KEYDOWN, key=code, mod=0, unicode=name, scancode=0)
+        driver.settle()
         driver.post(pygame.KEYUP, key=code, mod=0, unicode=name, scancode=0)
     driver.settle()
     assert [path.name for path in tmp_path.iterdir()] == ["robocov-1.png"]

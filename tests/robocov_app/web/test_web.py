@@ -329,11 +329,12 @@ def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
             # what others write there is not offered
             (tmp_path / "demo.log").write_text("")
             (tmp_path / "other").mkdir()
+            (tmp_path / "saved.json").write_text("{}")
             display.send(pygame.Surface((20, 20), 0, 32))
             while not (saved := told_to(line).get("saved")):
                 pass
-        assert set(saved) == {"hall.json", "run"}
-        for name, begins in (("hall.json", b"{}"), ("run", b"PK")):
+        assert set(saved) == {"saved.json", "run"}, "what was uploaded was not saved"
+        for name, begins in (("saved.json", b"{}"), ("run", b"PK")):
             address = display.link.replace("/?", f"/saved/{name}?")
             with urllib.request.urlopen(address) as answer:
                 assert answer.read().startswith(begins)

@@ -1,6 +1,7 @@
 """Names of keys, events without control characters, and notches of the wheel."""
 
 import math
+from collections.abc import Sequence
 
 import pygame
 
@@ -48,6 +49,37 @@ def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
     if event.type == pygame.DROPFILE:
         return pygame.event.Event(event.type, {**event.dict, "file": str(event.file).replace("\0", "")})
     return event
+
+
+def drop_late_repeats(events: Sequence[pygame.event.Event], held: set[int]) -> list[pygame.event.Event]:
+    """Leave out repetitions of a key that was released while the window was busy.
+
+    A key that is tapped while a frame takes long seems to be held, because its release has not been read.
+
+    Parameters
+    ----------
+    events : sequence of pygame.event.Event
+        All events that have arrived, the oldest first.
+    held : set of int
+        Keys that are held down before them; updated to those held down after them.
+
+    Returns
+    -------
+    list of pygame.event.Event
+    """
+    last_releases = {event.key: index for index, event in enumerate(events) if event.type == pygame.KEYUP}
+    timely: list[pygame.event.Event] = []
+    for index, event in enumerate(events):
+        if event.type == pygame.KEYDOWN:
+            if event.key in held and index < last_releases.get(event.key, -1):
+                continue
+            held.add(event.key)
+        elif event.type == pygame.KEYUP:
+            held.discard(event.key)
+        elif event.type == pygame.WINDOWFOCUSLOST:
+            held.clear()
+        timely.append(event)
+    return timely
 
 
 def get_key_name(event: pygame.event.Event) -> str:

@@ -15,7 +15,7 @@ from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_window
 from robocov_app.toolkit.window.faults import FaultLog
-from robocov_app.toolkit.window.input import clean_event
+from robocov_app.toolkit.window.input import clean_event, drop_late_repeats
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
 from robocov_app.toolkit.window.termination import is_ending
 
@@ -100,6 +100,7 @@ class BaseWindow:
         self.closed = False
         self.inner: BaseWindow | None = None
         self.remote: Remote | None = None
+        self._held_keys: set[int] = set()
         self.cursor = MouseCursor()
         self.faults = FaultLog()
         self.frame_rate = float(FPS)
@@ -209,7 +210,7 @@ class BaseWindow:
         remote = self.remote
         if remote is not None:
             self._run_contained("receiving messages of a page", lambda: remote.receive(self))
-        events = pygame.event.get()
+        events = drop_late_repeats(pygame.event.get(), self._held_keys)
         self._had_events = bool(events)
         for event in events:
             if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):

@@ -11,6 +11,10 @@ from robocov_app.viewer.panel.parameters import (
 )
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 
+_KINDS_NOT_REPEATED = frozenset({"hand", "robot", "failure"})
+"""Kinds of events that a restart does not repeat. Maps, controllers and limits stay as they are."""
+_MAX_LISTED_EVENTS = 3
+
 
 class ComparisonActions:
     """Chooses controllers and their gains, in one pane or in several.
@@ -30,9 +34,18 @@ class ComparisonActions:
         present = {pane.controller.name for pane in viewer.session.timeline.panes}
         absent = [name for name in viewer.controllers if name not in present]
         name = absent[0] if absent else viewer.controllers[0]
-        viewer.session.add_pane(ControllerChoice(name))
-        viewer.inspection.active_pane = len(viewer.session.timeline.panes) - 1
-        viewer.show_message("all controllers restart from the same starts")
+        session = viewer.session
+        events = session.timeline.events
+        dropped = [event.text for event in events if event.kind in _KINDS_NOT_REPEATED]
+        session.add_pane(ControllerChoice(name))
+        viewer.inspection.active_pane = len(session.timeline.panes) - 1
+        message = "all controllers restart from the same starts"
+        if dropped:
+            listed = ", ".join(dropped[:_MAX_LISTED_EVENTS])
+            if len(dropped) > _MAX_LISTED_EVENTS:
+                listed += f" and {len(dropped) - _MAX_LISTED_EVENTS} more"
+            message += f"; not repeated: {listed}. Undo (Ctrl+Z) returns to them."
+        viewer.show_message(message)
 
     def remove_pane(self) -> None:
         """Remove the active pane."""

@@ -134,10 +134,20 @@ class FileActions:
         self._viewer.show_message(f"session saved: {saved}")
 
     def open_file(self, path: Path) -> None:
-        """Open a file that contains a session or a map."""
+        """Open a file that contains a session or a map.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or cannot be read.
+        """
         require_regular_file(path)
         if path.suffix == SUFFIX:
             self.open_session(path)
+        elif path.suffix.lower() != ".json":
+            raise InputError(
+                f"{path}: expected a session ({SUFFIX}) or a map (.json). robocov edit imports other formats."
+            )
         else:
             self.open_map(str(path))
             self._viewer.show_message(f"map opened: {path}")

@@ -31,9 +31,11 @@ from robocov_app.viewer.canvas.tool_overlay import (
 )
 from robocov_app.viewer.costs.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.view import FADE_S
+from robocov_app.viewer.window.status import MIN_UNCOVERED_AREA_M2
 
 MAX_RAYS_PER_SCAN = 120
 MAX_RAYS_PER_PANE = 720
@@ -74,6 +76,7 @@ class ViewerCanvas:
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._environment: Environment | None = None
+        self._root: Node | None = None  # of the run that is shown
         self._camera: Camera | None = None  # None while the whole map is shown
         self._color_limit = 1.0  # end of the color scale of distances, m
         self._legend = SharedLegend(theme)
@@ -82,14 +85,14 @@ class ViewerCanvas:
         """Build the painters of the panes for a layout of the window."""
         self.layout = layout
         self.theme = theme
-        self._environment = self.viewer.session.displayed.environment
+        environment = self._adopt_environment()
         self._painters = []
         for _, _, width, height in layout.panes:
             layers = build_standard_layers()
             if len(layout.panes) > 1:
                 # Panes share the time, which is in the window's own status line.
                 layers = [layer for layer in build_pane_layers() if layer.name != "status"]
-            painter = Painter(self._environment, (width, height), theme, layers, layout.scale)
+            painter = Painter(environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.with_view(painter.camera.view)
             self._painters.append(painter)
@@ -168,7 +171,7 @@ class ViewerCanvas:
     def draw(self, screen: pygame.Surface) -> None:
         """Draw all panes."""
         session = self.viewer.session
-        self._update_environment(session.displayed.environment)
+        self._adopt_environment()
         self._scenes = []
         panes = session.timeline.panes
         # A pane that was just added has no place in the layout yet.
@@ -185,16 +188,23 @@ class ViewerCanvas:
             self._draw_frames(screen)
             self._legend.draw(screen, self._list_legend_entries(), self.layout, self._get_layers())
 
-    def _update_environment(self, environment: Environment) -> None:
-        """Let the painters show the present map; show all of it if its bounds have changed."""
+    def _adopt_environment(self) -> Environment:
+        """Show the present map: all of it if it is another one, not only edited."""
+        environment = self.viewer.session.displayed.environment
+        timeline = self.viewer.session.timeline
+        root = timeline.document.get_path(timeline.head)[0]
+        is_other_run = root is not self._root
         before = self._environment
-        if environment is before:
-            return
+        self._root = root
         self._environment = environment
+        if before is None or before is environment:
+            return environment
         for painter in self._painters:
             painter.environment = environment
-        if before is not None and before.region.bounds != environment.region.bounds:
+        is_other_map = is_other_run and not environment.has_same_geometry(before)
+        if is_other_map or before.region.bounds != environment.region.bounds:
             self.fit()
+        return environment
 
     def _build_scene(self, pane: Pane, painter: Painter) -> Scene:
         viewer = self.viewer
@@ -262,6 +272,10 @@ class ViewerCanvas:
             return ""
         name = get_cost_name(displayed.get_setup(pane).environment)
         text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
+        known = self.viewer.costs.known.get(pane.number)
+        if known is not None and known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
+            # The mean is that of the rest, and gets better when robots are locked out of a room.
+            text += f" without {known.result.uncovered_area:.1f} m² cut off"
         if displayed.time - time > MAX_COST_LAG_S:
             return f"{text} at {time:.1f} s"
         return text

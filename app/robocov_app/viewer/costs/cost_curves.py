@@ -75,7 +75,7 @@ class CostCurves:
         They are requested backwards from the first known cost; while the run plays, only every other time.
         """
         session = self._viewer.session
-        if session.timeline.head.kind != "begin" or not session.timeline.is_live:
+        if not session.timeline.is_live:
             return
         if session.playback.is_playing and self.answer_count % 2:
             return
@@ -88,7 +88,10 @@ class CostCurves:
             if first_time > 2 * MAX_INITIAL_GAP_S:
                 target = first_time - MAX_INITIAL_GAP_S
             index = history.find_index(target)
-            state = history[index].states[pane.number]
+            state = history[index].states.get(pane.number)
+            # The costs are those of the displayed map.
+            if state is None or state.setup.environment is not session.displayed.environment:
+                continue
             self._viewer.costs.ask(
                 pane.number,
                 history.get_time(index),

@@ -56,6 +56,8 @@ _REPORT_INDENT_PX = 34.0
 _LABEL_PX = 100
 _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
+_NUMBER_PX = (50, 34)  # the value and its unit
+_UNLIMITED_PX = (87,)  # a word in place of both
 # Columns of the rows with the controllers; each has a button that removes its pane, and a gap.
 _SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
 _TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
@@ -246,7 +248,10 @@ class ViewerPanel(CommandPanel):
     def _show_slider(self, ui: Ui, parameter: NumberParameter) -> None:
         name = parameter.name
         unit = parameter.unit
-        ui.row(_LABEL_PX, 0, 50, 34, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        columns: tuple[int, ...] = _NUMBER_PX
+        if parameter.is_unlimited:
+            columns = _UNLIMITED_PX
+        ui.row(_LABEL_PX, 0, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=f"{parameter.meaning} ({unit})" if unit else parameter.meaning)
         position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
         if position is not None:
@@ -254,8 +259,9 @@ class ViewerPanel(CommandPanel):
         text = ui.text_field(name, parameter.format())
         if text is not None:
             self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
-        ui.label(unit, key=f"unit:{name}", style="unit")
-        default = "no limit" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()
+        if not parameter.is_unlimited:
+            ui.label(unit, key=f"unit:{name}", style="unit")
+        default = "unlimited" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()
         self._show_reset(ui, parameter, default)
 
     def _show_options(self, ui: Ui, parameter: OptionParameter) -> None:

@@ -13,7 +13,7 @@ from robocov_app.viewer.session.robot_properties import RobotProperties
 
 SLIDER_SPAN = 30.0  # a slider reaches from 1 / 30 of the default to 30 times the default
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
-NO_LIMIT_TEXTS = ("none", "null", "no limit", "inf", "∞", "")
+NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
 
 
 class _LimitSlider(NamedTuple):
@@ -78,9 +78,14 @@ class NumberParameter:
         """Values that can be listed: none."""
         return ()
 
+    @property
+    def is_unlimited(self) -> bool:
+        """Whether there is no limit at present."""
+        return self.value is None or math.isinf(self.value)
+
     def compute_position(self) -> float:
         """Return the position of the slider, 0 to 1: logarithmic, unless the range includes 0."""
-        if self.value is None or math.isinf(self.value):
+        if self.is_unlimited or self.value is None:
             return 1.0
         position = 0.0
         if self.high > self.low:
@@ -103,8 +108,8 @@ class NumberParameter:
 
     def format(self) -> str:
         """Return the value as text."""
-        if self.value is None or math.isinf(self.value):
-            return "none"
+        if self.is_unlimited:
+            return "unlimited"
         return f"{self.value:.4g}"
 
     def parse(self, text: str) -> float | None:
@@ -121,7 +126,7 @@ class NumberParameter:
         try:
             return float(plain)
         except ValueError:
-            alternative = ", or none" if self.is_optional else ""
+            alternative = ", or unlimited" if self.is_optional else ""
             message = f"{self.label}: expected a number{alternative}, got {quote(text)}"
             raise ParameterError(message) from None
 

@@ -9,10 +9,11 @@ from robocov_app.viewer.session.clock import format_speed
 from robocov_app.viewer.session.pane import Pane
 
 HINT = "Space pause · F1 keys"
-LOW_FRAME_RATE = 30.0  # frames per second; a lower rate is listed before other facts
+
 MAX_SUGGESTIONS = 3
 _MAX_COST_LAG_S = 0.05  # an older cost is shown with its time
-_MIN_UNCOVERED_AREA_M2 = 1e-9
+MIN_UNCOVERED_AREA_M2 = 1e-9
+"""Area above which a part of the map counts as cut off."""
 _MAX_SITE_DISTANCE = 1.5  # spacings of the lattice: farther points are not free
 
 _SUGGESTIONS = {
@@ -50,16 +51,17 @@ def list_facts(
         facts += _list_cost_facts(known, time)
     if video_duration is not None:
         facts.append(f"● video {video_duration:.0f} s")
-    rate = f"{frame_rate:.0f} fps"
-    rest = [describe_cursor(viewer), _describe_speed(viewer, step_rate), f"{step_rate:.0f} steps/s"]
-    facts += [rate, *rest] if frame_rate < LOW_FRAME_RATE else [*rest, rate]
+    facts.append(describe_cursor(viewer))
+    facts.append(_describe_speed(viewer, step_rate))
+    facts.append(f"{step_rate:.0f} steps/s")
+    facts.append(f"{frame_rate:.0f} fps")
     return [fact for fact in facts if fact]
 
 
 def _list_cost_facts(known: KnownCost, time: float) -> list[str]:
     age = f" (at {known.time:.1f} s)" if abs(known.time - time) > _MAX_COST_LAG_S else ""
     facts = [f"J = {known.result.value:.2f} m³{age}"]
-    if known.result.uncovered_area > _MIN_UNCOVERED_AREA_M2:
+    if known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
         facts.append(f"cut off {known.result.uncovered_area:.1f} m²")
     return facts
 

@@ -298,7 +298,8 @@ class ViewerWindow(CommandWindow):
 
     def do(self, name: str) -> None:
         """Run a command by its name; lesson and help take some of them."""
-        if self.lesson.handle_command(name):
+        closes_help = name == "cancel" and self.is_help_open
+        if not closes_help and self.lesson.handle_command(name):
             return
         super().do(name)
         self.panel.report = None

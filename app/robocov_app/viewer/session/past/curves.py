@@ -1,6 +1,5 @@
 """Cost curves of the time line, curves of other branches, and events."""
 
-import math
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -87,11 +86,13 @@ class Curve:
         Returns
         -------
         list of list of float
-            Times, s, and values. The newest sample is always among them.
+            Times, s, and values. The first and the newest sample are always among them.
         """
-        stride = max(math.ceil(len(self) / maximum), 1)
-        times = self._times[::-stride][::-1]
-        values = self._values[::-stride][::-1]
+        count = min(maximum, len(self))
+        # A single sample is the newest.
+        indices = np.unique(np.linspace(len(self) - 1, 0, count).round().astype(int)).tolist()
+        times = [self._times[index] for index in indices]
+        values = [self._values[index] for index in indices]
         return [
             [round(time, _FILE_TIME_DECIMALS) for time in times],
             [float(f"{value:.5g}") for value in values],

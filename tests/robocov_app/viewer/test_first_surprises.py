@@ -1,0 +1,183 @@
+"""What surprised people who used the window for the first time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from driven_window import Driver, build_key_event, open_viewer
+from sample_sessions import HALL, advance_session
+
+from robocov.environment import WallObstacle
+from robocov.mapfile import save_map
+from robocov_app.toolkit.window.input import drop_late_repeats
+from robocov_app.viewer.panel.parameters import list_limit_parameters
+from robocov_app.viewer.session.files.session_file import MAX_FILE_SAMPLES
+from robocov_app.viewer.session.past.curves import Curve
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.window.status import list_facts
+
+
+def post_tap_while_busy(driver: Driver, name: str, repeats: int) -> None:
+    """Post the events of a key that was tapped while the window was busy: it seems to be held."""
+    attributes = build_key_event(name)
+    for _ in range(1 + repeats):
+        driver.post(pygame.KEYDOWN, **attributes)
+    driver.post(pygame.KEYUP, **attributes)
+    driver.settle()
+
+
+def test_a_tap_undoes_one_edit_however_long_the_frame_takes(driver: Driver) -> None:
+    for number in (1, 2):
+        driver.viewer.attempt(lambda number=number: driver.session.fail_robot(number))
+    post_tap_while_busy(driver, "ctrl+z", repeats=3)
+    assert len(driver.session.timeline.events) == 1
+    post_tap_while_busy(driver, "ctrl+z", repeats=3)
+    assert driver.session.timeline.events == []
+
+
+def test_a_key_that_is_held_still_repeats(driver: Driver) -> None:
+    for number in (1, 2):
+        driver.viewer.attempt(lambda number=number: driver.session.fail_robot(number))
+    attributes = build_key_event("ctrl+z")
+    for _ in range(2):
+        driver.post(pygame.KEYDOWN, **attributes)
+        driver.settle()
+    assert driver.session.timeline.events == []
+
+
+def test_keys_pressed_one_after_the_other_within_a_frame_all_count() -> None:
+    down = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_z)
+    up = pygame.event.Event(pygame.KEYUP, key=pygame.K_z)
+    held: set[int] = set()
+    assert drop_late_repeats([down, up, down, up], held) == [down, up, down, up]
+    assert drop_late_repeats([down, down, up], held) == [down, up]
+    assert drop_late_repeats([down, down], held) == [down, down]
+    assert held == {pygame.K_z}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_all_of_a_new_map_is_shown(driver: Driver, tmp_path: Path, scale: float) -> None:
+    """Also of one with the same name and bounds, and of one with another shape."""
+    boundary = tuple((scale * x, y) for x, y in HALL.boundary)
+    other = replace(HALL, boundary=boundary, obstacles=(), starts={})
+    save_map(other, tmp_path / "hall.json")
+    driver.wheel(200, 150, 5)
+    driver.wheel(200, 150, 5)
+    driver.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
+    driver.settle()
+    driver.frames(2)
+    left, top, width, height = driver.window.layout.panes[0]
+    for corner in boundary:
+        x, y = driver.pixel(corner)
+        assert left <= x <= left + width
+        assert top <= y <= top + height
+
+
+def test_the_view_stays_while_the_map_is_edited(driver: Driver) -> None:
+    driver.wheel(200, 150, 5)
+    before = driver.pixel((1.0, 1.0))
+    driver.viewer.attempt(lambda: driver.session.edit_map(replace(HALL, obstacles=()), "emptied"))
+    driver.frames(2)
+    driver.key("ctrl+z")
+    driver.frames(2)
+    driver.key("n")
+    driver.frames(2)
+    assert driver.pixel((1.0, 1.0)) == pytest.approx(before)
+
+
+def test_no_limit_is_called_unlimited(driver: Driver) -> None:
+    parameters = {parameter.name: parameter for parameter in list_limit_parameters(RobotProperties())}
+    communication = parameters["team.communication_range"]
+    assert communication.format() == "unlimited"
+    assert communication.parse(" Unlimited ") is None
+    entry = driver.widget("entry", "team.communication_range")
+    assert entry.text == "unlimited"
+    assert driver.find("label", "unit:team.communication_range") is None
+
+
+def test_escape_closes_the_help_before_the_lesson(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.key("f2")
+        driver.key("f1")
+        assert driver.window.is_help_open
+        driver.key("escape")
+        assert not driver.window.is_help_open
+        assert driver.window.lesson.player is not None
+        driver.key("escape")
+        assert driver.window.lesson.player is None
+
+
+def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
+    driver.viewer.attempt(lambda: driver.session.fail_robot(2))
+    driver.viewer.attempt(lambda: driver.session.place_robot(1, (1.0, 3.0)))
+    driver.push("pane:add")
+    message = driver.viewer.message
+    assert "not repeated: robot 2 failed, robot 1 was moved" in message
+    driver.key("ctrl+z")
+    assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
+
+
+def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
+    driver.push("pane:add")
+    assert driver.viewer.message == "all controllers restart from the same starts"
+
+
+def test_a_curve_in_a_file_has_its_beginning() -> None:
+    curve = Curve()
+    for sample in range(MAX_FILE_SAMPLES + 100):
+        curve.add(0.1 * sample, 5.0)
+    times, _ = curve.sample(MAX_FILE_SAMPLES)
+    assert len(times) <= MAX_FILE_SAMPLES
+    assert times[0] == 0.0
+    assert times[-1] == pytest.approx(0.1 * (MAX_FILE_SAMPLES + 99))
+    assert np.diff(times).max() < 0.6
+
+
+def test_the_beginning_of_a_curve_is_computed_after_an_edit_too(driver: Driver) -> None:
+    """A session may be recovered after its first edit, with a curve that starts later."""
+    session = driver.session
+    advance_session(session, 60)
+    session.fail_robot(2)
+    advance_session(session, 30)
+    for pane in session.timeline.panes:
+        pane.distance_curve._times.clear()
+        pane.distance_curve._values.clear()
+    driver.frames(30)
+    times = session.timeline.panes[0].distance_curve.times
+    assert times[0] == pytest.approx(0.0, abs=0.35)
+
+
+def test_what_is_cut_off_is_shown_next_to_the_cost(tmp_path: Path) -> None:
+    wall = WallObstacle(((2.0, 0.0), (2.0, 4.0)), 0.1)
+    sealed = replace(HALL, obstacles=(wall,), starts={"corner": HALL.starts["corner"]})
+    for environment, is_cut_off in ((HALL, False), (sealed, True)):
+        with open_viewer(tmp_path, environment=environment) as driver:
+            driver.session.playback.is_playing = True
+            driver.frames(20)
+            caption = driver.window.canvas._scenes[0].cost
+            assert ("m² cut off" in caption) == is_cut_off, caption
+
+
+def test_facts_keep_their_order_at_any_frame_rate(driver: Driver) -> None:
+    driver.move(*driver.pixel((1.0, 3.0)))
+    orders = []
+    for rate in (5.0, 29.9, 30.1, 60.0):
+        facts = list_facts(driver.viewer, rate, 60.0, None)
+        orders.append([index for index, fact in enumerate(facts) if fact.endswith("fps")])
+    assert all(order == orders[0] for order in orders)
+
+
+@pytest.mark.parametrize("name", ["letter.docx", "letter", "plan.pdf"])
+def test_a_dropped_file_of_another_kind_is_rejected_with_a_way_out(
+    name: str, driver: Driver, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"PK\x03\x04")
+    driver.post(pygame.DROPFILE, file=str(path))
+    driver.settle()
+    assert driver.viewer.has_error_message
+    assert "expected a session (.robocov) or a map (.json)" in driver.viewer.message
