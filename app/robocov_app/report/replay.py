@@ -39,7 +39,7 @@ def build_replay_html(runs: Sequence[ReplayRun]) -> str:
 def build_replay_element(
     runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, max_bytes: int = MAX_BYTES
 ) -> str:
-    """Build a replay without style and script, for a page that contains `read_replay_css` and `read_replay_js` once.
+    """Build a replay for a page that contains `read_replay_css` and `read_replay_js` once.
 
     Parameters
     ----------
