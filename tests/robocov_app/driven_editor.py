@@ -1,4 +1,4 @@
-"""An editor without a display, and hands for it."""
+"""An editor without a display, and a driver that uses its window."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def sheet(*shapes: Any, **more: Any) -> Sketch:
     return Sketch(boundary=DEFAULT_BOUNDARY, **more).with_obstacles(shapes)[0]
 
 
-def of_map(name: str) -> Sketch:
+def load_sketch(name: str) -> Sketch:
     return Sketch.from_environment(load_map(name))
 
 
-def touched(path: Path, text: str) -> None:
+def rewrite_file(path: Path, text: str) -> None:
     path.write_text(text)
     stat = path.stat()
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10_000_000))
 
 
 @contextmanager
-def opened_editor(
+def open_editor(
     folder: Path,
     sketch: Sketch | None = None,
     *,
@@ -51,7 +51,7 @@ def opened_editor(
     document: Document | None = None,
     theme: str = "light",
     readings: Any = None,
-) -> Iterator[Hands]:
+) -> Iterator[EditorDriver]:
     """Open the editor without a display."""
     with open_display(headless=True):
         if document is None:
@@ -60,20 +60,20 @@ def opened_editor(
             document, readings or create_measurement_worker(direct=True), folder, EditorSettings()
         )
         editor.theme = theme
-        hands = Hands(EditorWindow(editor, size, scale, drafts, waits_for_workers=True))
-        hands.settle()
-        hands.frames(2)
+        driver = EditorDriver(EditorWindow(editor, size, scale, drafts, waits_for_workers=True))
+        driver.settle()
+        driver.run_frames(2)
         try:
-            yield hands
+            yield driver
         finally:
             if pygame.display.get_init():  # another window may have ended it
                 pygame.key.set_mods(0)
-            hands.window.close()
+            driver.window.close()
             editor.document.close(discard=False)
 
 
-class Hands(Driver):
-    """Does to an editor what people do."""
+class EditorDriver(Driver):
+    """Uses the editor as people do; each action takes one or more frames."""
 
     window: EditorWindow
 
@@ -98,17 +98,17 @@ class Hands(Driver):
     def shapes(self) -> list[Any]:
         return [item.shape for item in self.editor.sketch.obstacles]
 
-    def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
+    def find_pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
         return self.window.canvas.to_pixel(point)
 
-    def hold(self, *names: str) -> None:
+    def hold_keys(self, *names: str) -> None:
         """Hold keys down, or none."""
         pygame.key.set_mods(sum(MODIFIERS[name] for name in names))
 
-    def go(self, *points: tuple[float, float], held: int = 0) -> None:
+    def move_to(self, *points: tuple[float, float], held: int = 0) -> None:
         """Move to places, m."""
         for point in points:
-            self.move(*self.pixel(point), held=held)
+            self.move(*self.find_pixel(point), held=held)
 
     def click_all(self, *points: tuple[float, float]) -> None:
         """Click places one after the other, too slowly for double clicks."""
@@ -116,7 +116,7 @@ class Hands(Driver):
             self.wait()
             self.click_at(point)
 
-    def twice(self, point: tuple[float, float]) -> None:
+    def double_click(self, point: tuple[float, float]) -> None:
         """Click a place twice, quickly."""
         self.wait()
         self.click_at(point)
@@ -125,18 +125,18 @@ class Hands(Driver):
     def wait(self, seconds: float = 0.5) -> None:
         self.window.run_frame(seconds)
 
-    def answer(self, text: str) -> None:
+    def click_answer(self, text: str) -> None:
         """Click a button of the question that is asked."""
         self.settle()
         shown = self.window.dialogs.ui.widgets
         found = next(each for each in shown.values() if each.kind == "button" and each.text == text)
         self.click(*found.rect.center)
 
-    def refused(self) -> str:
+    def read_refusal(self) -> str:
         """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
         asked = self.editor.dialogs.current
         assert isinstance(asked, Choice) and asked.error, "nothing was refused"
-        self.key("escape")
+        self.press_key("escape")
         assert self.editor.dialogs.current is None
         return asked.error
 
@@ -144,12 +144,12 @@ class Hands(Driver):
         self.editor.select(Selection.of(*keys))
         self.settle()
 
-    def command(self, text: str) -> None:
+    def run_command(self, text: str) -> None:
         """Type a command into the palette."""
-        self.key("ctrl+k")
+        self.press_key("ctrl+k")
         self.type(text)
-        self.key("return")
+        self.press_key("return")
 
     @property
-    def said(self) -> str:
+    def message(self) -> str:
         return self.editor.message

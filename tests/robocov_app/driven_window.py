@@ -111,7 +111,7 @@ class Driver:
     def session(self) -> Session:
         return self.viewer.session
 
-    def frames(self, count: int = 1, seconds: float = FRAME) -> None:
+    def run_frames(self, count: int = 1, seconds: float = FRAME) -> None:
         for _ in range(count):
             self.window.run_frame(seconds)
 
@@ -157,30 +157,30 @@ class Driver:
             self.move(x, y, held=button)
         self.release(button)
 
-    def wheel(self, x: float, y: float, amount: int) -> None:
+    def turn_wheel(self, x: float, y: float, amount: int) -> None:
         self.move(x, y)
         self.post(pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False)
         self.settle()
 
     # positions in the arena
 
-    def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
+    def find_pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
         return self.window.canvas.to_pixel(point, pane)
 
-    def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
+    def find_robot_pixel(self, number: int, pane: int = 0) -> tuple[float, float]:
         """Return the pixel at which a robot is drawn."""
         x, y = get_position(self, number, pane).tolist()
-        return self.pixel((x, y), pane)
+        return self.find_pixel((x, y), pane)
 
     def click_at(self, point: tuple[float, float], pane: int = 0, button: int = 1) -> None:
-        self.click(*self.pixel(point, pane), button)
+        self.click(*self.find_pixel(point, pane), button)
 
     def drag_at(self, *points: tuple[float, float], pane: int = 0) -> None:
-        self.drag(*(self.pixel(point, pane) for point in points))
+        self.drag(*(self.find_pixel(point, pane) for point in points))
 
     # keys
 
-    def key(self, name: str, times: int = 1) -> None:
+    def press_key(self, name: str, times: int = 1) -> None:
         """Press a key by its name in the list of commands, as in ``ctrl+shift+z``."""
         attributes = build_key_event(name)
         for _ in range(times):
@@ -200,29 +200,29 @@ class Driver:
 
     # the panel
 
-    def widget(self, kind: str, name: str) -> Widget:
+    def get_widget(self, kind: str, name: str) -> Widget:
         self.window.draw()
         assert not self.window.panel.hidden, "the panel is hidden"
-        found = self.find(kind, name)
+        found = self.find_widget(kind, name)
         assert found is not None, f"no {kind} {name}"
         return found
 
-    def find(self, kind: str, name: str) -> Widget | None:
+    def find_widget(self, kind: str, name: str) -> Widget | None:
         return self.window.panel.ui.find(kind, name)
 
-    def push(self, name: str) -> None:
+    def push_button(self, name: str) -> None:
         """Press a button of the panel."""
-        self.click(*self.widget("button", name).rect.center)
+        self.click(*self.get_widget("button", name).rect.center)
 
-    def turn(self, tab: str) -> None:
-        self.push(f"tab:{tab}")
+    def open_tab(self, tab: str) -> None:
+        self.push_button(f"tab:{tab}")
 
-    def tick(self, name: str) -> None:
-        self.click(*self.widget("check", name).rect.center)
+    def toggle_check_box(self, name: str) -> None:
+        self.click(*self.get_widget("check", name).rect.center)
 
-    def choose(self, menu: str, option: str) -> None:
+    def choose_option(self, menu: str, option: str) -> None:
         """Open a menu of the panel, scroll to an option, and choose it."""
-        self.click(*self.widget("menu", menu).rect.center)
+        self.click(*self.get_widget("menu", menu).rect.center)
         found = self.window.panel.ui.open_list
         assert found is not None
         assert option in found.options, f"no {option} in {menu}"
@@ -230,36 +230,36 @@ class Driver:
         for _ in range(100):
             if found.rect.contains(item):
                 break
-            self.wheel(*found.rect.center, 1 if item.top < found.rect.top else -1)
+            self.turn_wheel(*found.rect.center, 1 if item.top < found.rect.top else -1)
             item = found.get_item_rect(found.options.index(option))
         self.click(*item.center)
 
-    def write(self, field: str, text: str) -> None:
+    def type_into(self, field: str, text: str) -> None:
         """Click into a field, and type."""
-        self.click(*self.widget("entry", field).rect.center)
+        self.click(*self.get_widget("entry", field).rect.center)
         self.type(text)
 
-    def slide(self, name: str, part: float) -> None:
+    def drag_slider(self, name: str, part: float) -> None:
         """Drag a slider's knob to a fraction of its way."""
-        knob, free = self.knob(name)
-        x = self.widget("slider", name).rect.left + knob.width / 2 + part * free
+        knob, free = self.find_knob(name)
+        x = self.get_widget("slider", name).rect.left + knob.width / 2 + part * free
         self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
 
-    def knob(self, name: str) -> tuple[pygame.Rect, float]:
+    def find_knob(self, name: str) -> tuple[pygame.Rect, float]:
         """Return the rectangle of a slider's knob, and the length by which it can move, px."""
-        slider = self.widget("slider", name)
+        slider = self.get_widget("slider", name)
         high = len(SPEEDS) - 1.0 if name == "speed" else 1.0
         width = round(12 * self.window.layout.scale)
         free_width = slider.rect.width - width
         left = slider.rect.left + round(free_width * slider.value / high)
         return pygame.Rect(left, slider.rect.top, width, slider.rect.height), free_width
 
-    def picture(self) -> Any:
+    def copy_frame(self) -> Any:
         """Return the pixels of the window."""
         return copy_pixels(self.window.screen).astype(int)
 
-    def same(self, other: Any) -> bool:
-        return bool(np.array_equal(self.picture(), other))
+    def shows_frame(self, other: Any) -> bool:
+        return bool(np.array_equal(self.copy_frame(), other))
 
 
 def get_position(driver: Driver, number: int, pane: int = 0) -> np.ndarray:

@@ -183,9 +183,9 @@ def test_laws_of_the_window_say_words() -> None:
 def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
     with open_viewer(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
         target = lambda: driver.session.timeline.panes[0].controller.get_value("target")  # noqa: E731
-        chosen = lambda word: driver.widget("button", f"target:{word}").value  # noqa: E731
+        chosen = lambda word: driver.get_widget("button", f"target:{word}").value  # noqa: E731
         assert target() == "centroid" and chosen("centroid")
-        driver.push("target:median")
+        driver.push_button("target:median")
         assert target() == "median" and driver.session.timeline.events[-1].text.endswith("target = median")
         assert chosen("median") and not chosen("centroid")
         driver.viewer.attempt(lambda: driver.window.commands.run_text("target sens"))
@@ -193,7 +193,7 @@ def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
         assert target() == "sensing" and chosen("sensing")
         driver.viewer.attempt(lambda: driver.window.commands.run_text("target 3"))
         assert driver.viewer.has_error_message and "one of centroid, sensing, median" in driver.viewer.message
-        driver.push("reset:target")
+        driver.push_button("reset:target")
         assert target() == "centroid"
 
 
@@ -209,6 +209,6 @@ def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
     )
     with open_viewer(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
         for word in ("anticlockwise", "whichever is near", "clockwise"):
-            driver.choose("way", word)
+            driver.choose_option("way", word)
             assert driver.session.timeline.panes[0].controller.get_value("way") == word
-            assert driver.widget("menu", "way").text == word
+            assert driver.get_widget("menu", "way").text == word

@@ -8,7 +8,7 @@ from pathlib import Path
 import pygame
 import pytest
 from drawn_sketches import HALL
-from driven_editor import of_map, opened_editor
+from driven_editor import load_sketch, open_editor
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
@@ -86,35 +86,35 @@ def test_words_for_days():
 @pytest.mark.parametrize("ends", ["killed", "closed"])
 def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
     drafts = tmp_path / "drafts"
-    with opened_editor(tmp_path, of_map("square"), drafts=drafts) as hands:
-        before = len(hands.shapes)
-        hands.key("f5")
-        trial = hands.window.trial
+    with open_editor(tmp_path, load_sketch("square"), drafts=drafts) as driver:
+        before = len(driver.shapes)
+        driver.press_key("f5")
+        trial = driver.window.trial
         session = trial.viewer.session
         circle = CircleObstacle((5.0, 5.0), 0.3)
         obstacles = (*session.displayed.environment.obstacles, circle)
         session.edit_map(replace(session.displayed.environment, obstacles=obstacles), "drawn")
         if ends == "killed":
-            hands.window.run_frame(0.1)
+            driver.window.run_frame(0.1)
         else:
-            hands.window.close()
-        assert hands.editor.document.flush()
+            driver.window.close()
+        assert driver.editor.document.flush()
         (file,) = drafts.glob("*/draft.json")
         kept = json.loads(file.read_text())["sketch"]["obstacles"]
         assert len(kept) == before + 1
         if ends == "killed":
-            hands.key("f5")
-            assert hands.shapes[-1] == circle
+            driver.press_key("f5")
+            assert driver.shapes[-1] == circle
 
 
 def test_a_file_can_be_opened_after_leaving_for_it_was_canceled(tmp_path):
     write_sketch(SKETCH, tmp_path / "hall.json")
-    with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
-        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
+    with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:
+        driver.editor.apply(add_circle(driver.sketch, (5.0, 5.0), 1.0))
         for answer in ("escape", "escape", "d"):
-            hands.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
-            hands.settle()
-            assert hands.editor.dialogs.current is not None, hands.said
-            hands.key(answer)
-        assert hands.editor.document.title == "hall.json"
+            driver.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
+            driver.settle()
+            assert driver.editor.dialogs.current is not None, driver.message
+            driver.press_key(answer)
+        assert driver.editor.document.title == "hall.json"
         assert len(list((tmp_path / "drafts").iterdir())) == 1

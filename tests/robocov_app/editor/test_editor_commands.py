@@ -5,7 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from driven_editor import Hands, opened_editor, sheet
+from driven_editor import EditorDriver, open_editor, sheet
 from driven_window import open_viewer
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
@@ -25,16 +25,16 @@ WALLS = (WallObstacle(((1, 8), (3, 8)), 0.1), WallObstacle(((3, 8), (3, 9)), 0.1
 
 
 @pytest.fixture
-def hands(tmp_path: Path) -> Iterator[Hands]:
-    with opened_editor(tmp_path, sheet(LOW, HIGH, FAR, *WALLS)) as driver:
+def driver(tmp_path: Path) -> Iterator[EditorDriver]:
+    with open_editor(tmp_path, sheet(LOW, HIGH, FAR, *WALLS)) as driver:
         yield driver
 
 
 # the list of actions
 
 
-def test_no_key_does_two_things_and_every_command_has_a_group(hands: Hands) -> None:
-    listed = hands.window.commands.commands
+def test_no_key_does_two_things_and_every_command_has_a_group(driver: EditorDriver) -> None:
+    listed = driver.window.commands.commands
     keys = [key for command in listed for key in command.keys]
     assert len(keys) == len(set(keys))
     names = [command.name for command in listed]
@@ -45,8 +45,8 @@ def test_no_key_does_two_things_and_every_command_has_a_group(hands: Hands) -> N
 def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         theirs = {command.name: command.keys for command in driver.window.commands.commands}
-    with opened_editor(tmp_path) as hands:
-        ours = {command.name: command.keys for command in hands.window.commands.commands}
+    with open_editor(tmp_path) as driver:
+        ours = {command.name: command.keys for command in driver.window.commands.commands}
     same = {
         *(
             "undo",
@@ -68,8 +68,8 @@ def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> 
     assert ours["show:grid"] == theirs["layer:grid"] and ours["tool:select"] == theirs["tool:hand"]
 
 
-def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
-    known = {command.name for command in hands.window.commands.commands}
+def test_every_action_of_the_menus_is_one(driver: EditorDriver) -> None:
+    known = {command.name for command in driver.window.commands.commands}
     vertex = frozenset({Vertex(0, 0, 1)})
     for selection in (
         Selection(),
@@ -82,8 +82,8 @@ def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
         Selection(vertices=frozenset({Vertex(3, 0, 0)})),
         Selection(vertices=vertex | {Vertex(0, 0, 2)}),
     ):
-        hands.editor.select(selection)
-        names = list_menu_commands(hands.editor)
+        driver.editor.select(selection)
+        names = list_menu_commands(driver.editor)
         assert {name for name in names if name} <= known
         assert names[0] and names[-1] and all(a or b for a, b in pairwise(names))
 
@@ -91,120 +91,120 @@ def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
 # edits by keys
 
 
-def test_booleans_unite_subtract_and_intersect(hands: Hands) -> None:
-    hands.select(0, 1)
-    hands.key("alt+u")
-    assert hands.sketch.get_item(0).geometry.area == pytest.approx(17) and len(hands.shapes) == 4
-    hands.key("ctrl+z")
-    hands.select(0, 1)
-    hands.key("alt+s")
-    assert hands.sketch.obstacles[0].geometry.area == pytest.approx(8)
-    hands.key("ctrl+z")
-    hands.select(0, 1)
-    hands.key("alt+i")
-    assert hands.sketch.obstacles[0].geometry.area == pytest.approx(1)
+def test_booleans_unite_subtract_and_intersect(driver: EditorDriver) -> None:
+    driver.select(0, 1)
+    driver.press_key("alt+u")
+    assert driver.sketch.get_item(0).geometry.area == pytest.approx(17) and len(driver.shapes) == 4
+    driver.press_key("ctrl+z")
+    driver.select(0, 1)
+    driver.press_key("alt+s")
+    assert driver.sketch.obstacles[0].geometry.area == pytest.approx(8)
+    driver.press_key("ctrl+z")
+    driver.select(0, 1)
+    driver.press_key("alt+i")
+    assert driver.sketch.obstacles[0].geometry.area == pytest.approx(1)
 
 
-def test_aligning_and_distributing(hands: Hands) -> None:
-    hands.select(0, 1, 2)
-    hands.key("alt+left")
-    assert {item.geometry.bounds[0] for item in hands.sketch.obstacles[:3]} == {1.0}
-    hands.key("ctrl+z")
-    hands.select(0, 1, 2)
-    hands.key("alt+x")
-    lows = sorted(item.geometry.bounds[0] for item in hands.sketch.obstacles[:3])
-    highs = sorted(item.geometry.bounds[2] for item in hands.sketch.obstacles[:3])
+def test_aligning_and_distributing(driver: EditorDriver) -> None:
+    driver.select(0, 1, 2)
+    driver.press_key("alt+left")
+    assert {item.geometry.bounds[0] for item in driver.sketch.obstacles[:3]} == {1.0}
+    driver.press_key("ctrl+z")
+    driver.select(0, 1, 2)
+    driver.press_key("alt+x")
+    lows = sorted(item.geometry.bounds[0] for item in driver.sketch.obstacles[:3])
+    highs = sorted(item.geometry.bounds[2] for item in driver.sketch.obstacles[:3])
     assert lows[1] - highs[0] == pytest.approx(lows[2] - highs[1], abs=1e-3)
 
 
-def test_turning_and_mirroring(hands: Hands) -> None:
-    hands.select(3)
-    hands.key("q")
-    assert {x for x, _ in hands.shapes[3].points} == {2.0}
-    hands.key("e")
-    hands.select(0, 2)
-    before = hands.sketch.get_item(2).geometry.centroid.x
-    hands.key("shift+h")
-    assert hands.sketch.get_item(2).geometry.centroid.x != pytest.approx(before)
+def test_turning_and_mirroring(driver: EditorDriver) -> None:
+    driver.select(3)
+    driver.press_key("q")
+    assert {x for x, _ in driver.shapes[3].points} == {2.0}
+    driver.press_key("e")
+    driver.select(0, 2)
+    before = driver.sketch.get_item(2).geometry.centroid.x
+    driver.press_key("shift+h")
+    assert driver.sketch.get_item(2).geometry.centroid.x != pytest.approx(before)
 
 
-def test_walls_are_joined_split_and_extended(hands: Hands) -> None:
-    hands.select(3, 4)
-    hands.key("alt+j")
-    (joined,) = [shape for shape in hands.shapes if isinstance(shape, WallObstacle)]
+def test_walls_are_joined_split_and_extended(driver: EditorDriver) -> None:
+    driver.select(3, 4)
+    driver.press_key("alt+j")
+    (joined,) = [shape for shape in driver.shapes if isinstance(shape, WallObstacle)]
     assert joined.points == ((1, 8), (3, 8), (3, 9))
-    key = next(item.key for item in hands.sketch.obstacles if item.shape is joined)
-    hands.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 1)})))
-    hands.key("shift+c")
-    assert sum(isinstance(shape, WallObstacle) for shape in hands.shapes) == 2
-    hands.key("ctrl+z")
-    hands.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 2)})))
-    hands.go((5, 9))
-    hands.key("shift+w")
-    assert next(s for s in hands.shapes if isinstance(s, WallObstacle)).points[-1] == (5, 9)
+    key = next(item.key for item in driver.sketch.obstacles if item.shape is joined)
+    driver.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 1)})))
+    driver.press_key("shift+c")
+    assert sum(isinstance(shape, WallObstacle) for shape in driver.shapes) == 2
+    driver.press_key("ctrl+z")
+    driver.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 2)})))
+    driver.move_to((5, 9))
+    driver.press_key("shift+w")
+    assert next(s for s in driver.shapes if isinstance(s, WallObstacle)).points[-1] == (5, 9)
 
 
-def test_copies_go_through_the_clipboard_also_to_another_window(hands: Hands, tmp_path: Path) -> None:
-    hands.select(0, 2)
-    hands.key("ctrl+c")
-    hands.go((5, 5))
-    hands.key("ctrl+v")
-    assert len(hands.shapes) == 7
-    hands.key("ctrl+x")
-    assert len(hands.shapes) == 5
-    text = hands.editor.clipboard.get()
-    with opened_editor(tmp_path) as other:
+def test_copies_go_through_the_clipboard_also_to_another_window(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.select(0, 2)
+    driver.press_key("ctrl+c")
+    driver.move_to((5, 5))
+    driver.press_key("ctrl+v")
+    assert len(driver.shapes) == 7
+    driver.press_key("ctrl+x")
+    assert len(driver.shapes) == 5
+    text = driver.editor.clipboard.get()
+    with open_editor(tmp_path) as other:
         other.editor.clipboard.put(text)
-        other.key("ctrl+shift+v")
+        other.press_key("ctrl+shift+v")
         assert len(other.shapes) == 2
         other.editor.clipboard.put("no map at all")
-        other.key("ctrl+v")
+        other.press_key("ctrl+v")
         assert other.editor.has_error_message and len(other.shapes) == 2
         other.editor.clipboard.put("")
-        other.key("ctrl+v")
+        other.press_key("ctrl+v")
         assert "empty" in other.said
 
 
-def test_deleting_and_duplicating(hands: Hands) -> None:
-    hands.select(0)
-    hands.key("ctrl+d")
-    assert len(hands.shapes) == 6 and hands.shapes[5].vertices[0] == (1.5, 0.5)
-    hands.key("delete")
-    assert len(hands.shapes) == 5
-    hands.key("delete")
-    assert hands.editor.has_error_message and "nothing is selected" in hands.said
-    hands.key("ctrl+a")
-    hands.key("backspace")
-    assert hands.shapes == []
+def test_deleting_and_duplicating(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.press_key("ctrl+d")
+    assert len(driver.shapes) == 6 and driver.shapes[5].vertices[0] == (1.5, 0.5)
+    driver.press_key("delete")
+    assert len(driver.shapes) == 5
+    driver.press_key("delete")
+    assert driver.editor.has_error_message and "nothing is selected" in driver.message
+    driver.press_key("ctrl+a")
+    driver.press_key("backspace")
+    assert driver.shapes == []
 
 
-def test_tab_goes_round_all_things(hands: Hands) -> None:
+def test_tab_goes_round_all_things(driver: EditorDriver) -> None:
     seen = []
     for _ in range(7):
-        hands.key("tab")
-        seen.append(next(iter(hands.editor.selection.owners)))
+        driver.press_key("tab")
+        seen.append(next(iter(driver.editor.selection.owners)))
     assert seen == [0, 1, 2, 3, 4, BOUNDARY, 0]
-    hands.key("shift+tab")
-    assert hands.editor.selection.owners == {BOUNDARY}
+    driver.press_key("shift+tab")
+    assert driver.editor.selection.owners == {BOUNDARY}
 
 
-def test_an_obstacle_becomes_the_boundary_and_back(hands: Hands) -> None:
-    hands.select(0)
-    hands.window.do("boundary:of")
-    assert hands.sketch.boundary == LOW.vertices and len(hands.shapes) == 4
+def test_an_obstacle_becomes_the_boundary_and_back(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.window.do("boundary:of")
+    assert driver.sketch.boundary == LOW.vertices and len(driver.shapes) == 4
 
 
 def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
     starts = (("one", DiscStart((2, 2), 1.0)), ("two", DiscStart((7, 7), 1.0)))
-    with opened_editor(tmp_path, sheet(starts=starts)) as hands:
-        assert hands.editor.start_name == "one"
-        hands.key("shift+n")
-        assert hands.editor.start_name == "two" and hands.editor.selection == Selection.of("two")
-        hands.key("shift+d")
-        assert hands.editor.start_names == ["two", "one"]
-    with opened_editor(tmp_path, sheet()) as hands:
-        hands.key("shift+n")
-        assert "no start yet" in hands.said
+    with open_editor(tmp_path, sheet(starts=starts)) as driver:
+        assert driver.editor.start_name == "one"
+        driver.press_key("shift+n")
+        assert driver.editor.start_name == "two" and driver.editor.selection == Selection.of("two")
+        driver.press_key("shift+d")
+        assert driver.editor.start_names == ["two", "one"]
+    with open_editor(tmp_path, sheet()) as driver:
+        driver.press_key("shift+n")
+        assert "no start yet" in driver.message
 
 
 # typed commands
@@ -223,66 +223,68 @@ def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
         ("rotate 90", (1, 1, 4, 4)),
     ],
 )
-def test_typed_commands_change_what_is_selected(hands: Hands, text: str, wanted: tuple[float, ...]) -> None:
-    hands.select(0)
-    hands.command(text)
-    assert hands.sketch.get_item(0).geometry.bounds == pytest.approx(wanted)
+def test_typed_commands_change_what_is_selected(
+    driver: EditorDriver, text: str, wanted: tuple[float, ...]
+) -> None:
+    driver.select(0)
+    driver.run_command(text)
+    assert driver.sketch.get_item(0).geometry.bounds == pytest.approx(wanted)
 
 
-def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
-    hands.select(0)
+def test_typed_commands_name_note_array_and_set(driver: EditorDriver) -> None:
+    driver.select(0)
     for text in ("name desk", "note oak, heavy", "title Our office"):
-        hands.command(text)
-    item = hands.sketch.get_item(0)
-    assert (item.shape.name, item.note, hands.sketch.name) == ("desk", "oak, heavy", "Our office")
-    hands.select(2)
-    hands.command("circle 0.25")
-    assert hands.shapes[2].radius == 0.25
-    hands.command("array 2 x 2 1 -1")
-    assert sum(isinstance(shape, CircleObstacle) for shape in hands.shapes) == 4
-    hands.select(3)
-    hands.command("width 0.3")
-    assert hands.shapes[3].width == 0.3
+        driver.run_command(text)
+    item = driver.sketch.get_item(0)
+    assert (item.shape.name, item.note, driver.sketch.name) == ("desk", "oak, heavy", "Our office")
+    driver.select(2)
+    driver.run_command("circle 0.25")
+    assert driver.shapes[2].radius == 0.25
+    driver.run_command("array 2 x 2 1 -1")
+    assert sum(isinstance(shape, CircleObstacle) for shape in driver.shapes) == 4
+    driver.select(3)
+    driver.run_command("width 0.3")
+    assert driver.shapes[3].width == 0.3
     for text in ("grid 0.25", "angle 30", "radius 20cm", "robots 9", "seed 4", "wall 0.2"):
-        hands.command(text)
-    editor = hands.editor
+        driver.run_command(text)
+    editor = driver.editor
     assert (editor.grid, editor.snap_angle, editor.radius, editor.robots) == (0.25, 30.0, 0.2, 9)
     assert (editor.seed, editor.wall_width) == (4, 0.2)
 
 
-def test_commands_that_take_a_value_are_found_by_typing(hands: Hands) -> None:
+def test_commands_that_take_a_value_are_found_by_typing(driver: EditorDriver) -> None:
     for word in TYPED_COMMANDS:
-        assert f"{word} " in [option.completion for option in list_options(hands.window.commands, word)]
-    assert {command.name for command in list_typed_commands(hands.editor)} == set(TYPED_COMMANDS)
+        assert f"{word} " in [option.completion for option in list_options(driver.window.commands, word)]
+    assert {command.name for command in list_typed_commands(driver.editor)} == set(TYPED_COMMANDS)
 
 
-def palette(hands: Hands) -> Choice:
-    asked = hands.editor.dialogs.current
+def palette(driver: EditorDriver) -> Choice:
+    asked = driver.editor.dialogs.current
     assert isinstance(asked, Choice)
     return asked
 
 
 def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -> None:
-    with opened_editor(tmp_path) as hands:
-        hands.key("ctrl+k")
-        hands.type("array")
-        hands.key("return")
-        assert palette(hands).text == "array "
+    with open_editor(tmp_path) as driver:
+        driver.press_key("ctrl+k")
+        driver.type("array")
+        driver.press_key("return")
+        assert palette(driver).text == "array "
 
 
-def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
-    hands.editor.apply(create.add_obstacle(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
-    hands.settle()
-    hands.key("ctrl+tab", times=3)
-    hands.frames(3)
-    hands.click(*hands.widget("option", "problem:0").rect.center)
-    assert hands.editor.problem is not None and hands.editor.problem.kind == "outside"
-    hands.wait()
-    hands.push("fix:0")
-    assert hands.said == "circle “lamp” deleted"
+def test_a_problem_is_mended_by_the_button_beside_it(driver: EditorDriver) -> None:
+    driver.editor.apply(create.add_obstacle(driver.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
+    driver.settle()
+    driver.press_key("ctrl+tab", times=3)
+    driver.run_frames(3)
+    driver.click(*driver.get_widget("option", "problem:0").rect.center)
+    assert driver.editor.problem is not None and driver.editor.problem.kind == "outside"
+    driver.wait()
+    driver.push_button("fix:0")
+    assert driver.message == "circle “lamp” deleted"
 
 
 def test_what_was_typed_and_cannot_be_done_stays_to_be_corrected(tmp_path: Path) -> None:
-    with opened_editor(tmp_path) as hands:
-        hands.command("grid 99999")
-        assert "99999" in palette(hands).error and palette(hands).text == "grid 99999"
+    with open_editor(tmp_path) as driver:
+        driver.run_command("grid 99999")
+        assert "99999" in palette(driver).error and palette(driver).text == "grid 99999"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from density_cases import KINDS
 from drawn_sketches import problems
-from driven_editor import opened_editor, sheet
+from driven_editor import open_editor, sheet
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -142,59 +142,59 @@ class TestEdits:
 
 
 def test_with_the_mouse_and_by_typing(tmp_path):
-    with opened_editor(tmp_path, sheet()) as hands:
-        plain = hands.picture()
-        hands.key("d")
-        hands.drag(*(hands.pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
-        (peak,) = density_edits.list_features(hands.sketch)
+    with open_editor(tmp_path, sheet()) as driver:
+        plain = driver.copy_frame()
+        driver.press_key("d")
+        driver.drag(*(driver.find_pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
+        (peak,) = density_edits.list_features(driver.sketch)
         assert peak.center == pytest.approx((3.0, 3.0), abs=0.06)
         assert peak.sigma == pytest.approx(2.0, abs=0.1) and peak.weight == 4.0
-        assert not hands.same(plain)
-        hands.type("6.5")
-        hands.key("return")
-        assert density_edits.list_features(hands.sketch)[0].weight == 6.5
+        assert not driver.shows_frame(plain)
+        driver.type("6.5")
+        driver.press_key("return")
+        assert density_edits.list_features(driver.sketch)[0].weight == 6.5
         # the rim
-        rim = hands.pixel((peak.center[0], peak.center[1] + peak.sigma))
-        hands.wait()
-        hands.drag(rim, *(hands.pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
-        assert density_edits.list_features(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
+        rim = driver.find_pixel((peak.center[0], peak.center[1] + peak.sigma))
+        driver.wait()
+        driver.drag(rim, *(driver.find_pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
+        assert density_edits.list_features(driver.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
         # the middle
-        hands.wait()
-        hands.drag(*(hands.pixel(point) for point in (peak.center, (4, 4), (6, 5))))
-        assert density_edits.list_features(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
-        hands.wait()
-        hands.drag(*(hands.pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
-        assert [each.weight for each in density_edits.list_features(hands.sketch)] == [6.5, 6.5]
-        hands.key("backspace")
-        assert len(density_edits.list_features(hands.sketch)) == 1
-        hands.key("ctrl+z")
-        assert len(density_edits.list_features(hands.sketch)) == 2
-        hands.wait()
-        hands.click_at((6.0, 5.0))
-        assert hands.editor.tool.chosen == 0
-        hands.key("escape")
-        assert hands.editor.tool.chosen is None and hands.editor.tool.build_draw_state(hands.editor).rings
-        hands.command("floor 0.2")
-        hands.command("weight 3")
-        assert hands.sketch.density.floor == 0.2 and hands.editor.tool.weight == 3.0
-        assert density_edits.describe_density(hands.sketch.density) == "2 hot spots, floor 0.2"
-        hands.command("density none")
-        assert hands.sketch.density is None
-        hands.command("density some")
-        assert "expected none" in hands.refused()
-        hands.key("v")
-        hands.frames(2)
+        driver.wait()
+        driver.drag(*(driver.find_pixel(point) for point in (peak.center, (4, 4), (6, 5))))
+        assert density_edits.list_features(driver.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
+        driver.wait()
+        driver.drag(*(driver.find_pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
+        assert [each.weight for each in density_edits.list_features(driver.sketch)] == [6.5, 6.5]
+        driver.press_key("backspace")
+        assert len(density_edits.list_features(driver.sketch)) == 1
+        driver.press_key("ctrl+z")
+        assert len(density_edits.list_features(driver.sketch)) == 2
+        driver.wait()
+        driver.click_at((6.0, 5.0))
+        assert driver.editor.tool.chosen == 0
+        driver.press_key("escape")
+        assert driver.editor.tool.chosen is None and driver.editor.tool.build_draw_state(driver.editor).rings
+        driver.run_command("floor 0.2")
+        driver.run_command("weight 3")
+        assert driver.sketch.density.floor == 0.2 and driver.editor.tool.weight == 3.0
+        assert density_edits.describe_density(driver.sketch.density) == "2 hot spots, floor 0.2"
+        driver.run_command("density none")
+        assert driver.sketch.density is None
+        driver.run_command("density some")
+        assert "expected none" in driver.read_refusal()
+        driver.press_key("v")
+        driver.run_frames(2)
 
 
 def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
-    with opened_editor(tmp_path, sheet()) as hands:
-        hands.key("d")
-        hands.press(*hands.pixel((3, 3)))
-        hands.move(*hands.pixel((5, 3)), held=1)
-        assert hands.editor.tool.change is not None
-        hands.key("escape")
-        hands.release()
-        assert hands.sketch.density is None and not hands.editor.document.history.undo_descriptions
+    with open_editor(tmp_path, sheet()) as driver:
+        driver.press_key("d")
+        driver.press(*driver.find_pixel((3, 3)))
+        driver.move(*driver.find_pixel((5, 3)), held=1)
+        assert driver.editor.tool.change is not None
+        driver.press_key("escape")
+        driver.release()
+        assert driver.sketch.density is None and not driver.editor.document.history.undo_descriptions
 
 
 AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
@@ -245,20 +245,22 @@ class TestAreas:
 
     def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
         sketch = Sketch.from_environment(load_map("hospital"))
-        with opened_editor(tmp_path, sketch) as hands:
-            hands.key("d")
-            first = hands.sketch.density.areas[0]
-            hands.click_at((5.5, 2.0))
-            assert hands.editor.tool.chosen == 0
-            hands.type("6")
-            hands.key("return")
-            assert hands.sketch.density.areas[0].weight == 6.0
-            hands.wait()
-            hands.drag(*(hands.pixel(point) for point in (first.vertices[2], (11.5, 6.0), (12.0, 6.0))))
-            assert hands.sketch.density.areas[0].vertices[2] == pytest.approx((12.0, 6.0), abs=0.2)
-            hands.wait()
-            hands.drag(*(hands.pixel(point) for point in ((13.0, 9.0), (14.0, 10.0), (15.0, 11.0))))
-            assert len(hands.sketch.density.areas) == len(sketch.density.areas) + 1
-            hands.key("backspace")
-            assert len(hands.sketch.density.areas) == len(sketch.density.areas)
-            assert hands.sketch.build_environment().density == hands.sketch.density
+        with open_editor(tmp_path, sketch) as driver:
+            driver.press_key("d")
+            first = driver.sketch.density.areas[0]
+            driver.click_at((5.5, 2.0))
+            assert driver.editor.tool.chosen == 0
+            driver.type("6")
+            driver.press_key("return")
+            assert driver.sketch.density.areas[0].weight == 6.0
+            driver.wait()
+            driver.drag(
+                *(driver.find_pixel(point) for point in (first.vertices[2], (11.5, 6.0), (12.0, 6.0)))
+            )
+            assert driver.sketch.density.areas[0].vertices[2] == pytest.approx((12.0, 6.0), abs=0.2)
+            driver.wait()
+            driver.drag(*(driver.find_pixel(point) for point in ((13.0, 9.0), (14.0, 10.0), (15.0, 11.0))))
+            assert len(driver.sketch.density.areas) == len(sketch.density.areas) + 1
+            driver.press_key("backspace")
+            assert len(driver.sketch.density.areas) == len(sketch.density.areas)
+            assert driver.sketch.build_environment().density == driver.sketch.density

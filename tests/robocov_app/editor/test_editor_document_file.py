@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from driven_editor import sheet, touched
+from driven_editor import rewrite_file, sheet
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
@@ -81,7 +81,7 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
     other = Document.new(None)
     changed(other, 2.0)
     other.save(tmp_path / "other.json")
-    touched(tmp_path / "plan.json", (tmp_path / "other.json").read_text())
+    rewrite_file(tmp_path / "plan.json", (tmp_path / "other.json").read_text())
     assert document.check_disk(10.5) == "same"  # not asked that often
     assert document.check_disk(12.0) == "changed"
     assert document.check_disk(14.0) == "same"
@@ -100,7 +100,7 @@ def test_keeping_mine_lets_saving_replace_what_is_there(tmp_path: Path) -> None:
     document = Document.new(None)
     changed(document)
     document.save(tmp_path / "plan.json")
-    touched(tmp_path / "plan.json", "{}")
+    rewrite_file(tmp_path / "plan.json", "{}")
     assert document.check_disk(10.0) == "changed"
     document.ignore_disk_change()
     document.save(tmp_path / "plan.json")

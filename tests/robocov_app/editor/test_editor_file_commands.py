@@ -10,7 +10,7 @@ import pygame
 import pytest
 from called import complaint
 from drawn_sketches import renumbered
-from driven_editor import Hands, opened_editor, sheet, touched
+from driven_editor import EditorDriver, open_editor, rewrite_file, sheet
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle
@@ -32,197 +32,197 @@ from robocov_app.toolkit.dialogs import Choice, Question
 
 
 @pytest.fixture
-def hands(tmp_path: Path) -> Iterator[Hands]:
-    with opened_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0)), drafts=tmp_path / "drafts") as driver:
+def driver(tmp_path: Path) -> Iterator[EditorDriver]:
+    with open_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0)), drafts=tmp_path / "drafts") as driver:
         yield driver
 
 
-def asked(hands: Hands) -> str:
-    return hands.editor.dialogs.current.title if hands.editor.dialogs.current is not None else ""
+def asked(driver: EditorDriver) -> str:
+    return driver.editor.dialogs.current.title if driver.editor.dialogs.current is not None else ""
 
 
-def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
-    hands.key("ctrl+s")
-    assert asked(hands) == "Save as" and hands.editor.dialogs.current.text == "untitled.json"
-    hands.key("ctrl+a")
-    hands.type("plan")
-    hands.key("return")
-    assert hands.editor.dialogs.current is None and load_map(tmp_path / "plan.json").obstacles
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+s")
-    assert hands.editor.dialogs.current is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
-    assert hands.editor.recent == [str(tmp_path / "plan.json")]
+def test_saving_asks_for_a_name_once(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("ctrl+s")
+    assert asked(driver) == "Save as" and driver.editor.dialogs.current.text == "untitled.json"
+    driver.press_key("ctrl+a")
+    driver.type("plan")
+    driver.press_key("return")
+    assert driver.editor.dialogs.current is None and load_map(tmp_path / "plan.json").obstacles
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+s")
+    assert driver.editor.dialogs.current is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
+    assert driver.editor.recent == [str(tmp_path / "plan.json")]
 
 
-def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path: Path) -> None:
+def test_another_file_is_only_replaced_when_that_is_said(driver: EditorDriver, tmp_path: Path) -> None:
     (tmp_path / "mine.json").write_text("{}")
-    hands.key("ctrl+shift+s")
-    hands.key("ctrl+a")
-    hands.type("mine.json")
-    hands.key("return")
-    assert asked(hands) == "Replace the file?"
-    hands.key("escape")
+    driver.press_key("ctrl+shift+s")
+    driver.press_key("ctrl+a")
+    driver.type("mine.json")
+    driver.press_key("return")
+    assert asked(driver) == "Replace the file?"
+    driver.press_key("escape")
     assert (tmp_path / "mine.json").read_text() == "{}"
-    hands.key("ctrl+shift+s")
-    hands.key("ctrl+a")
-    hands.type("mine.json")
-    hands.key("return")
-    hands.key("r")
+    driver.press_key("ctrl+shift+s")
+    driver.press_key("ctrl+a")
+    driver.type("mine.json")
+    driver.press_key("return")
+    driver.press_key("r")
     assert load_map(tmp_path / "mine.json").obstacles
 
 
-def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
-    hands.window.run_frame(0.0)
-    hands.key("ctrl+s")
-    hands.key("return")
-    assert "as a draft" in hands.said
-    assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumbered(hands.sketch)
+def test_a_draft_is_saved_and_called_one(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.editor.apply(create.add_polygon(driver.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    driver.window.run_frame(0.0)
+    driver.press_key("ctrl+s")
+    driver.press_key("return")
+    assert "as a draft" in driver.message
+    assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumbered(driver.sketch)
 
 
-def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+s")
-    hands.key("ctrl+a")
-    hands.type("nowhere/plan.json")
-    hands.key("return")
-    assert "nowhere" in hands.refused() and hands.editor.document.history.has_unsaved_changes
+def test_a_folder_that_is_not_there_is_told_and_nothing_lost(driver: EditorDriver) -> None:
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+s")
+    driver.press_key("ctrl+a")
+    driver.type("nowhere/plan.json")
+    driver.press_key("return")
+    assert "nowhere" in driver.read_refusal() and driver.editor.document.history.has_unsaved_changes
 
 
-def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+n")
-    assert asked(hands) == "Save the changes?"
-    hands.key("escape")
-    assert len(hands.shapes) == 2
-    hands.post(pygame.QUIT)
-    hands.settle()
-    assert asked(hands) == "Save the changes?" and not hands.window.closed
-    hands.key("s")
-    assert asked(hands) == "Save as"
-    hands.key("return")
-    assert hands.window.closed and (tmp_path / "untitled.json").exists()
+def test_leaving_unsaved_work_asks_to_save_discard_or_stay(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+n")
+    assert asked(driver) == "Save the changes?"
+    driver.press_key("escape")
+    assert len(driver.shapes) == 2
+    driver.post(pygame.QUIT)
+    driver.settle()
+    assert asked(driver) == "Save the changes?" and not driver.window.closed
+    driver.press_key("s")
+    assert asked(driver) == "Save as"
+    driver.press_key("return")
+    assert driver.window.closed and (tmp_path / "untitled.json").exists()
 
 
-def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+n")
-    hands.key("d")
-    assert hands.shapes == [] and hands.editor.document.title == "Untitled"
-    assert hands.said.startswith("a new map: 10 x 10 m")
+def test_discarding_is_for_good_but_for_what_is_in_files(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+n")
+    driver.press_key("d")
+    assert driver.shapes == [] and driver.editor.document.title == "Untitled"
+    assert driver.message.startswith("a new map: 10 x 10 m")
     assert find_recoverable(tmp_path / "drafts") == ()
 
 
-def test_answers_are_clicked_too(hands: Hands) -> None:
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+n")
-    hands.answer("Cancel")
-    assert hands.editor.dialogs.current is None and len(hands.shapes) == 2
-    hands.key("ctrl+n")
-    hands.answer("Discard")
-    assert hands.shapes == []
+def test_answers_are_clicked_too(driver: EditorDriver) -> None:
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+n")
+    driver.click_answer("Cancel")
+    assert driver.editor.dialogs.current is None and len(driver.shapes) == 2
+    driver.press_key("ctrl+n")
+    driver.click_answer("Discard")
+    assert driver.shapes == []
 
 
-def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: Path) -> None:
+def test_opening_a_map_a_bundled_one_and_something_else(driver: EditorDriver, tmp_path: Path) -> None:
     save_map(load_map("l-shape"), tmp_path / "ell.json")
-    hands.key("ctrl+o")
-    assert isinstance(hands.editor.dialogs.current, Choice)
-    hands.type("ell")
-    hands.key("tab")
-    hands.key("return")
-    assert hands.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
-    hands.key("ctrl+shift+o")
-    assert isinstance(hands.editor.dialogs.current, Choice)
-    hands.type("rooms")
-    hands.key("return")
-    assert hands.editor.document.path is None and len(hands.shapes) == 18
-    hands.key("ctrl+o")
-    hands.type("missing.txt")
-    hands.key("return")
-    assert "missing.txt" in hands.refused() and len(hands.shapes) == 18
+    driver.press_key("ctrl+o")
+    assert isinstance(driver.editor.dialogs.current, Choice)
+    driver.type("ell")
+    driver.press_key("tab")
+    driver.press_key("return")
+    assert driver.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in driver.message
+    driver.press_key("ctrl+shift+o")
+    assert isinstance(driver.editor.dialogs.current, Choice)
+    driver.type("rooms")
+    driver.press_key("return")
+    assert driver.editor.document.path is None and len(driver.shapes) == 18
+    driver.press_key("ctrl+o")
+    driver.type("missing.txt")
+    driver.press_key("return")
+    assert "missing.txt" in driver.read_refusal() and len(driver.shapes) == 18
     (tmp_path / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": 3}')
-    hands.key("ctrl+o")
-    hands.type("bad.json")
-    hands.key("return")
-    assert "bad.json" in hands.refused() and len(hands.shapes) == 18
+    driver.press_key("ctrl+o")
+    driver.type("bad.json")
+    driver.press_key("return")
+    assert "bad.json" in driver.read_refusal() and len(driver.shapes) == 18
 
 
-def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Path) -> None:
-    hands.key("ctrl+s")
-    hands.key("return")
+def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("ctrl+s")
+    driver.press_key("return")
     path = tmp_path / "untitled.json"
     document = json.loads(path.read_text())
     document["obstacles"] = []
-    touched(path, json.dumps(document))
-    hands.window.run_frame(2.0)
-    hands.window.run_frame(2.0)
-    assert asked(hands) == "The file has changed"
-    hands.key("r")
-    assert hands.shapes == [] and not hands.editor.document.history.has_unsaved_changes
-    hands.key("ctrl+z")
-    assert len(hands.shapes) == 1
-    touched(path, json.dumps({**document, "name": "Again"}))
-    hands.window.run_frame(2.0)
-    hands.window.run_frame(2.0)
-    hands.key("k")
-    assert len(hands.shapes) == 1 and hands.editor.document.history.has_unsaved_changes
-    hands.key("ctrl+s")
+    rewrite_file(path, json.dumps(document))
+    driver.window.run_frame(2.0)
+    driver.window.run_frame(2.0)
+    assert asked(driver) == "The file has changed"
+    driver.press_key("r")
+    assert driver.shapes == [] and not driver.editor.document.history.has_unsaved_changes
+    driver.press_key("ctrl+z")
+    assert len(driver.shapes) == 1
+    rewrite_file(path, json.dumps({**document, "name": "Again"}))
+    driver.window.run_frame(2.0)
+    driver.window.run_frame(2.0)
+    driver.press_key("k")
+    assert len(driver.shapes) == 1 and driver.editor.document.history.has_unsaved_changes
+    driver.press_key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
-    hands.window.run_frame(2.0)
-    hands.window.run_frame(2.0)
-    assert "no longer exists" in hands.said
+    driver.window.run_frame(2.0)
+    driver.window.run_frame(2.0)
+    assert "no longer exists" in driver.message
 
 
-def test_a_picture_is_laid_under_by_its_path_from_the_map(hands: Hands, tmp_path: Path) -> None:
+def test_a_picture_is_laid_under_by_its_path_from_the_map(driver: EditorDriver, tmp_path: Path) -> None:
     Image.new("RGB", (400, 200)).save(tmp_path / "plan.png")
-    hands.key("ctrl+s")
-    hands.key("return")
-    hands.key("ctrl+b")
-    hands.type("plan.png")
-    hands.key("return")
-    assert hands.sketch.background.path == "plan.png"
+    driver.press_key("ctrl+s")
+    driver.press_key("return")
+    driver.press_key("ctrl+b")
+    driver.type("plan.png")
+    driver.press_key("return")
+    assert driver.sketch.background.path == "plan.png"
     (tmp_path / "no.png").write_text("no picture")
-    hands.key("ctrl+b")
-    hands.type("no.png")
-    hands.key("return")
-    assert "not a picture" in hands.refused()
-    hands.window.do("background:none")
-    assert hands.sketch.background is None
-    hands.editor.apply(set_background(hands.sketch, Background("gone.png", (40, 30))))
-    hands.window.draw()
-    assert "gone.png cannot be shown" in hands.said
+    driver.press_key("ctrl+b")
+    driver.type("no.png")
+    driver.press_key("return")
+    assert "not a picture" in driver.read_refusal()
+    driver.window.do("background:none")
+    assert driver.sketch.background is None
+    driver.editor.apply(set_background(driver.sketch, Background("gone.png", (40, 30))))
+    driver.window.draw()
+    assert "gone.png cannot be shown" in driver.message
 
 
 def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
-    hands: Hands, tmp_path: Path
+    driver: EditorDriver, tmp_path: Path
 ) -> None:
-    hands.key("ctrl+e")
-    assert hands.editor.dialogs.current.text == "untitled.svg"
-    hands.key("return")
+    driver.press_key("ctrl+e")
+    assert driver.editor.dialogs.current.text == "untitled.svg"
+    driver.press_key("return")
     first = (tmp_path / "untitled.svg").read_text()
-    assert "<svg" in first and "exported" in hands.said and hands.editor.document.path is None
-    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
-    hands.key("ctrl+e")
-    hands.key("return")
-    assert asked(hands) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
-    hands.key("r")
+    assert "<svg" in first and "exported" in driver.message and driver.editor.document.path is None
+    driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
+    driver.press_key("ctrl+e")
+    driver.press_key("return")
+    assert asked(driver) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
+    driver.press_key("r")
     assert (tmp_path / "untitled.svg").read_text() != first
-    hands.key("ctrl+e")
-    hands.key("ctrl+a")
-    hands.type("plan.xyz")
-    hands.key("return")
-    assert "unknown format" in hands.refused()
-    hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
-    hands.key("ctrl+e")
-    assert hands.editor.has_error_message and hands.editor.dialogs.current is None
+    driver.press_key("ctrl+e")
+    driver.press_key("ctrl+a")
+    driver.type("plan.xyz")
+    driver.press_key("return")
+    assert "unknown format" in driver.read_refusal()
+    driver.editor.apply(create.add_polygon(driver.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    driver.press_key("ctrl+e")
+    assert driver.editor.has_error_message and driver.editor.dialogs.current is None
 
 
-def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
-    hands.key("ctrl+s")
-    hands.key("ctrl+a")
-    hands.type("plan.svg")
-    hands.key("return")
+def test_a_map_is_never_saved_under_another_formats_suffix(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("ctrl+s")
+    driver.press_key("ctrl+a")
+    driver.type("plan.svg")
+    driver.press_key("return")
     assert (tmp_path / "plan.svg.json").exists() and not (tmp_path / "plan.svg").exists()
 
 
@@ -274,11 +274,11 @@ def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places
 
 
 def test_recent_files_are_found_from_every_folder(
-    hands: Hands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    driver: EditorDriver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    hands.window.documents.remember(Path("x.json"))
-    assert hands.editor.recent == [str(tmp_path / "x.json")]
+    driver.window.documents.remember(Path("x.json"))
+    assert driver.editor.recent == [str(tmp_path / "x.json")]
 
 
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
@@ -290,14 +290,14 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     with opening(places) as window:
         asked = window.editor.dialogs.current
         assert isinstance(asked, Question) and "Recover" in asked.title
-        Hands(window).key("r")
+        EditorDriver(window).press_key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.has_unsaved_changes
     # the window went without a decision: it is offered again
     with opening(places) as window:
         assert window.editor.dialogs.current is not None
-        Hands(window).key("l")
+        EditorDriver(window).press_key("l")
         offer_recovery(window, find_recoverable(places / "drafts"))
-        Hands(window).key("d")
+        EditorDriver(window).press_key("d")
         window.documents.may_close = True
     assert find_recoverable(places / "drafts") == ()
 
@@ -394,28 +394,28 @@ def test_a_file_of_no_map_is_named_for_what_it_is(places: Path) -> None:
         pass
 
 
-def test_the_polygon_that_was_drawn_is_in_the_file(hands: Hands, tmp_path: Path) -> None:
-    hands.key("p")
-    hands.click_all((1, 1), (3, 1), (3, 3))
-    hands.key("return")
-    hands.key("ctrl+s")
-    hands.key("return")
+def test_the_polygon_that_was_drawn_is_in_the_file(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("p")
+    driver.click_all((1, 1), (3, 1), (3, 3))
+    driver.press_key("return")
+    driver.press_key("ctrl+s")
+    driver.press_key("return")
     assert PolygonObstacle(((1, 1), (3, 1), (3, 3))) in load_map(tmp_path / "untitled.json").obstacles
 
 
-def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: Path) -> None:
-    hands.key("ctrl+s")
-    hands.key("return")
+def test_a_draft_is_not_saved_over_a_valid_map_unasked(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("ctrl+s")
+    driver.press_key("return")
     (path,) = tmp_path.glob("*.json")
-    hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
-    hands.key("ctrl+s")
-    assert hands.editor.dialogs.current is not None and "valid map" in hands.editor.dialogs.current.text
-    hands.key("c")
+    driver.editor.apply(create.set_boundary(driver.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
+    driver.press_key("ctrl+s")
+    assert driver.editor.dialogs.current is not None and "valid map" in driver.editor.dialogs.current.text
+    driver.press_key("c")
     load_map(path)
-    hands.key("ctrl+s")
-    hands.key("r")
+    driver.press_key("ctrl+s")
+    driver.press_key("r")
     with pytest.raises(MapError):
         load_map(path)
-    hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
-    hands.key("ctrl+s")
-    assert hands.editor.dialogs.current is None and not hands.editor.document.history.has_unsaved_changes
+    driver.editor.apply(create.set_boundary(driver.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
+    driver.press_key("ctrl+s")
+    assert driver.editor.dialogs.current is None and not driver.editor.document.history.has_unsaved_changes

@@ -7,7 +7,7 @@ from pathlib import Path
 import pygame
 import pytest
 from drawn_sketches import renumbered
-from driven_editor import Hands, of_map, opened_editor, sheet
+from driven_editor import EditorDriver, load_sketch, open_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
@@ -52,7 +52,7 @@ SHEETS: dict[str, Callable[[], object]] = {
         WallObstacle(((1, 8), (1, 8)), 0.1),
         CircleObstacle((50, 50), 1.0),
     ),
-    "rooms": lambda: of_map("rooms"),
+    "rooms": lambda: load_sketch("rooms"),
 }
 
 
@@ -81,21 +81,21 @@ class SeldomReadings:
 class Monkey:
     """Does one random thing after the other."""
 
-    def __init__(self, hands: Hands, seed: int) -> None:
-        self.hands, self.random = hands, random.Random(seed)
+    def __init__(self, driver: EditorDriver, seed: int) -> None:
+        self.driver, self.random = driver, random.Random(seed)
         self.done: dict[str, int] = {}
         self.held = 0
 
     def somewhere(self) -> tuple[int, int]:
-        width, height = self.hands.window.screen.get_size()
+        width, height = self.driver.window.screen.get_size()
         if self.random.random() < 0.25:
             return self.random.randrange(width), self.random.randrange(height)
         # near the map, where things are
-        x, y = self.hands.pixel((self.random.uniform(-1, 11), self.random.uniform(-1, 11)))
+        x, y = self.driver.find_pixel((self.random.uniform(-1, 11), self.random.uniform(-1, 11)))
         return int(min(max(x, 0), width - 1)), int(min(max(y, 0), height - 1))
 
     def key(self) -> None:
-        commands = self.hands.window.commands.commands
+        commands = self.driver.window.commands.commands
         name, key = self.random.choice([(each.name, key) for each in commands for key in each.keys])
         self.done[name] = self.done.get(name, 0) + 1
         if self.done[name] > MOST.get(name, 10**9):
@@ -105,51 +105,51 @@ class Monkey:
         code = KEYS.get(last) or pygame.key.key_code(last)
         text = last if len(last) == 1 and "ctrl" not in held else ""
         mod = sum(MODIFIERS[each] for each in held if each)
-        self.hands.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
+        self.driver.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
         if text:
-            self.hands.post(pygame.TEXTINPUT, text=text)
+            self.driver.post(pygame.TEXTINPUT, text=text)
         if self.random.random() < 0.9:
-            self.hands.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
+            self.driver.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
 
     def letters(self) -> None:
         for letter in self.random.choice(WORDS):
             code = ord(letter) if letter.isascii() else 0
-            self.hands.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
-            self.hands.post(pygame.TEXTINPUT, text=letter)
+            self.driver.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
+            self.driver.post(pygame.TEXTINPUT, text=letter)
         if self.random.random() < 0.7:
-            self.hands.post(pygame.KEYDOWN, key=pygame.K_RETURN, mod=0, unicode="\r", scancode=0)
+            self.driver.post(pygame.KEYDOWN, key=pygame.K_RETURN, mod=0, unicode="\r", scancode=0)
 
     def move(self) -> None:
         at = self.somewhere()
-        rel = at[0] - self.hands.at[0], at[1] - self.hands.at[1]
+        rel = at[0] - self.driver.at[0], at[1] - self.driver.at[1]
         pygame.mouse.set_pos(at)
-        self.hands.at = at
-        self.hands.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=(self.held == 1, 0, self.held == 3))
+        self.driver.at = at
+        self.driver.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=(self.held == 1, 0, self.held == 3))
 
     def press(self) -> None:
         self.held = self.random.choice(BUTTONS)
-        self.hands.post(pygame.MOUSEBUTTONDOWN, pos=self.hands.at, button=self.held)
+        self.driver.post(pygame.MOUSEBUTTONDOWN, pos=self.driver.at, button=self.held)
 
     def release(self) -> None:
         button = self.held if self.random.random() < 0.9 else self.random.choice(BUTTONS)
-        self.hands.post(pygame.MOUSEBUTTONUP, pos=self.hands.at, button=button)
+        self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.at, button=button)
         self.held = 0
 
     def wheel(self) -> None:
         amount = self.random.choice((-3, -1, 1, 2))
-        self.hands.post(
+        self.driver.post(
             pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False
         )
 
     def odd(self) -> None:
-        window = self.hands.window
+        window = self.driver.window
         which = self.random.randrange(6)
         if which == 0:
             size = self.random.choice(SIZES)
             pygame.display.set_mode(size, pygame.RESIZABLE)
-            self.hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+            self.driver.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
         elif which == 1:
-            self.hands.post(self.random.choice((pygame.WINDOWLEAVE, pygame.WINDOWFOCUSLOST)))
+            self.driver.post(self.random.choice((pygame.WINDOWLEAVE, pygame.WINDOWFOCUSLOST)))
         elif which == 2:
             pygame.key.set_mods(self.random.choice((0, 0, *MODIFIERS.values())))
         elif which == 3:
@@ -157,7 +157,7 @@ class Monkey:
         elif which == 4:
             window.canvas.fit()
         else:
-            self.hands.post(pygame.KEYDOWN, key=pygame.K_ESCAPE, mod=0, unicode="", scancode=0)
+            self.driver.post(pygame.KEYDOWN, key=pygame.K_ESCAPE, mod=0, unicode="", scancode=0)
 
     def act(self) -> None:
         dice = self.random.random()
@@ -188,12 +188,12 @@ def test_some_random_events_do_no_harm(tmp_path: Path) -> None:
 
 def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
     readings = SeldomReadings()
-    with opened_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=readings) as hands:
-        monkey = Monkey(hands, seed)
+    with open_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=readings) as driver:
+        monkey = Monkey(driver, seed)
         for step in range(events // BATCH):
             for _ in range(BATCH):
                 monkey.act()
-            window = hands.window
+            window = driver.window
             if window.trial is not None or step % DRAWN == 0:
                 window.run_frame(1 / 50)
             else:
@@ -201,15 +201,15 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
             if window.closed:
                 window.closed = window.documents.may_close = False
             if step % 50 == 0:
-                sketch = hands.sketch
+                sketch = driver.sketch
                 assert parse_sketch(dump_sketch(sketch), "map") == renumbered(sketch)
-                assert hands.editor.selection.restrict_to(sketch) == hands.editor.selection
+                assert driver.editor.selection.restrict_to(sketch) == driver.editor.selection
         # and back to the beginning, exactly
         pygame.event.clear()
-        if hands.window.trial is not None:
-            hands.window.trial.ended = True
-            hands.window.run_frame(0.0)
-        history = hands.editor.document.history
+        if driver.window.trial is not None:
+            driver.window.trial.ended = True
+            driver.window.run_frame(0.0)
+        history = driver.editor.document.history
         last = history.sketch
         undone = 0
         while history.undo() is not None:

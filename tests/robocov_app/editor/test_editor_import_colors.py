@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from driven_editor import Hands, opened_editor, sheet
+from driven_editor import EditorDriver, open_editor, sheet
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.ui.import_dialog import ImportDialog
@@ -130,83 +130,83 @@ def dialog_file(folder: Path) -> Path:
 
 
 @pytest.fixture(params=[("light", (900, 600)), ("dark", (1280, 720))])
-def hands(request: Any, tmp_path: Path) -> Iterator[Hands]:
+def driver(request: Any, tmp_path: Path) -> Iterator[EditorDriver]:
     theme, size = request.param
     dialog_file(tmp_path)
-    with opened_editor(tmp_path, sheet(), theme=theme, size=size) as driver:
-        driver.key("ctrl+o")
+    with open_editor(tmp_path, sheet(), theme=theme, size=size) as driver:
+        driver.press_key("ctrl+o")
         driver.type("plan.svg")
-        driver.key("return")
-        driver.frames(3)
+        driver.press_key("return")
+        driver.run_frames(3)
         yield driver
 
 
-def shown(hands: Hands) -> tuple[ImportDialog, Any]:
-    hands.frames(2)
-    asked = hands.editor.dialogs.current
+def shown(driver: EditorDriver) -> tuple[ImportDialog, Any]:
+    driver.run_frames(2)
+    asked = driver.editor.dialogs.current
     assert isinstance(asked, ImportDialog)
-    return asked, hands.window.dialogs.ui.widgets
+    return asked, driver.window.dialogs.ui.widgets
 
 
-def pixel(hands: Hands, point: Any) -> tuple[int, ...]:
+def pixel(driver: EditorDriver, point: Any) -> tuple[int, ...]:
     x, y = (round(value) for value in point)
-    return tuple(hands.window.screen.get_at((x, y)))[:3]
+    return tuple(driver.window.screen.get_at((x, y)))[:3]
 
 
-def test_a_click_on_the_preview_changes_a_color_and_the_preview(hands: Hands) -> None:
-    asked, widgets = shown(hands)
-    hands.click(*widgets["button:clicks:color"].rect.center)
-    asked, widgets = shown(hands)
+def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDriver) -> None:
+    asked, widgets = shown(driver)
+    driver.click(*widgets["button:clicks:color"].rect.center)
+    asked, widgets = shown(driver)
     before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.preview.cameras)
-    assert pixel(hands, before) == (224, 224, 255)
-    solid = pixel(hands, after)
-    hands.click(*before.tolist())
-    asked, widgets = shown(hands)
+    assert pixel(driver, before) == (224, 224, 255)
+    solid = pixel(driver, after)
+    driver.click(*before.tolist())
+    asked, widgets = shown(driver)
     assert asked.form.entries == {"free_color": "#e0e0ff"}
     # the rows of colors are in sight, and do not move the maps
     chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
-    assert pixel(hands, asked.preview.cameras[1].to_pixels(np.array(RUG))) != solid
+    assert pixel(driver, asked.preview.cameras[1].to_pixels(np.array(RUG))) != solid
     # a click into the right map still keeps a part
-    hands.click(*asked.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
-    asked, _ = shown(hands)
+    driver.click(*asked.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
+    asked, _ = shown(driver)
     assert [float(word) for word in asked.form.entries["inside"].split()] == pytest.approx(
         (8.0, 1.0), abs=0.1
     )
 
 
-def test_colors_are_reached_by_the_keyboard(hands: Hands) -> None:
-    shown(hands)
-    ui = hands.window.dialogs.ui
+def test_colors_are_reached_by_the_keyboard(driver: EditorDriver) -> None:
+    shown(driver)
+    ui = driver.window.dialogs.ui
     for _ in range(60):
         if ui.focus == "clicks:color":
             break
-        hands.key("tab")
-        hands.frames(1)
+        driver.press_key("tab")
+        driver.run_frames(1)
     assert ui.focus == "clicks:color"
-    hands.key("space")
-    hands.frames(2)
+    driver.press_key("space")
+    driver.run_frames(2)
     for _ in range(10):
         if ui.focus == "color:#e0e0ff":
             break
-        hands.key("tab")
-        hands.frames(1)
-    hands.key("space")
-    asked, _ = shown(hands)
+        driver.press_key("tab")
+        driver.run_frames(1)
+    driver.press_key("space")
+    asked, _ = shown(driver)
     assert asked.form.entries == {"free_color": "#e0e0ff"}
     assert ui.focus is not None and ui.focus == "color:#e0e0ff"
-    hands.key("space")
-    asked, _ = shown(hands)
+    driver.press_key("space")
+    asked, _ = shown(driver)
     assert asked.form.entries == {"solid_color": "#e0e0ff"}
 
 
-def test_the_report_is_in_sight(hands: Hands) -> None:
-    asked, _ = shown(hands)
+def test_the_report_is_in_sight(driver: EditorDriver) -> None:
+    asked, _ = shown(driver)
     foot = max(camera.view[1] + camera.view[3] for camera in asked.preview.cameras)
     left = round(asked.preview.cameras[0].view[0])
     lines = np.array(
         [
-            [hands.window.screen.get_at((x, y))[:3] for x in range(left, left + 120)]
+            [driver.window.screen.get_at((x, y))[:3] for x in range(left, left + 120)]
             for y in range(round(foot) + 8, round(foot) + 60)
         ]
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pygame
 import pytest
-from driven_editor import Hands, opened_editor, sheet
+from driven_editor import EditorDriver, open_editor, sheet
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.edits.properties import set_title
@@ -120,119 +120,119 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
 
 
 @pytest.fixture
-def hands(tmp_path: Path) -> Iterator[Hands]:
-    with opened_editor(tmp_path, sheet()) as driver:
+def driver(tmp_path: Path) -> Iterator[EditorDriver]:
+    with open_editor(tmp_path, sheet()) as driver:
         yield driver
 
 
-def shown(hands: Hands) -> tuple[ImportDialog, Any]:
+def shown(driver: EditorDriver) -> tuple[ImportDialog, Any]:
     """Return the dialog, and its widgets by kind and name."""
-    hands.frames(2)
-    assert isinstance(hands.editor.dialogs.current, ImportDialog)
-    return hands.editor.dialogs.current, hands.window.dialogs.ui.widgets
+    driver.run_frames(2)
+    assert isinstance(driver.editor.dialogs.current, ImportDialog)
+    return driver.editor.dialogs.current, driver.window.dialogs.ui.widgets
 
 
-def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, plan: Path) -> None:
-    hands.key("ctrl+o")
-    hands.type("plan.png")
-    hands.key("return")
-    hands.type("0.1")
-    asked, _ = shown(hands)
+def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(driver: EditorDriver, plan: Path) -> None:
+    driver.press_key("ctrl+o")
+    driver.type("plan.png")
+    driver.press_key("return")
+    driver.type("0.1")
+    asked, _ = shown(driver)
     assert asked.form.entries == {"cell": "0.1"}
     for camera, place in zip(asked.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
-        hands.click(*camera.to_pixels(np.array(place)).tolist())
+        driver.click(*camera.to_pixels(np.array(place)).tolist())
         x, y = (float(word) for word in asked.form.entries["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
-    hands.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
-    hands.key("return")
-    hands.frames(2)
-    assert hands.editor.dialogs.current is None
+    driver.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
+    driver.press_key("return")
+    driver.run_frames(2)
+    assert driver.editor.dialogs.current is None
     assert (
-        hands.editor.document.history.has_unsaved_changes
-        and hands.editor.document.path is None
-        and hands.editor.document.title == "plan"
+        driver.editor.document.history.has_unsaved_changes
+        and driver.editor.document.path is None
+        and driver.editor.document.title == "plan"
     )
-    assert hands.sketch.build_environment().free_area == pytest.approx(56)
-    assert hands.said == "imported: plan.png, not saved yet"
+    assert driver.sketch.build_environment().free_area == pytest.approx(56)
+    assert driver.message == "imported: plan.png, not saved yet"
 
 
-def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
-    hands.window.documents.open(plan)
-    asked, view = shown(hands)
-    hands.type("0.1")
-    hands.click(*view["menu:invert"].rect.center)
-    hands.key("down")
-    hands.key("return")
+def test_widgets_of_options_and_buttons(driver: EditorDriver, plan: Path) -> None:
+    driver.window.documents.open(plan)
+    asked, view = shown(driver)
+    driver.type("0.1")
+    driver.click(*view["menu:invert"].rect.center)
+    driver.press_key("down")
+    driver.press_key("return")
     assert asked.form.entries == {"cell": "0.1", "invert": "yes"} and not asked.accepted
-    menu = shown(hands)[1]["menu:unknown"]
+    menu = shown(driver)[1]["menu:unknown"]
     seen = []
     for _ in range(4):
-        hands.click(*menu.rect.center)
-        hands.key("down")
-        hands.key("return")
+        driver.click(*menu.rect.center)
+        driver.press_key("down")
+        driver.press_key("return")
         seen.append(asked.form.entries.get("unknown"))
     assert seen == ["obstacle", "free", "cut", "cut"]
-    hands.click(*menu.rect.center)
-    hands.key("home")
-    hands.key("return")
+    driver.click(*menu.rect.center)
+    driver.press_key("home")
+    driver.press_key("return")
     assert "unknown" not in asked.form.entries, "an option without a default can be left again"
-    before = hands.sketch
-    hands.click(*view["button:cancel"].rect.center)
-    assert hands.editor.dialogs.current is None and hands.sketch is before
+    before = driver.sketch
+    driver.click(*view["button:cancel"].rect.center)
+    assert driver.editor.dialogs.current is None and driver.sketch is before
 
 
-def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path) -> None:
-    hands.window.documents.open(plan)
-    asked, _ = shown(hands)
-    hands.key("return")
-    hands.frames(2)
-    assert hands.editor.dialogs.current is asked and "--cell" in asked.problem
-    hands.type("0.1")
-    hands.frames(2)
-    assert hands.editor.dialogs.current is asked, "an old Enter counts no more"
-    hands.key("escape")
-    assert hands.editor.dialogs.current is None
+def test_what_cannot_be_imported_is_told_and_not_taken(driver: EditorDriver, plan: Path) -> None:
+    driver.window.documents.open(plan)
+    asked, _ = shown(driver)
+    driver.press_key("return")
+    driver.run_frames(2)
+    assert driver.editor.dialogs.current is asked and "--cell" in asked.problem
+    driver.type("0.1")
+    driver.run_frames(2)
+    assert driver.editor.dialogs.current is asked, "an old Enter counts no more"
+    driver.press_key("escape")
+    assert driver.editor.dialogs.current is None
 
 
-def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
-    hands.editor.apply(set_title(hands.sketch, "mine"))
-    hands.post(pygame.DROPFILE, file=str(plan))
-    hands.settle()
-    shown(hands)
-    hands.type("0.1")
-    hands.key("return")
-    hands.frames(2)
-    asked = hands.editor.dialogs.current
+def test_what_is_open_is_not_lost(driver: EditorDriver, plan: Path) -> None:
+    driver.editor.apply(set_title(driver.sketch, "mine"))
+    driver.post(pygame.DROPFILE, file=str(plan))
+    driver.settle()
+    shown(driver)
+    driver.type("0.1")
+    driver.press_key("return")
+    driver.run_frames(2)
+    asked = driver.editor.dialogs.current
     assert isinstance(asked, Question) and asked.title == "Save the changes?"
-    hands.key("escape")
-    assert hands.sketch.name == "mine"
+    driver.press_key("escape")
+    assert driver.sketch.name == "mine"
 
 
-def test_closing_the_window_leaves_it(hands: Hands, plan: Path) -> None:
-    hands.window.documents.open(plan)
-    shown(hands)
-    hands.post(pygame.QUIT)
-    hands.settle()
-    assert hands.editor.dialogs.current is None and hands.window.closed
+def test_closing_the_window_leaves_it(driver: EditorDriver, plan: Path) -> None:
+    driver.window.documents.open(plan)
+    shown(driver)
+    driver.post(pygame.QUIT)
+    driver.settle()
+    assert driver.editor.dialogs.current is None and driver.window.closed
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
 def test_options_maps_and_report_keep_apart(tmp_path: Path, plan: Path, size: tuple[int, int]) -> None:
-    with opened_editor(tmp_path, sheet(), size=size) as hands:
-        hands.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
-        hands.frames(2)
-        asked, view = shown(hands)
+    with open_editor(tmp_path, sheet(), size=size) as driver:
+        driver.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
+        driver.run_frames(2)
+        asked, view = shown(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button", "area")]
         assert len(rects) == len(asked.form.options) + 3
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
-        hands.key("escape")
-        hands.window.documents.ask_import(plan, IMPORTERS["picture"])
-        hands.type("0.1")
-        asked, view = shown(hands)
+        driver.press_key("escape")
+        driver.window.documents.ask_import(plan, IMPORTERS["picture"])
+        driver.type("0.1")
+        asked, view = shown(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]
         views = [pygame.Rect(camera.view) for camera in asked.preview.cameras]
         assert not views[0].colliderect(views[1]) and min(min(view.size) for view in views) > 120
         assert all(not view.colliderect(rect) for view in views for rect in rects)
-        left, right = (hands.window.screen.subsurface(view).copy() for view in views)
+        left, right = (driver.window.screen.subsurface(view).copy() for view in views)
         assert pygame.transform.average_color(left) != pygame.transform.average_color(right)

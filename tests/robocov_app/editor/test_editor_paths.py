@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_editor import opened_editor, sheet
+from driven_editor import open_editor, sheet
 
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -99,12 +99,12 @@ def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path)
     assert paths.describe_path(broken.path) == "leads nowhere"
     paths.find_waypoint(broken.path, (0.0, 0.0), 1.0)
     assert paths.find_leg(broken.path, (9.0, 9.0), 0.1) is None
-    with opened_editor(tmp_path, sheet(broken)) as hands:
-        hands.editor.select(Selection.of(0))
-        hands.key("l")
-        hands.key("o")
-        hands.frames(3)
-        hands.go((5.0, 5.0))
+    with open_editor(tmp_path, sheet(broken)) as driver:
+        driver.editor.select(Selection.of(0))
+        driver.press_key("l")
+        driver.press_key("o")
+        driver.run_frames(3)
+        driver.move_to((5.0, 5.0))
 
 
 @pytest.mark.parametrize(
@@ -137,98 +137,99 @@ def test_it_is_kept_in_the_file() -> None:
 
 
 def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(CART, DESK)) as hands:
-        editor = hands.editor
+    with open_editor(tmp_path, sheet(CART, DESK)) as driver:
+        editor = driver.editor
         editor.snaps = set()
-        hands.key("o")
-        hands.click_all((4.0, 4.0))
+        driver.press_key("o")
+        driver.click_all((4.0, 4.0))
         assert "click the obstacle" in editor.message
-        hands.click_all((2.0, 2.0), (2.1, 2.1))
-        assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(hands.sketch) == ()
-        hands.click_all((6.0, 2.0), (6.0, 5.0))
-        points = np.array(led(hands.sketch).points)
+        driver.click_all((2.0, 2.0), (2.1, 2.1))
+        assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(driver.sketch) == ()
+        driver.click_all((6.0, 2.0), (6.0, 5.0))
+        points = np.array(led(driver.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
         # a click on a leg puts a waypoint into it
-        hands.click_all((4.0, 2.0))
-        assert len(led(hands.sketch).points) == 4
-        np.testing.assert_allclose(led(hands.sketch).points[1], (4.0, 2.0), atol=0.03)
-        hands.wait()
-        hands.drag_at((4.0, 2.0), (4.0, 2.5), (4.0, 3.0))
-        np.testing.assert_allclose(led(hands.sketch).points[1], (4.0, 3.0), atol=0.03)
-        hands.key("backspace")
-        np.testing.assert_allclose(led(hands.sketch).points, points, atol=1e-9)
-        hands.type("0.25")
-        hands.key("return")
-        assert led(hands.sketch).speed == 0.25
-        hands.key("shift+o")
-        assert led(hands.sketch).repeat == "loop"
+        driver.click_all((4.0, 2.0))
+        assert len(led(driver.sketch).points) == 4
+        np.testing.assert_allclose(led(driver.sketch).points[1], (4.0, 2.0), atol=0.03)
+        driver.wait()
+        driver.drag_at((4.0, 2.0), (4.0, 2.5), (4.0, 3.0))
+        np.testing.assert_allclose(led(driver.sketch).points[1], (4.0, 3.0), atol=0.03)
+        driver.press_key("backspace")
+        np.testing.assert_allclose(led(driver.sketch).points, points, atol=1e-9)
+        driver.type("0.25")
+        driver.press_key("return")
+        assert led(driver.sketch).speed == 0.25
+        driver.press_key("shift+o")
+        assert led(driver.sketch).repeat == "loop"
         for _ in range(6):
-            hands.key("ctrl+z")
-        assert len(led(hands.sketch).points) == 2
-        hands.key("ctrl+z")
-        assert paths.list_moving_obstacles(hands.sketch) == ()
+            driver.press_key("ctrl+z")
+        assert len(led(driver.sketch).points) == 2
+        driver.press_key("ctrl+z")
+        assert paths.list_moving_obstacles(driver.sketch) == ()
 
 
 def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(MOVING, DESK)) as hands:
-        hands.key("o")
-        hands.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
-        assert paths.list_moving_obstacles(hands.sketch) == (0, 1)
-        assert led(hands.sketch) == ROUND
-        hands.key("return")
-        assert not hands.editor.selection and hands.editor.tool.name == "path"
-        hands.click_all((6.0, 7.3))
-        hands.key("escape")
-        assert hands.editor.tool is hands.editor.toolbox.selector and hands.editor.selection == Selection.of(
-            1
+    with open_editor(tmp_path, sheet(MOVING, DESK)) as driver:
+        driver.press_key("o")
+        driver.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
+        assert paths.list_moving_obstacles(driver.sketch) == (0, 1)
+        assert led(driver.sketch) == ROUND
+        driver.press_key("return")
+        assert not driver.editor.selection and driver.editor.tool.name == "path"
+        driver.click_all((6.0, 7.3))
+        driver.press_key("escape")
+        assert (
+            driver.editor.tool is driver.editor.toolbox.selector
+            and driver.editor.selection == Selection.of(1)
         )
-        hands.key("alt+o")
-        assert paths.list_moving_obstacles(hands.sketch) == (0,)
+        driver.press_key("alt+o")
+        assert paths.list_moving_obstacles(driver.sketch) == (0,)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -> None:
     still = sheet(CART)
-    with opened_editor(tmp_path, still, theme=theme) as hands:
-        hands.key("l")
-        assert "no obstacle moves" in hands.editor.message
-        hands.editor.message = ""
-        hands.frames(2)
-        before = hands.picture()
-        change = paths.add_waypoint(hands.sketch, 0, (8.0, 2.0))
-        hands.editor.apply(replace(change, selection=Selection(), description=""))
-        hands.editor.message = ""
-        hands.frames(2)
-        with_path = hands.picture()
-        x, y = map(round, hands.pixel((5.0, 2.0)))
+    with open_editor(tmp_path, still, theme=theme) as driver:
+        driver.press_key("l")
+        assert "no obstacle moves" in driver.editor.message
+        driver.editor.message = ""
+        driver.run_frames(2)
+        before = driver.copy_frame()
+        change = paths.add_waypoint(driver.sketch, 0, (8.0, 2.0))
+        driver.editor.apply(replace(change, selection=Selection(), description=""))
+        driver.editor.message = ""
+        driver.run_frames(2)
+        with_path = driver.copy_frame()
+        x, y = map(round, driver.find_pixel((5.0, 2.0)))
         assert (with_path[y - 8 : y + 9, x - 30 : x + 30] != before[y - 8 : y + 9, x - 30 : x + 30]).any()
-        hands.key("l")
-        hands.editor.message = ""
-        hands.frames(1, 4.0)
-        (shift,) = [led(hands.sketch).compute_displacement(hands.editor.now - hands.editor.moves_since)]
+        driver.press_key("l")
+        driver.editor.message = ""
+        driver.run_frames(1, 4.0)
+        (shift,) = [led(driver.sketch).compute_displacement(driver.editor.now - driver.editor.moves_since)]
         assert shift[0] > 1.0
-        x, y = map(round, hands.pixel((2.0 + float(shift[0]), 2.2)))
-        assert (hands.picture()[y, x] != with_path[y, x]).any()
-        hands.key("l")
-        assert hands.editor.moves_since is None
+        x, y = map(round, driver.find_pixel((2.0 + float(shift[0]), 2.2)))
+        assert (driver.copy_frame()[y, x] != with_path[y, x]).any()
+        driver.press_key("l")
+        assert driver.editor.moves_since is None
 
 
 def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
-    with opened_editor(tmp_path, sheet(CART)) as hands:
-        hands.editor.apply(paths.add_waypoint(hands.sketch, 0, (8.0, 2.0)))
-        hands.editor.document.save(path)
+    with open_editor(tmp_path, sheet(CART)) as driver:
+        driver.editor.apply(paths.add_waypoint(driver.sketch, 0, (8.0, 2.0)))
+        driver.editor.document.save(path)
     environment = load_map(path)
     assert environment.at(4.0).obstacles[0].center == pytest.approx((4.0, 2.0))
 
 
 def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(MOVING)) as hands:
-        hands.editor.select(Selection.of(0))
-        run_typed_command(hands.editor, "0.75", "speed")
-        assert led(hands.sketch).speed == 0.75
-        hands.push("tab:object")
-        hands.push("path:repeat")
-        assert led(hands.sketch).repeat == "back-and-forth"
-        hands.push("path:none")
-        assert paths.list_moving_obstacles(hands.sketch) == ()
+    with open_editor(tmp_path, sheet(MOVING)) as driver:
+        driver.editor.select(Selection.of(0))
+        run_typed_command(driver.editor, "0.75", "speed")
+        assert led(driver.sketch).speed == 0.75
+        driver.push_button("tab:object")
+        driver.push_button("path:repeat")
+        assert led(driver.sketch).repeat == "back-and-forth"
+        driver.push_button("path:none")
+        assert paths.list_moving_obstacles(driver.sketch) == ()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pygame
-from driven_editor import Hands, of_map, opened_editor, sheet
+from driven_editor import EditorDriver, load_sketch, open_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
@@ -15,118 +15,118 @@ from robocov_app.editor.ui.play_mode import build_trial_change
 PILLAR = CircleObstacle((7, 7), 1.0)
 
 
-def tried(hands: Hands):
-    hands.key("f5")
-    trial = hands.window.trial
+def tried(driver: EditorDriver):
+    driver.press_key("f5")
+    trial = driver.window.trial
     assert trial is not None
     return trial
 
 
 def test_back_with_nothing_lost(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as hands:
-        hands.key("r")
-        hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
-        hands.key("v")
-        hands.window.canvas.zoom(2.0, (200.0, 200.0))
-        hands.window.run_frame(0.0)
-        before, camera, selection = hands.sketch, hands.window.canvas.camera, hands.editor.selection
-        picture = hands.picture()
-        trial = tried(hands)
+    with open_editor(tmp_path, sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as driver:
+        driver.press_key("r")
+        driver.drag_at((4, 4), (4.5, 4.5), (5, 5))
+        driver.press_key("v")
+        driver.window.canvas.zoom(2.0, (200.0, 200.0))
+        driver.window.run_frame(0.0)
+        before, camera, selection = driver.sketch, driver.window.canvas.camera, driver.editor.selection
+        picture = driver.copy_frame()
+        trial = tried(driver)
         assert trial.viewer.session.displayed.environment == before.build_environment()
         assert trial.viewer.session.timeline.scenario.start_name == "s"
-        hands.frames(10)
+        driver.run_frames(10)
         assert trial.viewer.session.displayed.time > 0.0
-        hands.key("f5")
-        assert hands.window.trial is None
-        assert hands.sketch is before and hands.window.canvas.camera == camera
-        assert hands.editor.selection == selection
-        hands.editor.message = ""
-        hands.window.run_frame(0.0)
+        driver.press_key("f5")
+        assert driver.window.trial is None
+        assert driver.sketch is before and driver.window.canvas.camera == camera
+        assert driver.editor.selection == selection
+        driver.editor.message = ""
+        driver.window.run_frame(0.0)
         arena = np.s_[40:500, :500]
-        apart = np.abs(hands.picture() - picture)[arena].max(axis=2)
+        apart = np.abs(driver.copy_frame() - picture)[arena].max(axis=2)
         assert (apart > 40).mean() < 0.05  # but for the message, as it was
-        hands.key("ctrl+z")
-        assert len(hands.shapes) == 1
+        driver.press_key("ctrl+z")
+        assert len(driver.shapes) == 1
 
 
 def test_escape_leads_back_but_first_closes_what_is_open(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, of_map("square")) as hands:
-        trial = tried(hands)
-        hands.key("f1")
+    with open_editor(tmp_path, load_sketch("square")) as driver:
+        trial = tried(driver)
+        driver.press_key("f1")
         assert trial.is_help_open
-        hands.key("escape")
-        assert hands.window.trial is trial and not trial.is_help_open
-        hands.key("w")
-        hands.key("escape")
-        assert hands.window.trial is trial
-        hands.key("escape")
-        assert hands.window.trial is None
+        driver.press_key("escape")
+        assert driver.window.trial is trial and not trial.is_help_open
+        driver.press_key("w")
+        driver.press_key("escape")
+        assert driver.window.trial is trial
+        driver.press_key("escape")
+        assert driver.window.trial is None
 
 
 def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
-    with opened_editor(tmp_path, sheet(crossed)) as hands:
-        hands.key("f5")
-        assert hands.window.trial is None and hands.editor.has_error_message and hands.said
-    with opened_editor(tmp_path, Sketch(boundary=None)) as hands:
-        hands.key("f5")
-        assert hands.window.trial is None and hands.editor.has_error_message
-    with opened_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as hands:
-        hands.editor.robots = 50
-        hands.key("f5")
-        assert hands.window.trial is None and "room for about" in hands.said
+    with open_editor(tmp_path, sheet(crossed)) as driver:
+        driver.press_key("f5")
+        assert driver.window.trial is None and driver.editor.has_error_message and driver.message
+    with open_editor(tmp_path, Sketch(boundary=None)) as driver:
+        driver.press_key("f5")
+        assert driver.window.trial is None and driver.editor.has_error_message
+    with open_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
+        driver.editor.robots = 50
+        driver.press_key("f5")
+        assert driver.window.trial is None and "room for about" in driver.message
 
 
 def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(PILLAR)) as hands:
-        hands.editor.apply(properties.set_note(hands.sketch, Selection.of(0), "old oak"))
-        trial = tried(hands)
-        hands.key("c")
+    with open_editor(tmp_path, sheet(PILLAR)) as driver:
+        driver.editor.apply(properties.set_note(driver.sketch, Selection.of(0), "old oak"))
+        trial = tried(driver)
+        driver.press_key("c")
         x, y = trial.canvas.to_pixel((3.0, 3.0))
         to_x, _ = trial.canvas.to_pixel((3.5, 3.0))
-        hands.drag((x, y), (x + 3, y), (to_x, y))
-        hands.key("f5")
-        assert len(hands.shapes) == 2 and hands.sketch.obstacles[0].note == "old oak"
-        hands.key("ctrl+z")
-        assert len(hands.shapes) == 1
+        driver.drag((x, y), (x + 3, y), (to_x, y))
+        driver.press_key("f5")
+        assert len(driver.shapes) == 2 and driver.sketch.obstacles[0].note == "old oak"
+        driver.press_key("ctrl+z")
+        assert len(driver.shapes) == 1
 
 
 def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet(PILLAR)) as hands:
-        trial = tried(hands)
+    with open_editor(tmp_path, sheet(PILLAR)) as driver:
+        trial = tried(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
         assert trial.viewer.files.has_left_tried_map and "Untitled" in trial.viewer.files.list_maps()
-        hands.key("f5")
-        assert hands.shapes == [PILLAR]
-        trial = tried(hands)
+        driver.press_key("f5")
+        assert driver.shapes == [PILLAR]
+        trial = tried(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("rooms"))
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("Untitled"))
         assert (
             not trial.viewer.files.has_left_tried_map
             and len(trial.viewer.session.displayed.environment.obstacles) == 1
         )
-        hands.key("escape")
+        driver.press_key("escape")
 
 
 def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet()) as hands:
-        hands.key("c")
-        hands.drag_at((4, 4), (4.5, 4), (5, 4))
-        tried(hands)
-        hands.post(pygame.QUIT)
-        hands.settle()
-        hands.settle()
-        assert hands.window.trial is None and hands.window.dialogs.is_open and not hands.window.closed
-        hands.key("d")
-        assert hands.window.closed
+    with open_editor(tmp_path, sheet()) as driver:
+        driver.press_key("c")
+        driver.drag_at((4, 4), (4.5, 4), (5, 4))
+        tried(driver)
+        driver.post(pygame.QUIT)
+        driver.settle()
+        driver.settle()
+        assert driver.window.trial is None and driver.window.dialogs.is_open and not driver.window.closed
+        driver.press_key("d")
+        assert driver.window.closed
 
 
 def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, sheet()) as hands:
-        tried(hands)
-        hands.key("t")
-        hands.key("f5")
-        assert hands.editor.theme == "dark"
+    with open_editor(tmp_path, sheet()) as driver:
+        tried(driver)
+        driver.press_key("t")
+        driver.press_key("f5")
+        assert driver.editor.theme == "dark"
 
 
 def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
@@ -134,22 +134,22 @@ def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
     environment = sketch.build_environment()
     assert build_trial_change(sketch, environment, environment) is None
     assert build_trial_change(sketch, environment, sketch.build_environment()) is None
-    other = of_map("rooms").build_environment()
+    other = load_sketch("rooms").build_environment()
     assert build_trial_change(sketch, environment, other) is None
 
 
 def test_a_key_that_is_held_down_while_it_opens_does_not_lead_back(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, of_map("square")) as hands:
+    with open_editor(tmp_path, load_sketch("square")) as driver:
         press = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_F5, mod=0, unicode="")
         for _ in range(3):
             pygame.event.post(press)
-        hands.frames(2)
+        driver.run_frames(2)
         pygame.event.post(press)
-        hands.frames(2)
-        trial = hands.window.trial
+        driver.run_frames(2)
+        trial = driver.window.trial
         assert trial is not None and not trial.ended
         pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_F5, mod=0, unicode=""))
         pygame.event.post(press)
         pygame.event.post(press)
-        hands.frames(3)
-        assert hands.window.trial is None
+        driver.run_frames(3)
+        assert driver.window.trial is None

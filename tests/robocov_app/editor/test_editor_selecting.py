@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from driven_editor import Hands, opened_editor, sheet
+from driven_editor import EditorDriver, open_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Selection, Vertex
@@ -18,193 +18,193 @@ WALL = WallObstacle(((6, 1), (6, 3), (8, 3)), 0.2)
 
 
 @pytest.fixture
-def hands(tmp_path: Path) -> Iterator[Hands]:
+def driver(tmp_path: Path) -> Iterator[EditorDriver]:
     start = (("corner", DiscStart((1, 8.5), 0.6)),)
-    with opened_editor(tmp_path, sheet(SQUARE, PILLAR, WALL, starts=start)) as driver:
+    with open_editor(tmp_path, sheet(SQUARE, PILLAR, WALL, starts=start)) as driver:
         yield driver
 
 
-def handle(hands: Hands, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
+def handle(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
     """Return the pixel of a handle."""
-    (found,) = (each for each in hands.editor.handles if each.kind == kind and each.side == side)
-    return hands.pixel(found.at)
+    (found,) = (each for each in driver.editor.handles if each.kind == kind and each.side == side)
+    return driver.find_pixel(found.at)
 
 
-def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(hands: Hands) -> None:
-    hands.click_all((3, 3))
-    assert hands.editor.selection == Selection.of(0)
-    hands.hold("shift")
-    hands.click_all((7, 7))
-    assert hands.editor.selection == Selection.of(0, 1)
-    hands.click_all((3, 3))
-    hands.hold()
-    assert hands.editor.selection == Selection.of(1)
-    hands.click_all((9, 5))
-    assert not hands.editor.selection
-    hands.click_all((1, 8.5))
-    assert hands.editor.selection == Selection.of("corner")
-    hands.click_all((10, 5))
-    assert hands.editor.selection == Selection.of(BOUNDARY)
+def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(driver: EditorDriver) -> None:
+    driver.click_all((3, 3))
+    assert driver.editor.selection == Selection.of(0)
+    driver.hold_keys("shift")
+    driver.click_all((7, 7))
+    assert driver.editor.selection == Selection.of(0, 1)
+    driver.click_all((3, 3))
+    driver.hold_keys()
+    assert driver.editor.selection == Selection.of(1)
+    driver.click_all((9, 5))
+    assert not driver.editor.selection
+    driver.click_all((1, 8.5))
+    assert driver.editor.selection == Selection.of("corner")
+    driver.click_all((10, 5))
+    assert driver.editor.selection == Selection.of(BOUNDARY)
 
 
-def test_a_box_takes_what_lies_in_it_and_leftwards_what_it_touches(hands: Hands) -> None:
-    hands.drag_at((1.5, 1.5), (3, 3), (5, 5))
-    assert hands.editor.selection == Selection.of(0)
-    hands.key("escape")
-    hands.drag_at((3, 1.5), (4, 4), (7.5, 5))
-    assert hands.editor.selection == Selection()
-    hands.drag_at((7.5, 5), (4, 4), (3, 1.5))
-    assert hands.editor.selection == Selection.of(0, 2)
+def test_a_box_takes_what_lies_in_it_and_leftwards_what_it_touches(driver: EditorDriver) -> None:
+    driver.drag_at((1.5, 1.5), (3, 3), (5, 5))
+    assert driver.editor.selection == Selection.of(0)
+    driver.press_key("escape")
+    driver.drag_at((3, 1.5), (4, 4), (7.5, 5))
+    assert driver.editor.selection == Selection()
+    driver.drag_at((7.5, 5), (4, 4), (3, 1.5))
+    assert driver.editor.selection == Selection.of(0, 2)
 
 
-def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
-    hands.drag_at((3, 3), (3.5, 3.2), (4, 3.5), (5, 3))
-    assert hands.shapes[0].vertices == ((4, 2), (6, 2), (6, 4), (4, 4))
-    assert hands.shapes[0].name == "box" and hands.editor.selection == Selection.of(0)
-    hands.key("ctrl+z")
-    assert hands.shapes[0] == SQUARE
-    assert not hands.editor.document.history.undo_descriptions
-    hands.key("ctrl+y")
-    assert hands.shapes[0].vertices[0] == (4, 2)
+def test_dragging_moves_and_can_be_undone_as_one(driver: EditorDriver) -> None:
+    driver.drag_at((3, 3), (3.5, 3.2), (4, 3.5), (5, 3))
+    assert driver.shapes[0].vertices == ((4, 2), (6, 2), (6, 4), (4, 4))
+    assert driver.shapes[0].name == "box" and driver.editor.selection == Selection.of(0)
+    driver.press_key("ctrl+z")
+    assert driver.shapes[0] == SQUARE
+    assert not driver.editor.document.history.undo_descriptions
+    driver.press_key("ctrl+y")
+    assert driver.shapes[0].vertices[0] == (4, 2)
 
 
-def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(hands: Hands) -> None:
-    before = hands.sketch
-    hands.press(*hands.pixel((3, 3)))
-    hands.go((4, 4), (5, 5), held=1)
-    assert hands.editor.displayed[0] is not hands.sketch
-    hands.key("escape")
-    hands.go((6, 6), held=1)
-    hands.release()
-    assert hands.sketch is before and hands.editor.displayed[0] is hands.sketch
+def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(driver: EditorDriver) -> None:
+    before = driver.sketch
+    driver.press(*driver.find_pixel((3, 3)))
+    driver.move_to((4, 4), (5, 5), held=1)
+    assert driver.editor.displayed[0] is not driver.sketch
+    driver.press_key("escape")
+    driver.move_to((6, 6), held=1)
+    driver.release()
+    assert driver.sketch is before and driver.editor.displayed[0] is driver.sketch
 
 
-def test_alt_drag_copies(hands: Hands) -> None:
-    hands.hold("alt")
-    hands.drag_at((7, 7), (7.5, 5), (9, 5))
-    hands.hold()
-    assert hands.shapes[1] == PILLAR and hands.shapes[3] == CircleObstacle((9, 5), 1.0)
-    assert hands.editor.selection == Selection(items=frozenset({hands.sketch.obstacles[3].key}))
+def test_alt_drag_copies(driver: EditorDriver) -> None:
+    driver.hold_keys("alt")
+    driver.drag_at((7, 7), (7.5, 5), (9, 5))
+    driver.hold_keys()
+    assert driver.shapes[1] == PILLAR and driver.shapes[3] == CircleObstacle((9, 5), 1.0)
+    assert driver.editor.selection == Selection(items=frozenset({driver.sketch.obstacles[3].key}))
 
 
-def test_a_drag_takes_a_typed_distance(hands: Hands) -> None:
-    hands.press(*hands.pixel((3, 3)))
-    hands.go((3.6, 3.1), (4, 3), held=1)
-    hands.type("0.25 -0.5")
-    hands.key("return")
-    hands.release()
-    assert hands.shapes[0].vertices[0] == (2.25, 1.5)
+def test_a_drag_takes_a_typed_distance(driver: EditorDriver) -> None:
+    driver.press(*driver.find_pixel((3, 3)))
+    driver.move_to((3.6, 3.1), (4, 3), held=1)
+    driver.type("0.25 -0.5")
+    driver.press_key("return")
+    driver.release()
+    assert driver.shapes[0].vertices[0] == (2.25, 1.5)
 
 
-def test_a_vertex_is_dragged_alone_and_several_together(hands: Hands) -> None:
-    hands.click_all((3, 3))
-    hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
-    assert hands.shapes[0].vertices == ((2, 2), (4, 2), (5, 5), (2, 4))
-    assert hands.editor.selection.vertices == {Vertex(0, 0, 2)}
-    hands.hold("shift")
-    hands.click_all((4, 2))
-    hands.hold()
-    assert len(hands.editor.selection.vertices) == 2
-    hands.drag_at((4, 2), (4.5, 2), (5, 2))
-    assert hands.shapes[0].vertices == ((2, 2), (5, 2), (6, 5), (2, 4))
+def test_a_vertex_is_dragged_alone_and_several_together(driver: EditorDriver) -> None:
+    driver.click_all((3, 3))
+    driver.drag_at((4, 4), (4.5, 4.5), (5, 5))
+    assert driver.shapes[0].vertices == ((2, 2), (4, 2), (5, 5), (2, 4))
+    assert driver.editor.selection.vertices == {Vertex(0, 0, 2)}
+    driver.hold_keys("shift")
+    driver.click_all((4, 2))
+    driver.hold_keys()
+    assert len(driver.editor.selection.vertices) == 2
+    driver.drag_at((4, 2), (4.5, 2), (5, 2))
+    assert driver.shapes[0].vertices == ((2, 2), (5, 2), (6, 5), (2, 4))
 
 
-def test_a_double_click_on_an_edge_inserts_a_vertex_and_delete_removes_it(hands: Hands) -> None:
-    hands.click_all((3, 3))
-    hands.twice((3, 4))
-    assert (3, 4) in hands.shapes[0].vertices and len(hands.shapes[0].vertices) == 5
-    hands.key("delete")
-    assert hands.shapes[0].vertices == SQUARE.vertices
+def test_a_double_click_on_an_edge_inserts_a_vertex_and_delete_removes_it(driver: EditorDriver) -> None:
+    driver.click_all((3, 3))
+    driver.double_click((3, 4))
+    assert (3, 4) in driver.shapes[0].vertices and len(driver.shapes[0].vertices) == 5
+    driver.press_key("delete")
+    assert driver.shapes[0].vertices == SQUARE.vertices
 
 
-def test_corners_are_cut_off_and_rounded(hands: Hands) -> None:
-    hands.click_all((3, 3), (4, 4))
-    hands.key("shift+b")
-    assert set(hands.shapes[0].vertices) >= {(4, 3.8), (3.8, 4)}
-    hands.key("ctrl+z")
-    hands.command("round 0.5")
-    assert len(hands.shapes[0].vertices) > 6
+def test_corners_are_cut_off_and_rounded(driver: EditorDriver) -> None:
+    driver.click_all((3, 3), (4, 4))
+    driver.press_key("shift+b")
+    assert set(driver.shapes[0].vertices) >= {(4, 3.8), (3.8, 4)}
+    driver.press_key("ctrl+z")
+    driver.run_command("round 0.5")
+    assert len(driver.shapes[0].vertices) > 6
 
 
-def test_a_box_around_some_vertices_of_what_is_selected_takes_them(hands: Hands) -> None:
-    hands.click_all((3, 3))
-    hands.drag_at((4.6, 1.4), (4.2, 3), (3.6, 4.6))
-    assert hands.editor.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
-    hands.key("escape")
-    assert hands.editor.selection == Selection.of(0)
+def test_a_box_around_some_vertices_of_what_is_selected_takes_them(driver: EditorDriver) -> None:
+    driver.click_all((3, 3))
+    driver.drag_at((4.6, 1.4), (4.2, 3), (3.6, 4.6))
+    assert driver.editor.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
+    driver.press_key("escape")
+    assert driver.editor.selection == Selection.of(0)
 
 
-def test_the_rim_of_a_circle_and_of_a_start_are_dragged(hands: Hands) -> None:
-    hands.click_all((7, 7))
-    hands.drag_at((8, 7), (8.2, 7), (8.5, 7))
-    assert hands.shapes[1] == CircleObstacle((7, 7), 1.5)
-    hands.click_all((1, 8.5))
-    hands.drag_at((1, 9.1), (1, 9.2), (1, 9.4))
-    assert hands.sketch.get_start("corner") == DiscStart((1, 8.5), 0.9)
+def test_the_rim_of_a_circle_and_of_a_start_are_dragged(driver: EditorDriver) -> None:
+    driver.click_all((7, 7))
+    driver.drag_at((8, 7), (8.2, 7), (8.5, 7))
+    assert driver.shapes[1] == CircleObstacle((7, 7), 1.5)
+    driver.click_all((1, 8.5))
+    driver.drag_at((1, 9.1), (1, 9.2), (1, 9.4))
+    assert driver.sketch.get_start("corner") == DiscStart((1, 8.5), 0.9)
 
 
-def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
-    hands.select(2)
-    x, y = handle(hands, "turn")
-    hands.press(x, y)
-    hands.move(x + 60, y + 20, held=1)
-    hands.type("90")
-    hands.key("return")
-    hands.release()
+def test_the_knob_turns_and_takes_degrees(driver: EditorDriver) -> None:
+    driver.select(2)
+    x, y = handle(driver, "turn")
+    driver.press(x, y)
+    driver.move(x + 60, y + 20, held=1)
+    driver.type("90")
+    driver.press_key("return")
+    driver.release()
     middle_x, middle_y = 7.0, 2.0
     turned = {
         (round(middle_x - (b - middle_y), 4), round(middle_y + a - middle_x, 4)) for a, b in WALL.points
     }
-    bounds = hands.sketch.get_item(2).geometry.bounds
+    bounds = driver.sketch.get_item(2).geometry.bounds
     assert bounds[2] - bounds[0] == pytest.approx(2.1, abs=1e-3)
-    assert len(turned) == len(hands.shapes[2].points)
+    assert len(turned) == len(driver.shapes[2].points)
 
 
-def test_shift_turns_in_steps(hands: Hands) -> None:
-    hands.select(0)
-    x, y = handle(hands, "turn")
-    hands.hold("shift")
-    cx, cy = hands.pixel((3, 3))
-    hands.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
-    hands.hold()
-    assert hands.shapes[0].vertices != SQUARE.vertices
-    (ax, ay), (bx, by) = hands.shapes[0].vertices[:2]
+def test_shift_turns_in_steps(driver: EditorDriver) -> None:
+    driver.select(0)
+    x, y = handle(driver, "turn")
+    driver.hold_keys("shift")
+    cx, cy = driver.find_pixel((3, 3))
+    driver.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
+    driver.hold_keys()
+    assert driver.shapes[0].vertices != SQUARE.vertices
+    (ax, ay), (bx, by) = driver.shapes[0].vertices[:2]
     import math
 
     angle = math.degrees(math.atan2(by - ay, bx - ax))
     assert angle / 15 == pytest.approx(round(angle / 15), abs=1e-2)
 
 
-def test_corners_and_sides_of_the_box_scale(hands: Hands) -> None:
-    hands.select(0)
-    x, y = handle(hands, "scale", (1, 0))
-    one = hands.pixel((1, 0))[0] - hands.pixel((0, 0))[0]
-    hands.drag((x, y), (x + one / 2, y), (x + one, y))
-    assert hands.shapes[0].vertices == ((2, 2), (5, 2), (5, 4), (2, 4))
-    x, y = handle(hands, "scale", (1, 1))
-    hands.hold("shift")
-    hands.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
-    hands.hold()
-    low_x, low_y, high_x, high_y = hands.sketch.get_item(0).geometry.bounds
+def test_corners_and_sides_of_the_box_scale(driver: EditorDriver) -> None:
+    driver.select(0)
+    x, y = handle(driver, "scale", (1, 0))
+    one = driver.find_pixel((1, 0))[0] - driver.find_pixel((0, 0))[0]
+    driver.drag((x, y), (x + one / 2, y), (x + one, y))
+    assert driver.shapes[0].vertices == ((2, 2), (5, 2), (5, 4), (2, 4))
+    x, y = handle(driver, "scale", (1, 1))
+    driver.hold_keys("shift")
+    driver.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
+    driver.hold_keys()
+    low_x, low_y, high_x, high_y = driver.sketch.get_item(0).geometry.bounds
     assert (low_x, low_y) == (2, 2)
     assert (high_x - low_x) / (high_y - low_y) == pytest.approx(1.5, rel=1e-3)
 
 
-def test_a_circle_stays_a_circle_when_it_is_scaled(hands: Hands) -> None:
-    hands.select(1)
-    x, y = handle(hands, "scale", (1, 0))
-    hands.drag((x, y), (x + 20, y), (x + 40, y + 5))
-    assert isinstance(hands.shapes[1], CircleObstacle) and hands.shapes[1].radius > 1.0
+def test_a_circle_stays_a_circle_when_it_is_scaled(driver: EditorDriver) -> None:
+    driver.select(1)
+    x, y = handle(driver, "scale", (1, 0))
+    driver.drag((x, y), (x + 20, y), (x + 40, y + 5))
+    assert isinstance(driver.shapes[1], CircleObstacle) and driver.shapes[1].radius > 1.0
 
 
-def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(hands: Hands) -> None:
-    hands.select(0)
-    hands.key("right", times=3)
-    hands.key("up")
-    hands.key("shift+left")
-    assert hands.shapes[0].vertices[0] == (1.3, 2.1)
-    hands.key("ctrl+z")
-    assert hands.shapes[0] == SQUARE  # pressed in a row, they are one
+def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.press_key("right", times=3)
+    driver.press_key("up")
+    driver.press_key("shift+left")
+    assert driver.shapes[0].vertices[0] == (1.3, 2.1)
+    driver.press_key("ctrl+z")
+    assert driver.shapes[0] == SQUARE  # pressed in a row, they are one
 
 
 def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
@@ -212,13 +212,13 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
         PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6))),
         PolygonObstacle(((2, 2), (4, 2), (4, 4))),
     )
-    with opened_editor(tmp_path, sheet(lower, upper)) as hands:
-        hands.click_all((3.5, 2.5))
-        assert hands.editor.selection == Selection.of(1)
-        hands.click_all((3.5, 2.5))
-        assert hands.editor.selection == Selection.of(0)
-        hands.click_all((3.5, 2.5))
-        assert hands.editor.selection == Selection.of(1)
+    with open_editor(tmp_path, sheet(lower, upper)) as driver:
+        driver.click_all((3.5, 2.5))
+        assert driver.editor.selection == Selection.of(1)
+        driver.click_all((3.5, 2.5))
+        assert driver.editor.selection == Selection.of(0)
+        driver.click_all((3.5, 2.5))
+        assert driver.editor.selection == Selection.of(1)
 
 
 def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
@@ -226,51 +226,51 @@ def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path
     from robocov_app.editor.tools.drags import MANY_POINTS
 
     ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(MANY_POINTS + 10))
-    with opened_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as hands:
-        wanted = transform.move(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
-        hands.select(0, 1)
-        hands.press(*hands.pixel((3, 3)))
-        hands.go((3.5, 3.2), (4, 3.5), held=1)
-        assert hands.editor.displayed[0] is hands.sketch
-        assert hands.editor.toolbox.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
-        hands.release()
-        assert hands.shapes == [item.shape for item in wanted.obstacles]
+    with open_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as driver:
+        wanted = transform.move(driver.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
+        driver.select(0, 1)
+        driver.press(*driver.find_pixel((3, 3)))
+        driver.move_to((3.5, 3.2), (4, 3.5), held=1)
+        assert driver.editor.displayed[0] is driver.sketch
+        assert driver.editor.toolbox.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
+        driver.release()
+        assert driver.shapes == [item.shape for item in wanted.obstacles]
 
 
-def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
+def test_grips_know_whose_vertices_are_shown(driver: EditorDriver) -> None:
     assert list_vertex_owners(Selection()) == () and list_vertex_owners(Selection.of(0, 1)) == ()
     assert list_vertex_owners(Selection.of(2)) == (2,)
     assert list_vertex_owners(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
-    found = list_handles(hands.sketch, Selection.of(0), 0.01)
+    found = list_handles(driver.sketch, Selection.of(0), 0.01)
     assert sum(each.kind == "vertex" for each in found) == 4
     assert sum(each.kind == "scale" for each in found) == 8
     assert find_handle(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
     assert find_handle(found, (3, 3), 0.2) is None
 
 
-def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
-    selector = hands.editor.toolbox.selector
-    hands.go((9, 5))
-    assert selector.choose_cursor(hands.editor) == "arrow"
-    hands.go((3, 3))
-    assert selector.choose_cursor(hands.editor) == "hand"
-    hands.select(0)
-    hands.go((3, 3.01))
-    assert selector.choose_cursor(hands.editor) == "move"
-    hands.move(*handle(hands, "scale", (1, 1)))
-    assert selector.choose_cursor(hands.editor) == "rising"
+def test_the_cursor_tells_what_a_press_would_do(driver: EditorDriver) -> None:
+    selector = driver.editor.toolbox.selector
+    driver.move_to((9, 5))
+    assert selector.choose_cursor(driver.editor) == "arrow"
+    driver.move_to((3, 3))
+    assert selector.choose_cursor(driver.editor) == "hand"
+    driver.select(0)
+    driver.move_to((3, 3.01))
+    assert selector.choose_cursor(driver.editor) == "move"
+    driver.move(*handle(driver, "scale", (1, 1)))
+    assert selector.choose_cursor(driver.editor) == "rising"
 
 
 def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path: Path) -> None:
     pillar = PolygonObstacle(((5, 5), (5.4, 5), (5.4, 5.4), (5, 5.4)))
     wide = replace(sheet(pillar), boundary=((0, 0), (80, 0), (80, 80), (0, 80)))
-    with opened_editor(tmp_path, wide) as hands:
-        hands.key("f")
-        hands.click_at((5.2, 5.2))
-        assert hands.editor.selection == Selection.of(0)
-        hands.wait()
-        hands.hold("ctrl")
-        hands.drag_at((5.2, 5.2), (15, 15), (25.2, 25.2))
-        (moved,) = hands.shapes
+    with open_editor(tmp_path, wide) as driver:
+        driver.press_key("f")
+        driver.click_at((5.2, 5.2))
+        assert driver.editor.selection == Selection.of(0)
+        driver.wait()
+        driver.hold_keys("ctrl")
+        driver.drag_at((5.2, 5.2), (15, 15), (25.2, 25.2))
+        (moved,) = driver.shapes
         assert moved.polygon.area == pytest.approx(0.16, abs=1e-3)
         assert moved.vertices[0] == pytest.approx((25, 25), abs=0.3)

@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from driven_editor import of_map, sheet
+from driven_editor import load_sketch, sheet
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -139,7 +139,7 @@ def test_a_hole_shows_what_lies_below() -> None:
 
 
 def test_what_the_hull_adds_is_told_apart() -> None:
-    sketch = of_map("l-shape")
+    sketch = load_sketch("l-shape")
     area = compute_hull_excess(sketch)
     assert area is not None and area.area > 1.0
     assert compute_hull_excess(sheet()).is_empty

@@ -3,7 +3,7 @@
 import time
 
 import numpy as np
-from driven_editor import of_map, sheet
+from driven_editor import load_sketch, sheet
 
 from robocov.environment import PolygonObstacle
 from robocov_app.editor.model.sketch import Sketch
@@ -15,7 +15,7 @@ def build_request(sketch: Sketch, robots: int, start: str | None = None, seed: i
 
 
 def test_the_team_has_the_positions_of_a_run() -> None:
-    sketch = of_map("rooms")
+    sketch = load_sketch("rooms")
     name = sketch.starts[0][0]
     team = sample_team(build_request(sketch, 5, name, seed=3))
     expected = sketch.build_environment().start(name).sample(5, seed=3, radius=0.1)
@@ -24,7 +24,7 @@ def test_the_team_has_the_positions_of_a_run() -> None:
 
 
 def test_a_team_that_does_not_fit_has_a_message() -> None:
-    assert "room for about" in sample_team(build_request(of_map("rooms"), 900)).message
+    assert "room for about" in sample_team(build_request(load_sketch("rooms"), 900)).message
     crossed = sheet(PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))))
     team = sample_team(build_request(crossed, 3))
     assert team.positions == ()
@@ -32,7 +32,7 @@ def test_a_team_that_does_not_fit_has_a_message() -> None:
 
 
 def test_only_the_newest_team_is_returned_and_only_once() -> None:
-    sketch = of_map("rooms")
+    sketch = load_sketch("rooms")
     sampler = TeamSampler()
     try:
         for robots in range(1, 5):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_editor import Hands, of_map, opened_editor, sheet
+from driven_editor import EditorDriver, load_sketch, open_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.canvas import layers
@@ -27,73 +27,73 @@ PILLAR = CircleObstacle((7, 7), 1.0)
 
 
 @pytest.fixture
-def hands(tmp_path: Path) -> Iterator[Hands]:
-    with opened_editor(tmp_path, sheet(BOX, PILLAR, starts=(("door", DiscStart((8, 2), 0.8)),))) as driver:
+def driver(tmp_path: Path) -> Iterator[EditorDriver]:
+    with open_editor(tmp_path, sheet(BOX, PILLAR, starts=(("door", DiscStart((8, 2), 0.8)),))) as driver:
         yield driver
 
 
 # the panel
 
 
-def test_every_button_does_what_its_action_does(hands: Hands) -> None:
-    hands.push("tool:wall")
-    assert hands.editor.tool.name == "wall"
-    hands.push("tool:select")
-    hands.select(0)
-    hands.turn("object")
-    hands.push("rotate:left")
-    assert hands.editor.document.history.undo_descriptions
-    hands.push("undo")
-    assert hands.shapes[0] == BOX
-    hands.push("help")
-    assert hands.window.is_help_open
+def test_every_button_does_what_its_action_does(driver: EditorDriver) -> None:
+    driver.push_button("tool:wall")
+    assert driver.editor.tool.name == "wall"
+    driver.push_button("tool:select")
+    driver.select(0)
+    driver.open_tab("object")
+    driver.push_button("rotate:left")
+    assert driver.editor.document.history.undo_descriptions
+    driver.push_button("undo")
+    assert driver.shapes[0] == BOX
+    driver.push_button("help")
+    assert driver.window.is_help_open
 
 
-def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
-    hands.turn("map")
-    hands.write("title", "Our office")
-    hands.key("return")
-    assert hands.sketch.name == "Our office"
-    hands.write("radius", "0.25")
-    hands.key("return")
-    assert hands.editor.radius == 0.25 and hands.editor.measurement.radius == 0.25
-    hands.write("robots", "nine")
-    hands.key("return")
-    assert hands.editor.has_error_message and hands.editor.robots == 6
-    hands.push("more")
-    assert hands.editor.robots == 7
-    hands.tick("show:robots")
-    assert "robots" in hands.editor.shown
+def test_the_map_page_takes_name_radius_and_team(driver: EditorDriver) -> None:
+    driver.open_tab("map")
+    driver.type_into("title", "Our office")
+    driver.press_key("return")
+    assert driver.sketch.name == "Our office"
+    driver.type_into("radius", "0.25")
+    driver.press_key("return")
+    assert driver.editor.radius == 0.25 and driver.editor.measurement.radius == 0.25
+    driver.type_into("robots", "nine")
+    driver.press_key("return")
+    assert driver.editor.has_error_message and driver.editor.robots == 6
+    driver.push_button("more")
+    assert driver.editor.robots == 7
+    driver.toggle_check_box("show:robots")
+    assert "robots" in driver.editor.shown
 
 
 def test_numbers_stand_in_fields_without_needless_zeros() -> None:
     assert [format_number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
 
 
-def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
-    hands.select(0)
-    hands.turn("object")
-    assert hands.widget("entry", "name").text == "box"
-    hands.write("x", "3.5")
-    hands.key("return")
-    hands.write("wide", "120cm")
-    hands.key("return")
-    assert hands.sketch.get_item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
-    hands.write("note", "oak")
-    hands.key("return")
-    assert hands.sketch.get_item(0).note == "oak"
-    hands.select(1)
-    hands.write("size:radius", "0.5")
-    hands.key("return")
-    assert hands.shapes[1].radius == 0.5
-    hands.select("door")
-    hands.write("name", "entrance")
-    hands.key("return")
-    assert hands.editor.start_names == ["entrance"]
+def test_the_object_page_takes_names_places_and_sizes(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.open_tab("object")
+    assert driver.get_widget("entry", "name").text == "box"
+    driver.type_into("x", "3.5")
+    driver.press_key("return")
+    driver.type_into("wide", "120cm")
+    driver.press_key("return")
+    assert driver.sketch.get_item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
+    driver.type_into("note", "oak")
+    driver.press_key("return")
+    assert driver.sketch.get_item(0).note == "oak"
+    driver.select(1)
+    driver.type_into("size:radius", "0.5")
+    driver.press_key("return")
+    assert driver.shapes[1].radius == 0.5
+    driver.select("door")
+    driver.type_into("name", "entrance")
+    driver.press_key("return")
+    assert driver.editor.start_names == ["entrance"]
 
 
-def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
-    hands.turn("object")
+def test_every_kind_of_selection_has_its_page(driver: EditorDriver) -> None:
+    driver.open_tab("object")
     vertex = frozenset({Vertex(0, 0, 1)})
     for selection in (
         Selection(),
@@ -105,202 +105,202 @@ def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
         Selection(vertices=vertex),
         Selection(vertices=vertex | {Vertex(0, 0, 2)}),
     ):
-        hands.editor.select(selection)
-        hands.frames(2, 0.2)
+        driver.editor.select(selection)
+        driver.run_frames(2, 0.2)
 
 
-def test_the_list_of_vertices_selects_and_scrolls(hands: Hands) -> None:
+def test_the_list_of_vertices_selects_and_scrolls(driver: EditorDriver) -> None:
     ring = tuple((5 + np.cos(a), 5 + np.sin(a)) for a in np.arange(0, 6.2, 0.1))
-    hands.editor.apply(add_polygon(hands.sketch, ring))
-    hands.turn("object")
-    hands.click(*hands.widget("option", "vertex:1").rect.center)
-    assert hands.editor.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
-    assert hands.find("option", "vertex:61") is None, "what is out of sight is not laid out"
-    at = hands.widget("option", "vertex:3").rect.center
+    driver.editor.apply(add_polygon(driver.sketch, ring))
+    driver.open_tab("object")
+    driver.click(*driver.get_widget("option", "vertex:1").rect.center)
+    assert driver.editor.selection.vertices == {Vertex(driver.sketch.obstacles[-1].key, 0, 1)}
+    assert driver.find_widget("option", "vertex:61") is None, "what is out of sight is not laid out"
+    at = driver.get_widget("option", "vertex:3").rect.center
     for _ in range(8):
-        hands.wheel(*at, -5)
-    hands.click(*hands.widget("option", "vertex:61").rect.center)
-    (vertex,) = hands.editor.selection.vertices
+        driver.turn_wheel(*at, -5)
+    driver.click(*driver.get_widget("option", "vertex:61").rect.center)
+    (vertex,) = driver.editor.selection.vertices
     assert vertex.index == 61
 
 
-def test_the_snap_page_switches_and_sets(hands: Hands) -> None:
-    hands.turn("snap")
-    hands.tick("snap:grid")
-    assert "grid" not in hands.editor.snaps
-    hands.tick("show:names")
-    assert "names" not in hands.editor.shown
-    hands.write("grid", "0.5")
-    hands.key("return")
-    assert hands.editor.grid == 0.5
+def test_the_snap_page_switches_and_sets(driver: EditorDriver) -> None:
+    driver.open_tab("snap")
+    driver.toggle_check_box("snap:grid")
+    assert "grid" not in driver.editor.snaps
+    driver.toggle_check_box("show:names")
+    assert "names" not in driver.editor.shown
+    driver.type_into("grid", "0.5")
+    driver.press_key("return")
+    assert driver.editor.grid == 0.5
 
 
-def test_pages_are_turned_by_keys(hands: Hands) -> None:
+def test_pages_are_turned_by_keys(driver: EditorDriver) -> None:
     seen = []
     for _ in EditorPanel.tabs:
-        hands.key("ctrl+tab")
-        seen.append(hands.window.panel.tab)
+        driver.press_key("ctrl+tab")
+        seen.append(driver.window.panel.tab)
     assert sorted(seen) == sorted(EditorPanel.tabs)
-    hands.key("h")
-    assert hands.window.layout.panel[2] == 0
-    hands.key("f2")  # the field of the map's name brings the panel back
-    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.edit
-    hands.type("New name")
-    hands.key("return")
-    assert hands.sketch.name == "New name"
+    driver.press_key("h")
+    assert driver.window.layout.panel[2] == 0
+    driver.press_key("f2")  # the field of the map's name brings the panel back
+    assert driver.window.layout.panel[2] > 0 and driver.window.panel.ui.edit
+    driver.type("New name")
+    driver.press_key("return")
+    assert driver.sketch.name == "New name"
 
 
-def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(hands: Hands) -> None:
-    hands.key("w")
-    hands.go((5.0, 5.0))
-    hands.wait()
-    assert hands.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
-    hands.move(hands.window.layout.panel[0] + 20, 200)
-    hands.wait()
-    assert hands.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
+def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(driver: EditorDriver) -> None:
+    driver.press_key("w")
+    driver.move_to((5.0, 5.0))
+    driver.wait()
+    assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
+    driver.move(driver.window.layout.panel[0] + 20, 200)
+    driver.wait()
+    assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 
 
-def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
-    hands.turn("map")
-    hands.write("title", "wall")
-    assert hands.editor.tool.name == "select" and hands.window.panel.ui.edit
-    hands.key("escape")
-    assert not hands.window.panel.ui.edit and hands.sketch.name == "Untitled"
+def test_keys_go_into_fields_and_not_to_actions_while_typing(driver: EditorDriver) -> None:
+    driver.open_tab("map")
+    driver.type_into("title", "wall")
+    assert driver.editor.tool.name == "select" and driver.window.panel.ui.edit
+    driver.press_key("escape")
+    assert not driver.window.panel.ui.edit and driver.sketch.name == "Untitled"
 
 
-def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:
-    hands.editor.apply(add_circle(hands.sketch, (5, 5), 0.2))
-    drawn = hands.sketch
-    hands.turn("map")
-    hands.write("title", "ab")
-    hands.key("left")
-    hands.type("c")
+def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(driver: EditorDriver) -> None:
+    driver.editor.apply(add_circle(driver.sketch, (5, 5), 0.2))
+    drawn = driver.sketch
+    driver.open_tab("map")
+    driver.type_into("title", "ab")
+    driver.press_key("left")
+    driver.type("c")
     texts = []
     for key in ("", "ctrl+z", "ctrl+z", "ctrl+z", "ctrl+y", "ctrl+y"):
         if key:
-            hands.key(key)
-        texts.append(hands.widget("entry", "title").text)
-    assert texts == ["acb", "ab", "Untitled", "Untitled", "ab", "acb"] and hands.sketch is drawn
+            driver.press_key(key)
+        texts.append(driver.get_widget("entry", "title").text)
+    assert texts == ["acb", "ab", "Untitled", "Untitled", "ab", "acb"] and driver.sketch is drawn
 
 
-def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
+def test_the_list_of_what_was_done_leads_back_and_forth(driver: EditorDriver) -> None:
     for radius in (0.2, 0.3, 0.4):
-        hands.editor.apply(add_circle(hands.sketch, (5, 5), radius))
-    hands.turn("history")
+        driver.editor.apply(add_circle(driver.sketch, (5, 5), radius))
+    driver.open_tab("history")
 
     def lines() -> list[tuple[str, bool]]:
-        hands.frames(1)
-        shown = hands.window.panel.ui.widgets.values()
+        driver.run_frames(1)
+        shown = driver.window.panel.ui.widgets.values()
         return [(each.text, bool(each.value)) for each in shown if each.key.startswith("step:")]
 
     def click(row: int) -> None:
-        hands.wait()
-        hands.click(*hands.widget("option", f"step:{row}").rect.center)
+        driver.wait()
+        driver.click(*driver.get_widget("option", f"step:{row}").rect.center)
 
     assert [chosen for _, chosen in lines()] == [True, False, False, False]
     click(2)
-    assert len(hands.shapes) == 3
+    assert len(driver.shapes) == 3
     assert [chosen for _, chosen in lines()] == [False, False, True, False]
     click(3)
-    assert len(hands.shapes) == 2
+    assert len(driver.shapes) == 2
     click(0)
-    assert len(hands.shapes) == 5
+    assert len(driver.shapes) == 5
 
 
 # the mouse
 
 
-def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
-    at = hands.pixel((5, 5))
-    zoom = hands.window.canvas.camera.zoom
-    hands.wheel(*at, 3)
-    assert hands.window.canvas.camera.zoom > zoom * 1.3
-    assert hands.pixel((5, 5)) == pytest.approx(at, abs=1)
-    center = hands.window.canvas.camera.center
-    hands.drag((300, 300), (330, 310), (360, 320), button=3)
-    moved = hands.window.canvas.camera.center
-    assert moved[0] < center[0] and hands.editor.dialogs.current is None
-    hands.key("f")
-    assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
+def test_wheel_and_right_button_zoom_and_pan(driver: EditorDriver) -> None:
+    at = driver.find_pixel((5, 5))
+    zoom = driver.window.canvas.camera.zoom
+    driver.turn_wheel(*at, 3)
+    assert driver.window.canvas.camera.zoom > zoom * 1.3
+    assert driver.find_pixel((5, 5)) == pytest.approx(at, abs=1)
+    center = driver.window.canvas.camera.center
+    driver.drag((300, 300), (330, 310), (360, 320), button=3)
+    moved = driver.window.canvas.camera.center
+    assert moved[0] < center[0] and driver.editor.dialogs.current is None
+    driver.press_key("f")
+    assert driver.window.canvas.camera.zoom == pytest.approx(zoom)
 
 
-def test_space_and_the_pan_tool_move_the_sheet(hands: Hands) -> None:
-    center = hands.window.canvas.camera.center
-    hands.key("g")
-    hands.drag((300, 300), (330, 310), (360, 320))
-    assert hands.window.canvas.camera.center != center
-    hands.key("v")
-    before, center = hands.sketch, hands.window.canvas.camera.center
-    hands.post(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
-    hands.settle()
-    hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
-    hands.post(pygame.KEYUP, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
-    hands.settle()
-    assert hands.sketch is before and hands.window.canvas.camera.center != center
-    hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
-    assert hands.sketch is not before
+def test_space_and_the_pan_tool_move_the_sheet(driver: EditorDriver) -> None:
+    center = driver.window.canvas.camera.center
+    driver.press_key("g")
+    driver.drag((300, 300), (330, 310), (360, 320))
+    assert driver.window.canvas.camera.center != center
+    driver.press_key("v")
+    before, center = driver.sketch, driver.window.canvas.camera.center
+    driver.post(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
+    driver.settle()
+    driver.drag_at((3, 3), (3.5, 3.5), (4, 4))
+    driver.post(pygame.KEYUP, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
+    driver.settle()
+    assert driver.sketch is before and driver.window.canvas.camera.center != center
+    driver.drag_at((3, 3), (3.5, 3.5), (4, 4))
+    assert driver.sketch is not before
 
 
-def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
+def test_the_map_cannot_be_lost_from_sight(driver: EditorDriver) -> None:
     for _ in range(80):
-        hands.key("ctrl+left")
-        hands.wheel(300, 300, -5)
-    low_x, low_y, high_x, high_y = hands.window.canvas.camera.compute_visible_bounds()
+        driver.press_key("ctrl+left")
+        driver.turn_wheel(300, 300, -5)
+    low_x, low_y, high_x, high_y = driver.window.canvas.camera.compute_visible_bounds()
     assert low_x < 10 and high_x > 0 and low_y < 10 and high_y > 0
-    hands.key("f")
-    hands.select(1)
-    hands.key("z")
-    low_x, _, high_x, _ = hands.window.canvas.camera.compute_visible_bounds()
+    driver.press_key("f")
+    driver.select(1)
+    driver.press_key("z")
+    low_x, _, high_x, _ = driver.window.canvas.camera.compute_visible_bounds()
     assert high_x - low_x < 5
 
 
-def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
-    hands.click_at((3, 3), button=3)
-    menu = hands.editor.dialogs.current
-    assert isinstance(menu, Menu) and hands.editor.selection == Selection.of(0)
-    hands.window.draw()
+def test_the_menu_offers_what_applies_and_does_it(driver: EditorDriver) -> None:
+    driver.click_at((3, 3), button=3)
+    menu = driver.editor.dialogs.current
+    assert isinstance(menu, Menu) and driver.editor.selection == Selection.of(0)
+    driver.window.draw()
     names = [action.name if action else "" for action in menu.rows]
     row = names.index("duplicate")
-    hands.key("down", times=sum(1 for name in names[: row + 1] if name))
-    hands.key("return")
-    assert len(hands.shapes) == 3 and hands.editor.dialogs.current is None
-    hands.click_at((9.5, 5), button=3)
-    hands.window.draw()
-    assert not hands.editor.selection
-    assert "paste" in [action.name for action in hands.editor.dialogs.current.rows if action]
-    hands.click(*hands.window.dialogs.ui.widgets["option:select:all"].rect.center)
-    assert hands.editor.dialogs.current is None and hands.editor.selection
-    hands.click_at((3, 3), button=3)
-    hands.key("escape")
-    assert hands.editor.dialogs.current is None
-    hands.click_at((3, 3), button=3)
-    hands.post(pygame.DROPFILE, file="nowhere.txt")
-    hands.settle()
-    assert hands.editor.dialogs.current is None and "nowhere.txt" in hands.said
+    driver.press_key("down", times=sum(1 for name in names[: row + 1] if name))
+    driver.press_key("return")
+    assert len(driver.shapes) == 3 and driver.editor.dialogs.current is None
+    driver.click_at((9.5, 5), button=3)
+    driver.window.draw()
+    assert not driver.editor.selection
+    assert "paste" in [action.name for action in driver.editor.dialogs.current.rows if action]
+    driver.click(*driver.window.dialogs.ui.widgets["option:select:all"].rect.center)
+    assert driver.editor.dialogs.current is None and driver.editor.selection
+    driver.click_at((3, 3), button=3)
+    driver.press_key("escape")
+    assert driver.editor.dialogs.current is None
+    driver.click_at((3, 3), button=3)
+    driver.post(pygame.DROPFILE, file="nowhere.txt")
+    driver.settle()
+    assert driver.editor.dialogs.current is None and "nowhere.txt" in driver.message
 
 
-def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
-    hands.key("p")
-    hands.click_all((5, 1), (6, 1), (6, 2))
-    hands.click_at((6, 2), button=3)
-    assert len(hands.shapes) == 3 and hands.editor.dialogs.current is None
+def test_a_right_click_ends_what_is_being_drawn(driver: EditorDriver) -> None:
+    driver.press_key("p")
+    driver.click_all((5, 1), (6, 1), (6, 2))
+    driver.click_at((6, 2), button=3)
+    assert len(driver.shapes) == 3 and driver.editor.dialogs.current is None
 
 
 # palette, help, look
 
 
-def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
-    hands.select(0)
-    hands.key("ctrl+k")
-    hands.type("mirror left")
-    hands.key("return")
-    assert hands.editor.document.history.undo_descriptions
-    hands.command("rotate 90")
-    assert "turned" in hands.said or "rotated" in hands.said
-    hands.key("/")
-    assert isinstance(hands.editor.dialogs.current, Choice) and hands.editor.dialogs.current.text == ""
-    hands.key("escape")
-    assert hands.editor.dialogs.current is None
+def test_the_palette_does_actions_and_commands(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.press_key("ctrl+k")
+    driver.type("mirror left")
+    driver.press_key("return")
+    assert driver.editor.document.history.undo_descriptions
+    driver.run_command("rotate 90")
+    assert "turned" in driver.message or "rotated" in driver.message
+    driver.press_key("/")
+    assert isinstance(driver.editor.dialogs.current, Choice) and driver.editor.dialogs.current.text == ""
+    driver.press_key("escape")
+    assert driver.editor.dialogs.current is None
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
@@ -312,48 +312,48 @@ def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatc
         words.add(text)
         return real(text, *rest)
 
-    with opened_editor(tmp_path, size=size, scale=scale) as hands:
+    with open_editor(tmp_path, size=size, scale=scale) as driver:
         monkeypatch.setattr(help_page, "render_text", label)
-        hands.key("f1")
-    for action in hands.window.commands.commands:
+        driver.press_key("f1")
+    for action in driver.window.commands.commands:
         if action.keys and not action.hidden:
             title = action.title.partition(":")[0]
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
 
 
-def test_light_dark_and_every_size(hands: Hands) -> None:
-    hands.key("t")
-    assert hands.picture().mean() < 90
+def test_light_dark_and_every_size(driver: EditorDriver) -> None:
+    driver.press_key("t")
+    assert driver.copy_frame().mean() < 90
     for size in (MIN_SIZE_PX, (640, 480), (1600, 500), (700, 1200)):
         pygame.display.set_mode(size, pygame.RESIZABLE)
-        hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
-        hands.settle()
-        hands.frames(2)
-        assert hands.window.layout.size == size
-        hands.key("f")
+        driver.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+        driver.settle()
+        driver.run_frames(2)
+        assert driver.window.layout.size == size
+        driver.press_key("f")
         for tab in EditorPanel.tabs:
-            hands.window.panel.show_tab(tab)
-            hands.frames(1, 0.2)
+            driver.window.panel.show_tab(tab)
+            driver.run_frames(1, 0.2)
 
 
-def test_a_screenshot_is_saved(hands: Hands, tmp_path: Path) -> None:
-    hands.key("f12")
+def test_a_screenshot_is_saved(driver: EditorDriver, tmp_path: Path) -> None:
+    driver.press_key("f12")
     assert (tmp_path / "robocov-1.png").exists()
 
 
-def test_the_status_line_says_where_what_and_how(hands: Hands) -> None:
-    hands.go((3, 3))
-    hands.select(0)
-    said = list_status(hands.editor, 60.0, None)
+def test_the_status_line_says_where_what_and_how(driver: EditorDriver) -> None:
+    driver.move_to((3, 3))
+    driver.select(0)
+    said = list_status(driver.editor, 60.0, None)
     assert said[0].startswith("(3.0") and any("box" in each for each in said) and "60 fps" in said
-    hands.key("w")
-    assert any(each.startswith("Wall: click its points") for each in list_status(hands.editor, 60.0, None))
+    driver.press_key("w")
+    assert any(each.startswith("Wall: click its points") for each in list_status(driver.editor, 60.0, None))
 
 
-def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
-    hands.select(0)
-    hands.key("right")
-    hands.frames(1)
+def test_the_title_of_the_window_tells_what_is_unsaved(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.press_key("right")
+    driver.run_frames(1)
     assert pygame.display.get_caption()[0] == "● Untitled · robocov edit"
 
 
@@ -374,19 +374,19 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
         rings.append(np.round(points + (k % 32 + 0.5, k // 32 + 0.5), 4))
     shapes = [PolygonObstacle(tuple(map(tuple, ring.tolist()))) for ring in rings]
     sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).with_obstacles(shapes)[0]
-    with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
-        window, sheet = hands.window, hands.window.canvas.sheet
-        hands.editor.snapper.waits_for_targets = False
+    with open_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as driver:
+        window, sheet = driver.window, driver.window.canvas.sheet
+        driver.editor.snapper.waits_for_targets = False
         spot = sketch.obstacles[500].geometry.representative_point()
-        x, y = hands.pixel((spot.x, spot.y))
-        hands.press(x, y)
+        x, y = driver.find_pixel((spot.x, spot.y))
+        driver.press(x, y)
         paint, boxes = sheet._paint, []
         sheet._paint = lambda *what: (boxes.append(what[-1]), paint(*what))  # type: ignore[method-assign]
         for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
-            hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
+            driver.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
             window.run_frame(1 / 60)
-        assert hands.editor.displayed[0] is not hands.sketch
+        assert driver.editor.displayed[0] is not driver.sketch
         whole = window.canvas.camera.view[2] * window.canvas.camera.view[3]
         assert boxes and all(box.width * box.height < whole / 10 for box in boxes)
 
@@ -402,26 +402,26 @@ class NoReadings:
 
 
 def test_a_double_click_that_drags_still_drags(tmp_path: Path) -> None:
-    with opened_editor(tmp_path, of_map("square")) as hands:
-        hands.key("r")
-        hands.drag_at((2, 2), (3, 3), (6, 6))
-        hands.key("v")
-        hands.wait()
-        hands.click_at((4, 4))
-        hands.drag_at((4, 4), (4.5, 4.5), (5, 4))  # at once
-        assert hands.sketch.obstacles[0].geometry.bounds == (3.0, 2.0, 7.0, 6.0)
+    with open_editor(tmp_path, load_sketch("square")) as driver:
+        driver.press_key("r")
+        driver.drag_at((2, 2), (3, 3), (6, 6))
+        driver.press_key("v")
+        driver.wait()
+        driver.click_at((4, 4))
+        driver.drag_at((4, 4), (4.5, 4.5), (5, 4))  # at once
+        assert driver.sketch.obstacles[0].geometry.bounds == (3.0, 2.0, 7.0, 6.0)
 
 
-def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
-    hands.select(0)
-    hands.key("ctrl+h")
-    hands.key("ctrl+tab")
-    hands.editor.select(Selection())
-    hands.frames(2)
-    lines = [each for each in hands.window.panel.ui.widgets.values() if each.key.startswith("object:")]
-    assert lines[-1].text == "boundary" and len(lines) == len(hands.shapes) + 1 + len(hands.sketch.starts)
-    hands.click(*hands.widget("option", "object:0").rect.center)
-    assert hands.editor.selection.items == {0}
+def test_all_things_are_listed_also_those_that_are_hidden(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.press_key("ctrl+h")
+    driver.press_key("ctrl+tab")
+    driver.editor.select(Selection())
+    driver.run_frames(2)
+    lines = [each for each in driver.window.panel.ui.widgets.values() if each.key.startswith("object:")]
+    assert lines[-1].text == "boundary" and len(lines) == len(driver.shapes) + 1 + len(driver.sketch.starts)
+    driver.click(*driver.get_widget("option", "object:0").rect.center)
+    assert driver.editor.selection.items == {0}
 
 
 @pytest.mark.slow
@@ -430,45 +430,45 @@ def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path
     pictures = []
     for many in (200, 10_000):
         monkeypatch.setattr(layers, "MANY_OBJECTS", many)
-        with opened_editor(tmp_path, sheet(*shapes)) as hands:
-            hands.key("ctrl+a")
-            hands.frames(2)
-            pictures.append(pygame.surfarray.array3d(hands.window.screen).astype(int))
+        with open_editor(tmp_path, sheet(*shapes)) as driver:
+            driver.press_key("ctrl+a")
+            driver.run_frames(2)
+            pictures.append(pygame.surfarray.array3d(driver.window.screen).astype(int))
     assert np.abs(pictures[0] - pictures[1]).max() < 8
 
 
 def test_a_window_that_nobody_touches_is_not_drawn_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with opened_editor(tmp_path) as hands:
-        hands.move(300, 300)
-        hands.frames(3)
-        hands.editor.message = ""
-        hands.frames(60)
+    with open_editor(tmp_path) as driver:
+        driver.move(300, 300)
+        driver.run_frames(3)
+        driver.editor.message = ""
+        driver.run_frames(60)
         drawn: list[int] = []
         monkeypatch.setattr(pygame.display, "flip", lambda: drawn.append(1))
-        hands.frames(30)
+        driver.run_frames(30)
         assert not drawn
-        hands.move(310, 300)
+        driver.move(310, 300)
         assert drawn
-        hands.editor.show_message("something new")
+        driver.editor.show_message("something new")
         drawn.clear()
-        hands.frames(1)
+        driver.run_frames(1)
         assert drawn
-        hands.key("ctrl+k")  # what is asked does not move by itself
-        hands.frames(320)
+        driver.press_key("ctrl+k")  # what is asked does not move by itself
+        driver.run_frames(320)
         drawn.clear()
-        hands.frames(20)
-        assert hands.window.dialogs.is_open and not drawn
+        driver.run_frames(20)
+        assert driver.window.dialogs.is_open and not drawn
 
 
 def test_a_map_that_is_fitted_stays_so_in_a_window_of_another_size(tmp_path: Path) -> None:
-    with opened_editor(tmp_path) as hands:
-        shown, zooms = hands.window.canvas, [hands.window.canvas.camera.zoom]
+    with open_editor(tmp_path) as driver:
+        shown, zooms = driver.window.canvas, [driver.window.canvas.camera.zoom]
         for size in ((1700, 1300), (900, 600)):
             pygame.display.set_mode(size, pygame.RESIZABLE)
-            hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
-            hands.frames(2)
+            driver.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+            driver.run_frames(2)
             zooms.append(shown.camera.zoom)
             shown.zoom(0.5)  # and not fitted any more
         assert zooms[1] > 1.2 * zooms[0]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driven_editor import opened_editor
+from driven_editor import open_editor
 from driven_window import open_viewer
 from sample_sessions import start_session
 
@@ -190,9 +190,9 @@ def test_a_field_limits_the_length_of_its_text() -> None:
 
 
 def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
-        window = hands.window
-        editor = hands.editor
+    with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:
+        window = driver.window
+        editor = driver.editor
         window.contains_faults = True
         editor.apply(add_circle(editor.sketch, (2.0, 2.0), 0.5))
         before = editor.sketch
@@ -203,32 +203,32 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
 
         monkeypatch.setattr(window, "try_it", half_way)
         monkeypatch.setattr(window, "do", lambda name: half_way())
-        hands.key("f5")
+        driver.press_key("f5")
         assert editor.sketch == before
         assert "Internal error" in editor.message
         assert editor.has_error_message
         monkeypatch.undo()
-        hands.key("ctrl+z")
+        driver.press_key("ctrl+z")
         assert editor.sketch.obstacles == ()
-        hands.key("ctrl+y")
+        driver.press_key("ctrl+y")
         assert editor.sketch == before
 
 
 def test_a_dialog_that_cannot_be_drawn_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with opened_editor(tmp_path) as hands:
-        hands.window.contains_faults = True
-        hands.key("ctrl+k")
-        palette = hands.editor.dialogs.current
+    with open_editor(tmp_path) as driver:
+        driver.window.contains_faults = True
+        driver.press_key("ctrl+k")
+        palette = driver.editor.dialogs.current
         assert palette is not None
 
         def fail(ui: object) -> None:
             raise IndexError("page")
 
         monkeypatch.setattr(palette, "show_content", fail)
-        hands.window.run_frame(0.1)
-        hands.window.run_frame(0.1)
-        assert hands.editor.dialogs.current is None
-        assert "IndexError" in hands.editor.message
+        driver.window.run_frame(0.1)
+        driver.window.run_frame(0.1)
+        assert driver.editor.dialogs.current is None
+        assert "IndexError" in driver.editor.message
 
 
 def test_an_edit_of_a_session_that_raises_is_reverted(
@@ -250,7 +250,7 @@ def test_an_edit_of_a_session_that_raises_is_reverted(
 
         monkeypatch.setattr(session.timeline.history, "amend", fail)
         driver.viewer.inspection.selected = 1
-        driver.key("delete")
+        driver.press_key("delete")
         assert "ZeroDivisionError" in driver.viewer.message
         monkeypatch.setattr(session.timeline.history, "amend", amend)
         assert session.displayed.numbers == (1, 3)
@@ -291,20 +291,20 @@ def test_a_step_that_raises_is_reverted_and_pauses_the_session(
 
         monkeypatch.setattr(pane, "step", fail)
         session.playback.is_playing = True
-        driver.frames(3, 0.1)
+        driver.run_frames(3, 0.1)
         assert not session.playback.is_playing
         assert "ZeroDivisionError" in driver.viewer.message
         assert session.timeline.panes[0].time == pytest.approx(session.timeline.end_time)
         assert (session.timeline.panes[0].simulation.positions == positions).all()
         session.playback.is_playing = True
-        driver.frames(3, 0.1)
+        driver.run_frames(3, 0.1)
         assert session.timeline.end_time > 20 * session.timeline.scenario.dt
 
 
 def test_a_message_with_control_characters_is_drawn(tmp_path: Path) -> None:
-    with opened_editor(tmp_path) as hands:
-        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
-        (item,) = hands.sketch.obstacles
+    with open_editor(tmp_path) as driver:
+        driver.editor.apply(add_circle(driver.sketch, (5.0, 5.0), 1.0))
+        (item,) = driver.sketch.obstacles
         assert isinstance(item.shape, CircleObstacle)
-        hands.editor.show_message("a\x00b\udcff", is_error=True)
-        hands.window.run_frame(0.1)
+        driver.editor.show_message("a\x00b\udcff", is_error=True)
+        driver.window.run_frame(0.1)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driven_editor import opened_editor, sheet
+from driven_editor import open_editor, sheet
 from driven_window import open_viewer, resize_window
 
 from robocov.environment import CircleObstacle
@@ -35,19 +35,19 @@ def test_a_tiny_window_shows_a_part_of_a_larger_surface(size: tuple[int, int], t
     with open_viewer(tmp_path) as driver:
         resize_window(driver, size)
         assert pygame.display.get_surface().get_size() == size
-        driver.key("ctrl+k")
-        driver.key("escape")
-        driver.key("f1")
+        driver.press_key("ctrl+k")
+        driver.press_key("escape")
+        driver.press_key("f1")
         resize_window(driver, (900, 600))
         assert driver.window.screen is pygame.display.get_surface()
-    with opened_editor(tmp_path) as hands:
-        resize_window(hands, size)
-        hands.key("ctrl+k")
-        hands.key("escape")
-        hands.key("f5")
-        hands.key("f5")
-        resize_window(hands, (900, 600))
-        assert hands.window.screen is pygame.display.get_surface()
+    with open_editor(tmp_path) as driver:
+        resize_window(driver, size)
+        driver.press_key("ctrl+k")
+        driver.press_key("escape")
+        driver.press_key("f5")
+        driver.press_key("f5")
+        resize_window(driver, (900, 600))
+        assert driver.window.screen is pygame.display.get_surface()
 
 
 @posix_only
@@ -63,11 +63,11 @@ def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path)
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
             assert expected in driver.viewer.message
-    with opened_editor(tmp_path) as hands:
+    with open_editor(tmp_path) as driver:
         for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
-            hands.post(pygame.DROPFILE, file=str(path))
-            hands.settle()
-            assert expected in hands.said
+            driver.post(pygame.DROPFILE, file=str(path))
+            driver.settle()
+            assert expected in driver.message
 
 
 @posix_only
@@ -75,26 +75,26 @@ def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path)
 def test_a_background_that_is_a_pipe_does_not_block_the_window(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "plan.png")
     sketch = sheet(background=Background("plan.png", (10, 10)))
-    with opened_editor(tmp_path, sketch) as hands:
-        hands.editor.shown.add("picture")
-        hands.window.run_frame(0.1)
-        assert "got a pipe or a device" in hands.said
+    with open_editor(tmp_path, sketch) as driver:
+        driver.editor.shown.add("picture")
+        driver.window.run_frame(0.1)
+        assert "got a pipe or a device" in driver.message
 
 
 def test_a_draft_with_a_huge_circle_is_drawn(tmp_path: Path) -> None:
     sketch = sheet(CircleObstacle((5.0, 5.0), 1e308), CircleObstacle((1e308, -1e308), 0.5))
-    with opened_editor(tmp_path, sketch) as hands:
-        hands.select(*(item.key for item in sketch.obstacles))
-        assert hands.editor.selection == Selection.of(0, 1)
-        hands.window.run_frame(0.1)
+    with open_editor(tmp_path, sketch) as driver:
+        driver.select(*(item.key for item in sketch.obstacles))
+        assert driver.editor.selection == Selection.of(0, 1)
+        driver.window.run_frame(0.1)
 
 
 def test_an_open_list_with_outdated_names_chooses_nothing(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        driver.click(*driver.widget("menu", "map").rect.center)
+        driver.click(*driver.get_widget("menu", "map").rect.center)
         assert driver.window.panel.ui.open_list is not None
         driver.viewer.files.open_map("square")
-        driver.key("return")
+        driver.press_key("return")
         assert driver.viewer.files.map_name == "square"
 
 
@@ -102,9 +102,9 @@ def test_an_open_list_with_outdated_names_chooses_nothing(tmp_path: Path) -> Non
 def test_a_map_whose_file_name_is_not_text_has_drafts(tmp_path: Path) -> None:
     path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.json"))
     document = Document.new(tmp_path / "drafts", path)
-    with opened_editor(tmp_path, document=document) as hands:
-        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
-        hands.window.run_frame(0.1)
+    with open_editor(tmp_path, document=document) as driver:
+        driver.editor.apply(add_circle(driver.sketch, (5.0, 5.0), 1.0))
+        driver.window.run_frame(0.1)
         assert document.flush()
     (draft,) = find_recoverable(tmp_path / "drafts")
     assert draft.path == path

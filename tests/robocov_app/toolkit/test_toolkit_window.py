@@ -109,16 +109,16 @@ def test_a_paused_window_is_drawn_only_after_changes(tmp_path: Path) -> None:
         drawn: list[bool] = []
         draw = window.draw
         window.draw = lambda: (drawn.append(True), draw())  # type: ignore[method-assign, func-returns-value]
-        driver.frames(120)
+        driver.run_frames(120)
         drawn.clear()
-        driver.frames(20)
+        driver.run_frames(20)
         assert window.is_resting
         assert not drawn
         viewer.show_message("something")
-        driver.frames(5)
+        driver.run_frames(5)
         assert len(drawn) == 1
         driver.session.playback.is_playing = True
-        driver.frames(5)
+        driver.run_frames(5)
         assert len(drawn) == 6
         assert not window.is_resting
         driver.session.timeline.is_settled = True  # time goes on, and nothing moves

@@ -364,6 +364,6 @@ def test_a_command_typed_within_one_frame_runs(tmp_path: Path) -> None:
             if letter.isprintable():
                 pygame.event.post(pygame.event.Event(pygame.TEXTINPUT, text=letter))
             pygame.event.post(pygame.event.Event(pygame.KEYUP, attributes))
-        driver.frames(2)
+        driver.run_frames(2)
         assert not driver.window.dialogs.is_open
         assert driver.viewer.session.displayed.numbers == (1,)

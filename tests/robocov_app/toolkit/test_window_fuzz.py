@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_editor import Hands, opened_editor
+from driven_editor import EditorDriver, open_editor
 from driven_window import Driver, open_viewer
 from random_events import RandomEvents
 
@@ -43,19 +43,19 @@ def assert_no_fault(log: FaultLog) -> None:
 
 
 def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
-    with opened_editor(folder, drafts=folder / "drafts") as hands:
-        log = contain_faults(hands.window, folder)
-        fuzz = RandomEvents(hands.window, folder / "odd", seed)
+    with open_editor(folder, drafts=folder / "drafts") as driver:
+        log = contain_faults(driver.window, folder)
+        fuzz = RandomEvents(driver.window, folder / "odd", seed)
 
         def stay_open() -> None:
-            hands.window.documents.may_close = False
+            driver.window.documents.may_close = False
 
         fuzz.play(events, stay_open)
-        leave_everything(hands)
-        history: UndoHistory = hands.editor.document.history
+        leave_everything(driver)
+        history: UndoHistory = driver.editor.document.history
         before = history.sketch
-        hands.editor.apply(add_circle(history.sketch, (1.0, 1.0), 0.25))
-        hands.key("ctrl+z")
+        driver.editor.apply(add_circle(history.sketch, (1.0, 1.0), 0.25))
+        driver.press_key("ctrl+z")
         assert history.sketch == before
     return log
 
@@ -90,12 +90,12 @@ def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
         leave_everything(driver)
         for pane in driver.session.timeline.panes:
             assert np.isfinite(pane.simulation.positions).all()
-        driver.key("ctrl+k")
+        driver.press_key("ctrl+k")
         assert driver.window.dialogs.is_open
     return log
 
 
-def leave_everything(driver: Driver | Hands) -> None:
+def leave_everything(driver: Driver | EditorDriver) -> None:
     """Release all buttons, cancel all actions, and restore the usual size of the window."""
     pygame.event.clear()
     pygame.key.set_mods(0)
@@ -106,7 +106,7 @@ def leave_everything(driver: Driver | Hands) -> None:
     driver.post(pygame.WINDOWFOCUSLOST)
     driver.window.set_appearance(1.0, "light", panel=True)
     for _ in range(8):
-        driver.key("escape")
+        driver.press_key("escape")
         driver.window.closed = False
 
 

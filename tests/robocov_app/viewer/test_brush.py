@@ -217,30 +217,30 @@ def test_nothing_is_painted_before_a_press():
 def test_the_brush_is_used_in_the_window(tmp_path):
     with open_viewer(tmp_path, RAPF, LLOYD) as driver:
         session = driver.session
-        plain = driver.picture()
-        driver.key("g")
+        plain = driver.copy_frame()
+        driver.press_key("g")
         brush = driver.viewer.tool
-        driver.wheel(*driver.pixel((3.0, 2.0)), 2)
+        driver.turn_wheel(*driver.find_pixel((3.0, 2.0)), 2)
         radius = brush.radius
-        driver.key("[")
+        driver.press_key("[")
         assert brush.radius < radius
         assert "radius" in driver.viewer.message
-        driver.drag(*(driver.pixel((1.0 + 0.3 * k, 3.0)) for k in range(5)))
+        driver.drag(*(driver.find_pixel((1.0 + 0.3 * k, 3.0)) for k in range(5)))
         assert driver.viewer.message == "density raised"
         assert get_density(session, (1.6, 3.0)) > 1.1
-        driver.drag(*(driver.pixel((4.5 + 0.2 * k, 3.2)) for k in range(4)), button=3)
+        driver.drag(*(driver.find_pixel((4.5 + 0.2 * k, 3.2)) for k in range(4)), button=3)
         assert driver.viewer.message == "density lowered"
         assert get_density(session, (4.8, 3.2)) < 0.9
-        assert not driver.same(plain)
+        assert not driver.shows_frame(plain)
         environments = {pane.setup.environment for pane in session.timeline.panes}
         assert environments == {session.displayed.environment}
-        driver.key("ctrl+shift+s")
+        driver.press_key("ctrl+shift+s")
         assert load_map(driver.viewer.files.map_name) == session.displayed.environment
-        driver.key("ctrl+z", 2)
+        driver.press_key("ctrl+z", 2)
         assert session.displayed.environment.density is None
         assert "φ" not in driver.window.canvas._scenes[0].cost
-        driver.key("ctrl+y")
-        driver.frames(3)
+        driver.press_key("ctrl+y")
+        driver.run_frames(3)
         assert "mean distance by φ" in driver.window.canvas._scenes[0].cost
 
 

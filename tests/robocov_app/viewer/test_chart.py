@@ -25,9 +25,9 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
 
 def play(driver: Driver, frames: int = 60) -> None:
     driver.session.playback.is_playing = True
-    driver.frames(frames)
+    driver.run_frames(frames)
     driver.session.playback.is_playing = False
-    driver.frames(8)
+    driver.run_frames(8)
 
 
 @pytest.mark.parametrize("width", [480, 900])
@@ -47,7 +47,7 @@ def test_times_do_not_overlap_in_a_narrow_chart(
     with open_viewer(tmp_path, size=(width, 1200), scale=3.0) as driver:
         ends.clear()
         driver.window.chart._page = None
-        driver.frames(1)
+        driver.run_frames(1)
     assert ends
     assert all(left[1] <= right[0] for left, right in pairwise(ends))
 
@@ -88,7 +88,7 @@ def test_an_event_is_drawn_at_its_time(driver: Driver) -> None:
     window = driver.window
     before = copy_pixels(window.screen).copy()
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
-    driver.frames(8)
+    driver.run_frames(8)
     after = copy_pixels(window.screen)
     column = round(window.chart.to_column(driver.session.timeline.end_time))
     _, top, _, height = window.layout.chart
@@ -118,7 +118,7 @@ def test_values_of_the_past_are_shown_at_once(driver: Driver) -> None:
     driver.session.show_time(1.0)
     assert driver.session.displayed.time == 1.0
     assert not driver.session.timeline.is_live
-    driver.frames(1)
+    driver.run_frames(1)
     assert not np.array_equal(
         copy_pixels(driver.window.screen)[top : top + height, width - 150 : width], live
     )

@@ -21,11 +21,11 @@ def build_room(*walls: WallObstacle) -> Environment:
 
 def test_a_wall_that_ends_near_walls_closes_the_room(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
-        driver.key("w")
+        driver.press_key("w")
         # Without snapping there would be cracks of two centimeters.
         driver.click_at((5.0, 0.02))
         driver.click_at((5.0, 5.98))
-        driver.key("return")
+        driver.press_key("return")
         environment = driver.session.displayed.environment
         assert len(environment.free.geoms) == 2
         assert environment.obstacles[-1].points == ((5.0, 0.0), (5.0, 6.0))
@@ -34,10 +34,10 @@ def test_a_wall_that_ends_near_walls_closes_the_room(tmp_path: Path) -> None:
 
 def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
-        driver.key("w")
+        driver.press_key("w")
         for point in ((5.0, 1.0), (5.0, 4.0)):
             driver.click_at(point)
-        driver.key("return")
+        driver.press_key("return")
         wall = driver.session.displayed.environment.obstacles[-1]
         assert np.allclose(wall.points, ((5.0, 1.0), (5.0, 4.0)), atol=0.02)
         assert driver.viewer.message == "wall drawn"
@@ -45,7 +45,7 @@ def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
 
 def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
-        driver.key("w")
+        driver.press_key("w")
         driver.drag_at((5.0, 0.02), (5.0, 5.98))
         (wall,) = driver.session.displayed.environment.obstacles
         assert wall.points == ((5.0, 0.0), (5.0, 6.0))
@@ -54,11 +54,11 @@ def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
 
 def test_a_very_short_drag_counts_as_a_click(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
-        driver.key("w")
+        driver.press_key("w")
         driver.drag_at((2.0, 3.0), (2.0, 3.01))
         assert driver.session.displayed.environment.obstacles == ()
         driver.click_at((3.0, 3.0))
-        driver.key("return")
+        driver.press_key("return")
         (wall,) = driver.session.displayed.environment.obstacles
         assert np.allclose(wall.points, ((2, 3), (3, 3)), atol=0.02)
 

@@ -45,7 +45,7 @@ def test_captions_show_the_values_of_the_chart_with_their_time(
 ) -> None:
     with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session = driver.session
-        driver.frames(2)
+        driver.run_frames(2)
         # The curves get no further values.
         driver.window._cost_curves.update = lambda: None  # type: ignore[method-assign]
         for _ in range(90):
@@ -91,14 +91,14 @@ def test_the_cursor_is_described_in_the_pane_below_it_and_on_the_present_map(tmp
         driver.viewer.costs.forget()
         texts = []
         for pane in (0, 1):
-            driver.move(*driver.pixel(MIDDLE, pane))
-            driver.frames(2)
+            driver.move(*driver.find_pixel(MIDDLE, pane))
+            driver.run_frames(2)
             assert driver.viewer.active_pane == 0
             texts.append(describe_cursor(driver.viewer))
         assert texts[0] != texts[1]
         before = driver.viewer.inspection.cursor
         driver.viewer.files.open_map("square")
-        driver.frames(2)
+        driver.run_frames(2)
         # The same pixel is another point of the new map.
         assert driver.viewer.inspection.cursor != before
         assert driver.viewer.inspection.cursor == driver.window.canvas.to_world(driver.at, 1)
@@ -110,7 +110,7 @@ def test_each_of_four_panes_shows_its_cost(
 ) -> None:
     with open_viewer(tmp_path, *FOUR, size=size) as driver:
         boxes = driver.window.layout.panes
-        driver.frames(2)
+        driver.run_frames(2)
         drawn_texts.clear()
         driver.settle()
         for pane in driver.session.timeline.panes:
@@ -153,10 +153,10 @@ def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None
         assert suggest_actions(viewer).startswith(
             "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
         )
-        before = driver.picture()
+        before = driver.copy_frame()
         driver.window.is_unattended = False
         driver.settle()
-        assert not driver.same(before)
+        assert not driver.shows_frame(before)
         session.timeline.is_settled = False
         assert suggest_actions(viewer), "a swaying robot does not make the suggestion blink"
         session.fail_robot(2)
@@ -254,24 +254,24 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         viewer.files.save_session(tmp_path / "first.robocov")
         viewer.files.save_session(tmp_path / "second.robocov")
         (tmp_path / "notes.txt").touch()
-        driver.key("ctrl+o")
+        driver.press_key("ctrl+o")
         dialog = driver.window.dialogs.current
         assert isinstance(dialog, Choice)
         offered = [option.text for option in dialog.options("")]
         assert offered[:2] == [str(tmp_path / "second.robocov"), str(tmp_path / "first.robocov")]
         assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
-        driver.key("return")
+        driver.press_key("return")
         assert not driver.window.dialogs.is_open
         assert viewer.files.map_name == str(tmp_path / "other.json")
-        driver.key("ctrl+o")
-        driver.key("down")
-        driver.key("return")
+        driver.press_key("ctrl+o")
+        driver.press_key("down")
+        driver.press_key("return")
         assert viewer.files.workspace.path == tmp_path / "first.robocov"
         assert viewer.files.recent[0] == str(tmp_path / "first.robocov")
-        driver.key("ctrl+o")
+        driver.press_key("ctrl+o")
         driver.type("nothing.robocov")
-        driver.key("return")
+        driver.press_key("return")
         # The dialog stays open with the typed text and the error.
         dialog = driver.window.dialogs.current
         assert isinstance(dialog, Choice)
@@ -320,14 +320,14 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         viewer = driver.viewer
         session = driver.session
         session.playback.is_playing = True
-        driver.frames(20)
+        driver.run_frames(20)
         session.fail_robot(2)
-        driver.frames(20)
+        driver.run_frames(20)
         failed = session.timeline.head
         viewer.playback.look_at(0.2)
         session.fail_robot(3)
-        driver.frames(20)
-        driver.key("ctrl+b")
+        driver.run_frames(20)
+        driver.press_key("ctrl+b")
         dialog = driver.window.dialogs.current
         assert isinstance(dialog, Choice)
         options = dialog.options("")
@@ -339,5 +339,5 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         end_value = session.timeline.panes[0].distance_curve.interpolate(end_time)
         assert options[-1].note == f"{end_time:.1f} s · RAPF {end_value:.3f} m"
         driver.type("robot 2")
-        driver.key("return")
+        driver.press_key("return")
         assert session.timeline.head is failed

@@ -65,28 +65,28 @@ def test_all_of_a_new_map_is_shown(driver: Driver, tmp_path: Path, scale: float)
     boundary = tuple((scale * x, y) for x, y in HALL.boundary)
     other = replace(HALL, boundary=boundary, obstacles=(), starts={})
     save_map(other, tmp_path / "hall.json")
-    driver.wheel(200, 150, 5)
-    driver.wheel(200, 150, 5)
+    driver.turn_wheel(200, 150, 5)
+    driver.turn_wheel(200, 150, 5)
     driver.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
     driver.settle()
-    driver.frames(2)
+    driver.run_frames(2)
     left, top, width, height = driver.window.layout.panes[0]
     for corner in boundary:
-        x, y = driver.pixel(corner)
+        x, y = driver.find_pixel(corner)
         assert left <= x <= left + width
         assert top <= y <= top + height
 
 
 def test_the_view_stays_while_the_map_is_edited(driver: Driver) -> None:
-    driver.wheel(200, 150, 5)
-    before = driver.pixel((1.0, 1.0))
+    driver.turn_wheel(200, 150, 5)
+    before = driver.find_pixel((1.0, 1.0))
     driver.viewer.attempt(lambda: driver.session.edit_map(replace(HALL, obstacles=()), "emptied"))
-    driver.frames(2)
-    driver.key("ctrl+z")
-    driver.frames(2)
-    driver.key("n")
-    driver.frames(2)
-    assert driver.pixel((1.0, 1.0)) == pytest.approx(before)
+    driver.run_frames(2)
+    driver.press_key("ctrl+z")
+    driver.run_frames(2)
+    driver.press_key("n")
+    driver.run_frames(2)
+    assert driver.find_pixel((1.0, 1.0)) == pytest.approx(before)
 
 
 def test_no_limit_is_called_unlimited(driver: Driver) -> None:
@@ -94,35 +94,35 @@ def test_no_limit_is_called_unlimited(driver: Driver) -> None:
     communication = parameters["team.communication_range"]
     assert communication.format() == "unlimited"
     assert communication.parse(" Unlimited ") is None
-    entry = driver.widget("entry", "team.communication_range")
+    entry = driver.get_widget("entry", "team.communication_range")
     assert entry.text == "unlimited"
-    assert driver.find("label", "unit:team.communication_range") is None
+    assert driver.find_widget("label", "unit:team.communication_range") is None
 
 
 def test_escape_closes_the_help_before_the_lesson(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        driver.key("f2")
-        driver.key("f1")
+        driver.press_key("f2")
+        driver.press_key("f1")
         assert driver.window.is_help_open
-        driver.key("escape")
+        driver.press_key("escape")
         assert not driver.window.is_help_open
         assert driver.window.lesson.player is not None
-        driver.key("escape")
+        driver.press_key("escape")
         assert driver.window.lesson.player is None
 
 
 def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.fail_robot(2))
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (1.0, 3.0)))
-    driver.push("pane:add")
+    driver.push_button("pane:add")
     message = driver.viewer.message
     assert "not repeated: robot 2 failed, robot 1 was moved" in message
-    driver.key("ctrl+z")
+    driver.press_key("ctrl+z")
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
 
 
 def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
-    driver.push("pane:add")
+    driver.push_button("pane:add")
     assert driver.viewer.message == "all controllers restart from the same starts"
 
 
@@ -146,7 +146,7 @@ def test_the_beginning_of_a_curve_is_computed_after_an_edit_too(driver: Driver) 
     for pane in session.timeline.panes:
         pane.distance_curve._times.clear()
         pane.distance_curve._values.clear()
-    driver.frames(30)
+    driver.run_frames(30)
     times = session.timeline.panes[0].distance_curve.times
     assert times[0] == pytest.approx(0.0, abs=0.35)
 
@@ -157,13 +157,13 @@ def test_what_is_cut_off_is_shown_next_to_the_cost(tmp_path: Path) -> None:
     for environment, is_cut_off in ((HALL, False), (sealed, True)):
         with open_viewer(tmp_path, environment=environment) as driver:
             driver.session.playback.is_playing = True
-            driver.frames(20)
+            driver.run_frames(20)
             caption = driver.window.canvas._scenes[0].cost
             assert ("m² cut off" in caption) == is_cut_off, caption
 
 
 def test_facts_keep_their_order_at_any_frame_rate(driver: Driver) -> None:
-    driver.move(*driver.pixel((1.0, 3.0)))
+    driver.move(*driver.find_pixel((1.0, 3.0)))
     orders = []
     for rate in (5.0, 29.9, 30.1, 60.0):
         facts = list_facts(driver.viewer, rate, 60.0, None)

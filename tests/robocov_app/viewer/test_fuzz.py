@@ -195,7 +195,7 @@ class RandomUser:
             session = self.driver.session
             pane = rng.randrange(min(len(session.timeline.panes), len(layout.panes)))
             x, y = rng.choice(session.displayed.get_positions(session.timeline.panes[pane]).tolist())
-            column, row = self.driver.pixel((x, y), pane)
+            column, row = self.driver.find_pixel((x, y), pane)
             return round(column) + rng.randint(-3, 3), round(row) + rng.randint(-3, 3)
         left, top, box_width, box_height = rng.choice(boxes)
         return left + rng.randrange(max(box_width, 1)), top + rng.randrange(max(box_height, 1))
@@ -299,7 +299,7 @@ def assert_usable(driver: Driver) -> None:
     pygame.display.set_mode((900, 600), pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
     driver.post(pygame.WINDOWFOCUSLOST)  # releases all keys
-    driver.key("escape", 6)
+    driver.press_key("escape", 6)
     viewer.view.has_panel = True
     window.scale = 1.0
     viewer.view.layers = {"robots", "obstacles", "boundary"}
@@ -311,20 +311,20 @@ def assert_usable(driver: Driver) -> None:
         run_text(viewer, name)
     driver.settle()
     driver.settle()
-    driver.push("tool:hand")
-    driver.key("f")
+    driver.push_button("tool:hand")
+    driver.press_key("f")
     driver.session.playback.is_playing = False
     driver.settle()
-    driver.drag(driver.robot(1), driver.pixel((5.0, 5.0)))
+    driver.drag(driver.find_robot_pixel(1), driver.find_pixel((5.0, 5.0)))
     pane = driver.session.timeline.panes[0]
     assert np.allclose(pane.simulation.positions[0], (5.0, 5.0), atol=0.05)
     assert window.panel.tab == "robot"
-    driver.push("pause")
-    driver.frames(5)
+    driver.push_button("pause")
+    driver.run_frames(5)
     assert driver.session.playback.is_playing
     assert driver.session.timeline.end_time > 0.0
-    driver.turn("parameters")
-    driver.write("k_rep", "0.75")
-    driver.key("return")
+    driver.open_tab("parameters")
+    driver.type_into("k_rep", "0.75")
+    driver.press_key("return")
     assert pane.controller.get_value("k_rep") == 0.75
     assert_consistent(driver)

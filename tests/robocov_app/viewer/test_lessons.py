@@ -77,37 +77,37 @@ def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsy
         assert lesson is not None
         assert lesson.chapter.title == "Failure"
         assert viewer.session is not before
-        driver.frames(6)
+        driver.run_frames(6)
         assert viewer.session.displayed.numbers == (1, 2, 3)
-        driver.frames(30)
+        driver.run_frames(30)
         assert viewer.session.displayed.numbers == (1, 3), "at its step, however long frames take"
         assert lesson.state == "ended"
         assert not viewer.session.playback.is_playing
         lesson.skip(1)
         assert lesson.state == "asking"
         assert lesson.lines == ["What now?", "1  Nothing", "2  Much"]
-        driver.frames(10)
+        driver.run_frames(10)
         assert viewer.session.displayed.time == 0.0, "it waits for an answer"
-        driver.key("1")
+        driver.press_key("1")
         assert lesson.state == "playing"
         assert lesson.answer == 1
-        driver.frames(30)
+        driver.run_frames(30)
         assert lesson.state == "task"
         assert lesson.lines == ["Now you: drag robot 1."]
         viewer.session.place_robot(1, (1.0, 1.0))
-        driver.frames(2)
+        driver.run_frames(2)
         assert lesson.state == "ended"
         assert lesson.lines == ["✗ Not quite. Correct: Much", "So it is.", "Well done."]
         lesson.advance(player.READING_S)
         assert lesson.state == "ended"
         assert not lesson.is_done, "there is something to read"
-        driver.key("space")
+        driver.press_key("space")
         lesson.advance(100.0)
         assert lesson.state == "ended"
         assert not viewer.session.playback.is_playing, "it is paused between chapters too"
-        driver.key("space")
+        driver.press_key("space")
         assert not lesson.is_held
-        driver.key("escape")
+        driver.press_key("escape")
         assert driver.window.lesson.player is None
         assert viewer.session is before
         assert before.displayed.numbers == (1, 2)
@@ -117,10 +117,10 @@ def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False
         driver.window.lesson.start(write_short_lesson(tmp_path, robot=1))
-        driver.key("right")
+        driver.press_key("right")
         assert driver.viewer.selected_robot == 1
-        driver.key("right")
-        driver.frames(1)
+        driver.press_key("right")
+        driver.run_frames(1)
         assert driver.window.lesson.player is None
         assert driver.viewer.selected_robot is None
         assert driver.viewer.message.startswith("the lesson has ended")
@@ -131,21 +131,21 @@ def test_a_lesson_can_be_paused_left_and_resumed(tmp_path: Path) -> None:
         driver.window.lesson.is_unattended = False
         driver.window.lesson.start(write_short_lesson(tmp_path))
         lesson = driver.window.lesson.player
-        driver.key("space")
+        driver.press_key("space")
         assert lesson.state == "playing"
         assert not driver.viewer.session.playback.is_playing
-        driver.frames(60)
+        driver.run_frames(60)
         assert lesson.number == 0
         assert driver.viewer.session.displayed.time < 0.1
-        driver.key("n")
+        driver.press_key("n")
         assert lesson.state == "left"
         assert driver.window.lesson.player is lesson
-        driver.key("f2")
+        driver.press_key("f2")
         assert lesson.state == "playing"
         assert driver.viewer.session.displayed.time == 0.0
-        driver.key("right")
+        driver.press_key("right")
         assert lesson.number == 1
-        driver.key("left")
+        driver.press_key("left")
         assert lesson.number == 0
 
 
@@ -158,18 +158,18 @@ def test_answers_and_chapters_are_clicked(tmp_path: Path) -> None:
         driver.settle()
         driver.click(*driver.window.lesson.click_areas[1][0].center)
         assert (lesson.number, lesson.state) == (1, "asking")
-        driver.key("space")
-        driver.frames(10)
+        driver.press_key("space")
+        driver.run_frames(10)
         assert driver.session.displayed.time == 0.0
         assert "answer first" in driver.viewer.message
         driver.click(*driver.window.lesson.click_areas[1][0].center)
         assert (lesson.answer, lesson.state) == (2, "playing")
-        driver.frames(30)
+        driver.run_frames(30)
         assert lesson.state == "task"
-        driver.key("f2")
+        driver.press_key("f2")
         assert lesson.state == "left"
         assert not driver.window.lesson.click_areas
-        driver.key("f2")
+        driver.press_key("f2")
         assert lesson.state == "asking"
 
 
@@ -177,7 +177,7 @@ def test_answers_and_chapters_are_clicked(tmp_path: Path) -> None:
 def test_every_chapter_fits_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
     with open_viewer(tmp_path, size=size) as driver:
         driver.window.lesson.is_unattended = False
-        driver.key("f2")
+        driver.press_key("f2")
         lesson = driver.window.lesson.player
         assert lesson is not None
         for _ in LESSON.chapters:
@@ -185,7 +185,7 @@ def test_every_chapter_fits_on_its_page(tmp_path: Path, size: tuple[int, int]) -
             boxes = [box for box, _ in driver.window.lesson.click_areas]
             assert all(above.bottom <= below.top + 1 for above, below in itertools.pairwise(boxes))
             assert boxes[-1].bottom <= size[1] - 46
-            driver.key("right")
+            driver.press_key("right")
 
 
 def test_closing_the_window_restores_the_session(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_closing_the_window_restores_the_session(tmp_path: Path) -> None:
         session = driver.session
         shown = set(driver.viewer.view.layers)
         driver.window.lesson.start(write_short_lesson(tmp_path, show=["distances"]))
-        driver.key("right")
+        driver.press_key("right")
         driver.window.close()
         assert driver.window.lesson.player is None
         assert driver.session is session
@@ -213,7 +213,7 @@ def test_an_unattended_lesson_plays_to_its_end(tmp_path: Path, monkeypatch: pyte
         driver.window.lesson.is_unattended = True
         driver.window.lesson.start(write_short_lesson(tmp_path))
         for _ in range(120):
-            driver.frames(1)
+            driver.run_frames(1)
             if driver.window.lesson.player is None:
                 break
         assert driver.window.lesson.player is None

@@ -51,7 +51,7 @@ def assert_equal(first: SessionSummary, second: SessionSummary) -> None:
 
 def play(driver: Driver) -> None:
     driver.session.playback.is_playing = True
-    driver.frames(10)
+    driver.run_frames(10)
     driver.session.playback.is_playing = False
 
 
@@ -63,40 +63,40 @@ def test_a_session_is_the_same_after_undo_recovery_loading_and_run(
     with open_viewer(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
         driver.viewer.files.workspace = SessionWorkspace(driver.session, drafts)
         play(driver)
-        driver.key("w")
+        driver.press_key("w")
         driver.click_at((3.0, 0.02))
         driver.click_at((3.0, 2.0))
-        driver.key("return")
-        driver.key("v")
+        driver.press_key("return")
+        driver.press_key("v")
         play(driver)
-        driver.click(*driver.robot(2))
-        driver.key("shift+d")
+        driver.click(*driver.find_robot_pixel(2))
+        driver.press_key("shift+d")
         play(driver)
         failed = summarize(driver.session)
         driver.viewer.playback.look_at(0.3)  # before the failure
-        driver.key("b")
+        driver.press_key("b")
         play(driver)
-        driver.key("k")  # adds a pane, and restarts
+        driver.press_key("k")  # adds a pane, and restarts
         play(driver)
         compared = summarize(driver.session)
         assert len(driver.session.timeline.document.list_branches()) == 2
         assert len(driver.session.timeline.panes) == 2
         undone = 0
         while driver.session.timeline.head.parent is not None:
-            driver.key("ctrl+z")
+            driver.press_key("ctrl+z")
             undone += 1
         assert undone == 2
         assert driver.session.timeline.end_time == 0.2
         assert not driver.session.displayed.environment.obstacles
         for _ in range(undone):
-            driver.key("ctrl+y")
+            driver.press_key("ctrl+y")
         assert_equal(summarize(driver.session), compared)
-        driver.key("ctrl+s")
+        driver.press_key("ctrl+s")
         file = driver.viewer.files.workspace.path
         assert file is not None
         play(driver)
-        driver.click(*driver.robot(1))
-        driver.key("shift+d")
+        driver.click(*driver.find_robot_pixel(1))
+        driver.press_key("shift+d")
         play(driver)
         last = summarize(driver.session)
         workspace = driver.viewer.files.workspace

@@ -73,7 +73,7 @@ def test_a_long_message_is_wrapped_within_the_arena(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         before = copy_pixels(driver.window.screen).copy()
         driver.viewer.show_message("many words " * 40, is_error=True)
-        driver.frames(1)
+        driver.run_frames(1)
         after = copy_pixels(driver.window.screen)
         rows, columns = np.nonzero((after != before).any(axis=2))
         _, _, width, height = driver.window.layout.arena
@@ -88,9 +88,9 @@ def test_a_long_report_is_scrolled_to_its_end_by_the_wheel(tmp_path: Path) -> No
         driver.viewer.inspection.selected = 1
         window.panel.show_tab("robot")
         driver.session.playback.is_playing = True
-        driver.frames(30)
+        driver.run_frames(30)
         driver.session.playback.is_playing = False
-        driver.frames(15)
+        driver.run_frames(15)
         left, top, width, height = window.layout.panel
         driver.move(left + width // 2, top + height - 40)
         pictures = [copy_pixels(window.screen)[top:, left:].copy()]

@@ -24,9 +24,9 @@ def test_teams_with_different_speeds_have_a_curve_of_the_mean_time(tmp_path: Pat
         pane = driver.session.timeline.panes[0]
         np.testing.assert_array_equal(session.displayed.get_setup(pane).speed_limits, [1.0, 1.0, 0.25])
         session.playback.is_playing = True
-        driver.frames(20)
+        driver.run_frames(20)
         session.playback.is_playing = False
-        driver.frames(2)
+        driver.run_frames(2)
         positions = session.displayed.get_positions(pane)
         cost = CoverageCost(session.displayed.environment, 16)
         expected = cost(positions, np.array([1.0, 1.0, 0.25])).mean_time
@@ -37,7 +37,7 @@ def test_teams_with_different_speeds_have_a_curve_of_the_mean_time(tmp_path: Pat
         )
         # The remaining robots are equally fast, and the curve of the time continues.
         session.fail_robot(3)
-        driver.frames(2)
+        driver.run_frames(2)
         assert session.displayed.get_setup(pane).speed_limits.tolist() == [1.0, 1.0]
         assert pane.curves["time"].values[-1] == pytest.approx(pane.distance_curve.values[-1])
 
@@ -46,15 +46,15 @@ def test_the_plotted_quantity_is_chosen_by_key_and_click(tmp_path: Path) -> None
     with open_viewer(tmp_path, properties=MIXED) as driver:
         chart = driver.window.chart
         driver.session.playback.is_playing = True
-        driver.frames(20)
+        driver.run_frames(20)
         driver.session.playback.is_playing = False
-        driver.frames(8)
+        driver.run_frames(8)
         assert chart.plotted is DISTANCE
-        before = driver.picture()
-        driver.key("y")
-        driver.frames(2)
+        before = driver.copy_frame()
+        driver.press_key("y")
+        driver.run_frames(2)
         assert chart.plotted is TIME
-        assert not driver.same(before)
+        assert not driver.shows_frame(before)
         left, top, width, _ = chart.switch_box
         driver.click(left + width / 2, top + 6)
         assert chart.plotted is DISTANCE
@@ -64,7 +64,7 @@ def test_the_plotted_quantity_is_chosen_by_key_and_click(tmp_path: Path) -> None
 def test_both_quantities_have_ghost_curves(tmp_path: Path) -> None:
     with open_viewer(tmp_path, properties=MIXED) as driver:
         driver.session.playback.is_playing = True
-        driver.frames(60)
+        driver.run_frames(60)
         driver.session.playback.is_playing = False
         driver.session.show_time(0.4)
         driver.session.branch()
@@ -76,9 +76,9 @@ def test_both_quantities_have_ghost_curves(tmp_path: Path) -> None:
 
 def test_teams_with_equal_speeds_have_no_choice(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        driver.frames(3)
+        driver.run_frames(3)
         assert driver.session.displayed.get_setup(driver.session.timeline.panes[0]).speed_limits is None
-        driver.key("y")
+        driver.press_key("y")
         assert driver.window.chart.plotted is DISTANCE
         assert "equally fast" in driver.viewer.message
         assert driver.window.chart.switch_box is None

@@ -21,35 +21,35 @@ from robocov_app.viewer.window.status import describe_cursor
 
 
 def test_space_plays_and_pauses(driver: Driver) -> None:
-    driver.key("space")
-    driver.frames(10)
+    driver.press_key("space")
+    driver.run_frames(10)
     assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
-    driver.key("space")
-    driver.frames(5)
+    driver.press_key("space")
+    driver.run_frames(5)
     assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
 
 
 def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
-    driver.push("pause")
+    driver.push_button("pause")
     assert driver.session.playback.is_playing
-    assert driver.widget("button", "pause").text == "Pause"
-    driver.frames(5)
-    driver.push("pause")
+    assert driver.get_widget("button", "pause").text == "Pause"
+    driver.run_frames(5)
+    driver.push_button("pause")
     assert not driver.session.playback.is_playing
-    assert driver.widget("button", "pause").text == "Play"
+    assert driver.get_widget("button", "pause").text == "Play"
     end = driver.session.timeline.end_time
-    driver.push("step")
+    driver.push_button("step")
     assert driver.session.timeline.end_time == pytest.approx(end + driver.session.timeline.scenario.dt)
-    driver.push("settle")
+    driver.push_button("settle")
     assert driver.session.playback.stop_when_settled
-    assert driver.widget("button", "settle").value
-    driver.push("restart")
+    assert driver.get_widget("button", "settle").value
+    driver.push_button("restart")
     assert driver.session.timeline.end_time < 0.1
 
 
 def test_playback_stops_when_the_team_has_settled(tmp_path: Path) -> None:
     with open_viewer(tmp_path, robots=1) as driver:
-        driver.key("s")
+        driver.press_key("s")
         for _ in range(2000):
             driver.window.advance(0.1)
             if not driver.session.playback.is_playing:
@@ -59,9 +59,9 @@ def test_playback_stops_when_the_team_has_settled(tmp_path: Path) -> None:
 
 
 def test_the_speed_multiplies_the_simulated_time(driver: Driver) -> None:
-    driver.key("=")
-    driver.key("space")
-    driver.frames(10)
+    driver.press_key("=")
+    driver.press_key("space")
+    driver.run_frames(10)
     assert driver.session.displayed.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
 
 
@@ -70,10 +70,10 @@ def test_the_speed_multiplies_the_simulated_time(driver: Driver) -> None:
 
 def test_the_status_line_describes_the_point_under_the_cursor(tmp_path: Path) -> None:
     with open_viewer(tmp_path, lattice=48) as driver:
-        driver.frames(3)
-        driver.move(*driver.robot(2))
+        driver.run_frames(3)
+        driver.move(*driver.find_robot_pixel(2))
         assert "robot 2" in describe_cursor(driver.viewer)
-        driver.move(*driver.pixel((4.2, 1.2)))
+        driver.move(*driver.find_pixel((4.2, 1.2)))
         assert "inside an obstacle" in describe_cursor(driver.viewer)
         driver.post(pygame.WINDOWLEAVE)
         driver.settle()
@@ -81,23 +81,23 @@ def test_the_status_line_describes_the_point_under_the_cursor(tmp_path: Path) ->
 
 
 def test_the_cursor_is_an_arrow_over_the_panel(driver: Driver) -> None:
-    driver.key("w")
-    driver.move(*driver.pixel((4.2, 1.2)))
-    driver.frames(1)
+    driver.press_key("w")
+    driver.move(*driver.find_pixel((4.2, 1.2)))
+    driver.run_frames(1)
     assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
     left, top, wide, high = driver.window.layout.panel
     driver.move(left + wide / 2, top + high - 5)
-    driver.frames(1)
+    driver.run_frames(1)
     assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 
 
 def test_a_screenshot_contains_the_window(driver: Driver, tmp_path: Path) -> None:
-    picture = driver.picture()
-    driver.key("f12")
+    picture = driver.copy_frame()
+    driver.press_key("f12")
     with Image.open(tmp_path / "robocov-1.png") as saved:
         assert np.array_equal(np.asarray(saved.convert("RGB")).astype(int), picture)
-    driver.turn("file")
-    driver.push("screenshot")
+    driver.open_tab("file")
+    driver.push_button("screenshot")
     assert (tmp_path / "robocov-2.png").exists()
 
 
@@ -105,9 +105,9 @@ def test_a_screenshot_contains_the_window(driver: Driver, tmp_path: Path) -> Non
 def test_a_run_is_saved_in_the_background(driver: Driver, tmp_path: Path) -> None:
     for _ in range(30):
         driver.session.playback.step()
-    driver.key("ctrl+e")
+    driver.press_key("ctrl+e")
     driver.window.run_saver.finish()
-    driver.frames(2)
+    driver.run_frames(2)
     assert not driver.viewer.has_error_message
     assert "saved" in driver.viewer.message
     (record,) = tmp_path.rglob("record.npz")
@@ -116,13 +116,13 @@ def test_a_run_is_saved_in_the_background(driver: Driver, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) -> None:
-    driver.key("space")
-    driver.key("f9")
+    driver.press_key("space")
+    driver.press_key("f9")
     assert driver.viewer.view.is_recording
-    driver.frames(60)
+    driver.run_frames(60)
     resize_window(driver, (1000, 640))
-    driver.frames(15)
-    driver.key("f9")
+    driver.run_frames(15)
+    driver.press_key("f9")
     path = tmp_path / "robocov-1.mp4"
     assert driver.viewer.message.startswith(f"video saved: {path}")
     assert not driver.viewer.view.is_recording
@@ -134,8 +134,8 @@ def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) 
 
 def test_closing_the_window_completes_the_video(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        driver.key("f9")
-        driver.frames(10)
+        driver.press_key("f9")
+        driver.run_frames(10)
         driver.post(pygame.QUIT)
         driver.settle()
         assert driver.window.closed
@@ -147,7 +147,7 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
     with open_viewer(tmp_path / "file") as driver:
         for key in ("f12", "f9", "ctrl+s"):
             driver.viewer.has_error_message = False
-            driver.key(key)
+            driver.press_key(key)
             assert driver.viewer.has_error_message
             assert driver.viewer.message, key
         assert driver.window.video is None
@@ -159,13 +159,13 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("key", ["f1", "shift+/"])
 def test_the_help_page_closes_by_key_or_click(key: str, driver: Driver) -> None:
-    plain = driver.picture()
-    driver.key(key)
+    plain = driver.copy_frame()
+    driver.press_key(key)
     assert driver.window.is_help_open
-    assert not driver.same(plain)
-    driver.key("escape")
+    assert not driver.shows_frame(plain)
+    driver.press_key("escape")
     assert not driver.window.is_help_open
-    driver.key(key)
+    driver.press_key(key)
     driver.click(300, 300)
     assert not driver.window.is_help_open
     assert driver.viewer.selected_robot is None
@@ -173,46 +173,46 @@ def test_the_help_page_closes_by_key_or_click(key: str, driver: Driver) -> None:
 
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])
 def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
-    driver.key(key)
+    driver.press_key(key)
     dialogs = driver.window.dialogs
     assert dialogs.is_open
     assert dialogs.current.text == ""
     driver.type("single")
     assert [option.text for option in dialogs.current.options("single")] == ["Single step"]
-    driver.key("return")
+    driver.press_key("return")
     assert driver.session.timeline.end_time > 0.0
     assert not dialogs.is_open
 
 
 def test_the_palette_is_navigated_by_keys(driver: Driver) -> None:
-    driver.key("ctrl+k")
+    driver.press_key("ctrl+k")
     driver.type("rob")
     palette = driver.window.dialogs.current
-    driver.key("down", 2)
-    driver.key("up")
+    driver.press_key("down", 2)
+    driver.press_key("up")
     assert palette.chosen == 1
-    driver.key("backspace")
+    driver.press_key("backspace")
     assert palette.text == "ro"
     assert palette.chosen == 0
-    driver.key("down", 30)
+    driver.press_key("down", 30)
     assert palette.chosen == len(palette.options("ro")) - 1
-    driver.key("escape")
+    driver.press_key("escape")
     assert not driver.window.dialogs.is_open
     assert driver.session.timeline.end_time == 0.0
 
 
 def test_values_are_set_in_the_palette(driver: Driver) -> None:
-    driver.key("ctrl+k")
+    driver.press_key("ctrl+k")
     driver.type("k_rep 0.5")
-    driver.key("return")
+    driver.press_key("return")
     assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 0.5
-    driver.key("ctrl+k")
+    driver.press_key("ctrl+k")
     driver.type("robots 5")
-    driver.key("enter")
+    driver.press_key("enter")
     assert len(driver.session.displayed.numbers) == 5
-    driver.key("ctrl+k")
+    driver.press_key("ctrl+k")
     driver.type("robots many")
-    driver.key("return")
+    driver.press_key("return")
     palette = driver.window.dialogs.current
     assert palette.text == "robots many"
     assert "whole number" in palette.error
@@ -227,21 +227,21 @@ def test_held_keys_repeat_steps_but_not_screenshots(driver: Driver, tmp_path: Pa
     driver.settle()
     assert [path.name for path in tmp_path.iterdir()] == ["robocov-1.png"]
     assert driver.session.timeline.end_time == pytest.approx(5 / 60)
-    driver.key("f12")
+    driver.press_key("f12")
     assert (tmp_path / "robocov-2.png").exists()
 
 
 def test_the_theme_changes_all_parts_of_the_window(driver: Driver) -> None:
-    light = driver.picture()
-    driver.key("t")
-    driver.frames(3, 0.3)
-    dark = driver.picture()
+    light = driver.copy_frame()
+    driver.press_key("t")
+    driver.run_frames(3, 0.3)
+    dark = driver.copy_frame()
     for part in (slice(0, 500), slice(600, 900)):
         assert light[:, part].mean() > 190
         assert dark[:, part].mean() < 90
-    driver.key("t")
-    driver.frames(3, 0.3)
-    assert driver.picture().mean() > 190
+    driver.press_key("t")
+    driver.run_frames(3, 0.3)
+    assert driver.copy_frame().mean() > 190
 
 
 @pytest.mark.parametrize(
@@ -253,30 +253,30 @@ def test_windows_of_any_size_can_be_used(size: tuple[int, int], panes: int, tmp_
     ) as driver:
         resize_window(driver, size)
         assert driver.window.layout.size == size
-        driver.key("space")
-        driver.frames(2)
-        driver.push("pause")
+        driver.press_key("space")
+        driver.run_frames(2)
+        driver.push_button("pause")
         assert not driver.session.playback.is_playing
-        driver.turn("file")
-        driver.click(*driver.robot(1))
+        driver.open_tab("file")
+        driver.click(*driver.find_robot_pixel(1))
         assert driver.viewer.selected_robot == 1
         if size[0] >= 900:
-            driver.turn("parameters")
-            driver.push("reset:k_rep")
+            driver.open_tab("parameters")
+            driver.push_button("reset:k_rep")
 
 
 def test_long_pages_scroll_by_wheel_and_bar(driver: Driver) -> None:
-    assert driver.widget("entry", "team.radius").rect.height == 0  # out of sight
+    assert driver.get_widget("entry", "team.radius").rect.height == 0  # out of sight
     for _ in range(12):
-        driver.wheel(740, 500, -3)
-    driver.write("team.radius", "0.12")
-    driver.key("return")
+        driver.turn_wheel(740, 500, -3)
+    driver.type_into("team.radius", "0.12")
+    driver.press_key("return")
     assert driver.session.timeline.panes[0].setup.properties.radius == 0.12
-    bar = driver.widget("bar", "parameters:rapf").rect
+    bar = driver.get_widget("bar", "parameters:rapf").rect
     driver.drag(bar.center, (bar.centerx, bar.centery - 200))
-    assert driver.widget("entry", "team.radius").rect.height == 0
+    assert driver.get_widget("entry", "team.radius").rect.height == 0
     camera = driver.window.canvas._painters[0].camera
-    driver.wheel(740, 500, -3)
+    driver.turn_wheel(740, 500, -3)
     assert driver.window.canvas._painters[0].camera == camera
 
 
@@ -285,14 +285,14 @@ def test_long_pages_scroll_by_wheel_and_bar(driver: Driver) -> None:
 
 def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
     shown = set(driver.viewer.view.layers)
-    driver.key("f2")
+    driver.press_key("f2")
     assert driver.window.lesson.player is not None
     assert driver.viewer.session.playback.is_playing
-    driver.frames(5)
-    driver.key("f12")
-    driver.key("t")
+    driver.run_frames(5)
+    driver.press_key("f12")
+    driver.press_key("t")
     assert driver.window.lesson.player is not None
-    driver.key("escape")
+    driver.press_key("escape")
     assert driver.window.lesson.player is None
     assert driver.viewer.view.layers == shown
     assert driver.viewer.session is driver.session
@@ -300,13 +300,13 @@ def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
 
 
 def test_the_lesson_pauses_when_the_arena_is_clicked(driver: Driver) -> None:
-    driver.key("f2")
-    driver.frames(3)
+    driver.press_key("f2")
+    driver.run_frames(3)
     driver.click(*driver.window.layout.arena[2:])
     driver.click(200, 200)
     assert driver.window.lesson.player is not None
     assert driver.window.lesson.player.state == "left"
-    driver.key("f2")
+    driver.press_key("f2")
     assert driver.window.lesson.player.state == "playing"
 
 
@@ -325,10 +325,10 @@ def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.Monke
 
     with window() as first:
         driver = Driver(first)
-        driver.key("t")
-        driver.key("shift+t")
-        driver.turn("show")
-        driver.tick("cells")
+        driver.press_key("t")
+        driver.press_key("shift+t")
+        driver.open_tab("show")
+        driver.toggle_check_box("cells")
         first.close()
     settings = json.loads((tmp_path / "settings/window.json").read_text())
     assert settings["theme"] == "dark"

@@ -14,12 +14,12 @@ from sample_sessions import RAPF, RPF
 
 
 def test_a_dragged_robot_follows_the_mouse(driver: Driver) -> None:
-    driver.key("space")
-    driver.press(*driver.robot(2))
-    target = driver.pixel(MIDDLE)
+    driver.press_key("space")
+    driver.press(*driver.find_robot_pixel(2))
+    target = driver.find_pixel(MIDDLE)
     for _ in range(60):
         driver.move(*target, held=1, settled=False)
-        driver.frames()
+        driver.run_frames()
     assert np.hypot(*(get_position(driver, 2) - MIDDLE)) < 0.3
     assert driver.session.timeline.drag is not None
     assert driver.session.timeline.drag[0] == 2
@@ -31,34 +31,34 @@ def test_a_dragged_robot_follows_the_mouse(driver: Driver) -> None:
 
 def test_a_thrown_robot_keeps_moving(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (0.5, 3.0)))
-    driver.key("space")
-    driver.press(*driver.robot(1))
+    driver.press_key("space")
+    driver.press(*driver.find_robot_pixel(1))
     x, y = driver.at
     for k in range(12):
         driver.move(x + 8 * k, y, held=1, settled=False)
-        driver.frames()
+        driver.run_frames()
     driver.release()
     pane = driver.session.timeline.panes[0]
     fast = float(np.hypot(*pane.simulation.velocities[pane.numbers.index(1)]))
     assert fast > pane.setup.properties.max_speed
     before = get_position(driver, 1).copy()
-    driver.frames(10)
+    driver.run_frames(10)
     assert get_position(driver, 1)[0] > before[0] + 0.1
 
 
 def test_a_robot_is_placed_at_the_mouse_while_paused(driver: Driver) -> None:
-    driver.drag(driver.robot(3), driver.pixel((5.0, 3.4)))
+    driver.drag(driver.find_robot_pixel(3), driver.find_pixel((5.0, 3.4)))
     assert np.allclose(get_position(driver, 3), (5.0, 3.4), atol=0.03)
 
 
 def test_a_click_on_the_floor_clears_the_selection_and_a_drag_pans(driver: Driver) -> None:
-    driver.click(*driver.robot(1))
+    driver.click(*driver.find_robot_pixel(1))
     assert driver.viewer.selected_robot == 1
-    x, y = driver.pixel(MIDDLE)
+    x, y = driver.find_pixel(MIDDLE)
     driver.drag((x, y), (x + 40, y + 30))
     assert driver.viewer.selected_robot == 1
-    assert np.allclose(driver.pixel(MIDDLE), (x + 40, y + 30), atol=2)
-    driver.click(*driver.pixel(MIDDLE))
+    assert np.allclose(driver.find_pixel(MIDDLE), (x + 40, y + 30), atol=2)
+    driver.click(*driver.find_pixel(MIDDLE))
     assert driver.viewer.selected_robot is None
 
 
@@ -68,31 +68,31 @@ def test_moving_an_obstacle_can_be_undone_and_redone(driver: Driver) -> None:
     (pillar, _) = driver.session.displayed.environment.obstacles
     assert pillar.center == pytest.approx((5.0, 1.8), abs=0.03)
     assert driver.viewer.message.startswith("circle “pillar” moved")
-    driver.key("ctrl+z")
+    driver.press_key("ctrl+z")
     assert driver.session.displayed.environment == before
     assert driver.viewer.message.startswith("undone: ")
-    driver.key("ctrl+y")
+    driver.press_key("ctrl+y")
     assert driver.session.displayed.environment.obstacles[0] == pillar
-    driver.key("ctrl+z")
-    driver.key("ctrl+shift+z")
+    driver.press_key("ctrl+z")
+    driver.press_key("ctrl+shift+z")
     assert driver.session.displayed.environment.obstacles[0] == pillar
 
 
 def test_escape_releases_a_dragged_obstacle(driver: Driver) -> None:
     before = driver.session.displayed.environment
-    driver.press(*driver.pixel((4.2, 1.2)))
-    driver.move(*driver.pixel((5.0, 1.8)), held=1)
-    driver.key("escape")
+    driver.press(*driver.find_pixel((4.2, 1.2)))
+    driver.move(*driver.find_pixel((5.0, 1.8)), held=1)
+    driver.press_key("escape")
     driver.release()
     assert driver.session.displayed.environment is before
 
 
 def test_another_button_does_not_release_a_dragged_obstacle(driver: Driver) -> None:
-    driver.press(*driver.pixel((4.2, 1.2)))
-    driver.move(*driver.pixel((4.6, 1.4)), held=1)
+    driver.press(*driver.find_pixel((4.2, 1.2)))
+    driver.move(*driver.find_pixel((4.6, 1.4)), held=1)
     driver.post(pygame.MOUSEBUTTONDOWN, pos=driver.at, button=3)
     driver.release(3)
-    driver.move(*driver.pixel((5.0, 1.8)), held=1)
+    driver.move(*driver.find_pixel((5.0, 1.8)), held=1)
     driver.release()
     assert driver.session.displayed.environment.obstacles[0].center == pytest.approx((5.0, 1.8), abs=0.03)
 
@@ -101,11 +101,11 @@ def test_another_button_does_not_release_a_dragged_obstacle(driver: Driver) -> N
 
 
 def test_a_polygon_is_drawn_corner_by_corner_and_closed_by_enter(driver: Driver) -> None:
-    driver.key("p")
+    driver.press_key("p")
     for corner in ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)):
         driver.click_at(corner)
     assert len(driver.session.displayed.environment.obstacles) == 2
-    driver.key("return")
+    driver.press_key("return")
     obstacle = driver.session.displayed.environment.obstacles[-1]
     assert np.allclose(obstacle.vertices, ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)), atol=0.02)
     assert driver.viewer.message.startswith("polygon drawn")
@@ -113,10 +113,10 @@ def test_a_polygon_is_drawn_corner_by_corner_and_closed_by_enter(driver: Driver)
 
 @pytest.mark.parametrize("gesture", ["double click", "first corner", "right click"])
 def test_a_polygon_is_closed_by(gesture: str, driver: Driver) -> None:
-    driver.key("p")
+    driver.press_key("p")
     for corner in ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)):
         driver.click_at(corner)
-        driver.frames(20)
+        driver.run_frames(20)
     if gesture == "double click":
         driver.click_at((0.5, 3.5))
         driver.click_at((0.5, 3.5))
@@ -129,18 +129,18 @@ def test_a_polygon_is_closed_by(gesture: str, driver: Driver) -> None:
 
 
 def test_a_wall_has_the_chosen_width(driver: Driver) -> None:
-    driver.key("w")
-    driver.key("]")
+    driver.press_key("w")
+    driver.press_key("]")
     driver.click_at((0.4, 3.6))
     driver.click_at((1.4, 3.6))
-    driver.key("enter")
+    driver.press_key("enter")
     wall = driver.session.displayed.environment.obstacles[-1]
     assert wall.width == 0.125
     assert np.allclose(wall.points, ((0.4, 3.6), (1.4, 3.6)), atol=0.02)
 
 
 def test_a_circle_is_dragged_from_its_center_to_its_rim(driver: Driver) -> None:
-    driver.key("c")
+    driver.press_key("c")
     driver.drag_at((1.0, 3.2), (1.2, 3.2), (1.4, 3.2))
     circle = driver.session.displayed.environment.obstacles[-1]
     assert circle.center == pytest.approx((1.0, 3.2), abs=0.02)
@@ -148,23 +148,23 @@ def test_a_circle_is_dragged_from_its_center_to_its_rim(driver: Driver) -> None:
 
 
 def test_the_eraser_deletes_obstacles_and_robots(driver: Driver) -> None:
-    driver.key("x")
+    driver.press_key("x")
     driver.click_at((4.2, 1.2))
     assert len(driver.session.displayed.environment.obstacles) == 1
-    driver.click(*driver.robot(2))
+    driver.click(*driver.find_robot_pixel(2))
     assert driver.session.displayed.numbers == (1, 3)
-    driver.key("ctrl+z", 2)
+    driver.press_key("ctrl+z", 2)
     assert driver.session.displayed.numbers == (1, 2, 3)
     assert len(driver.session.displayed.environment.obstacles) == 2
 
 
 def test_robots_are_added_failed_and_revived_by_clicks(driver: Driver) -> None:
-    driver.key("a")
+    driver.press_key("a")
     driver.click_at((5.0, 3.0))
     assert driver.session.displayed.numbers == (1, 2, 3, 4)
     assert np.allclose(get_position(driver, 4), (5.0, 3.0), atol=0.02)
-    driver.key("d")
-    driver.click(*driver.robot(4))
+    driver.press_key("d")
+    driver.click(*driver.find_robot_pixel(4))
     assert driver.session.displayed.numbers == (1, 2, 3)
     driver.click_at((5.0, 3.0))
     assert driver.session.displayed.numbers == (1, 2, 3, 4)
@@ -179,10 +179,10 @@ def test_robots_are_added_failed_and_revived_by_clicks(driver: Driver) -> None:
 )
 def test_an_invalid_obstacle_is_refused_with_the_reason(corners, reason: str, driver: Driver) -> None:
     before = driver.session.displayed.environment
-    driver.key("p")
+    driver.press_key("p")
     for corner in corners:
         driver.click_at(corner)
-    driver.key("return")
+    driver.press_key("return")
     assert reason in driver.viewer.message
     assert driver.viewer.has_error_message
     assert driver.session.displayed.environment is before
@@ -190,17 +190,17 @@ def test_an_invalid_obstacle_is_refused_with_the_reason(corners, reason: str, dr
 
 def test_an_obstacle_that_covers_the_floor_is_refused(driver: Driver) -> None:
     before = driver.session.displayed.environment
-    driver.key("p")
+    driver.press_key("p")
     for corner in ((0.01, 0.01), (5.99, 0.01), (5.99, 3.99), (0.01, 3.99)):
         driver.click_at(corner)
-    driver.key("return")
+    driver.press_key("return")
     assert driver.viewer.has_error_message
     assert driver.viewer.message
     assert driver.session.displayed.environment is before
 
 
 def test_the_ruler_measures_a_distance(driver: Driver) -> None:
-    driver.key("m")
+    driver.press_key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
     state = driver.viewer.tool.build_draw_state(driver.session)
     assert state.label.startswith("2.0")
@@ -208,8 +208,8 @@ def test_the_ruler_measures_a_distance(driver: Driver) -> None:
 
 def test_drawing_in_a_pane_activates_it_and_edits_all_panes(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, RPF) as driver:
-        driver.key("c")
-        driver.drag(driver.pixel((1.0, 3.2), 1), driver.pixel((1.4, 3.2), 1))
+        driver.press_key("c")
+        driver.drag(driver.find_pixel((1.0, 3.2), 1), driver.find_pixel((1.4, 3.2), 1))
         assert driver.viewer.active_pane == 1
         for pane in driver.session.timeline.panes:
             assert pane.setup.environment.obstacles[-1].center == pytest.approx((1.0, 3.2), abs=0.05)

@@ -22,10 +22,10 @@ from robocov_app.viewer.session.playback import Playback
 
 
 def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
-    driver.choose("controller:0", "RPF")
+    driver.choose_option("controller:0", "RPF")
     assert driver.session.timeline.panes[0].controller.name == "rpf"
-    assert driver.find("entry", "k_att") is None
-    driver.choose("controller:0", "Lloyd")
+    assert driver.find_widget("entry", "k_att") is None
+    driver.choose_option("controller:0", "Lloyd")
     assert driver.session.timeline.panes[0].controller.name == "lloyd"
 
 
@@ -34,19 +34,19 @@ def test_the_menu_shows_the_controller_of_a_branch_that_takes_long_to_reach(
 ) -> None:
     """The state of the branch is reached some frames after the command."""
     driver.session.playback.is_playing = True
-    driver.frames(20)
+    driver.run_frames(20)
     driver.session.playback.is_playing = False
-    driver.choose("controller:0", "RPF")
-    driver.choose("controller:0", "Lloyd")
-    driver.key("ctrl+z", times=2)
+    driver.choose_option("controller:0", "RPF")
+    driver.choose_option("controller:0", "Lloyd")
+    driver.press_key("ctrl+z", times=2)
     monkeypatch.setattr("robocov_app.viewer.session.playback.SEEK_SLICE_S", 0.0)
     monkeypatch.setattr(Playback, "seek_seconds", 0.0)
     for _ in range(3):
-        driver.key("alt+left")
-        driver.frames(60)
+        driver.press_key("alt+left")
+        driver.run_frames(60)
         assert not driver.session.timeline.is_seeking
         displayed = driver.session.displayed.get_setup(driver.session.timeline.panes[0]).controller
-        menu = driver.find("menu", "controller:0")
+        menu = driver.find_widget("menu", "controller:0")
         assert menu is not None
         assert menu.value == displayed.label
 
@@ -68,35 +68,35 @@ def test_user_controllers_with_equal_labels_have_unique_menu_entries(tmp_path: P
             driver.viewer.attempt(lambda name=name: driver.window.commands.run_text(f"controller {name}"))
         driver.viewer.attempt(lambda: driver.viewer.comparison.set_controller(0, "rapf"))
         driver.settle()
-        driver.click(*driver.widget("menu", "controller:1").rect.center)
+        driver.click(*driver.get_widget("menu", "controller:1").rect.center)
         items = driver.window.panel.ui.open_list.options
         assert len(set(items)) == len(items) == len(CONTROLLERS) + 2
-        driver.key("escape")
-        driver.choose("controller:1", items[-1])
+        driver.press_key("escape")
+        driver.choose_option("controller:1", items[-1])
         assert driver.session.timeline.panes[1].controller.name == names[1]
 
 
 def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
-    driver.choose("map", "trap")
+    driver.choose_option("map", "trap")
     assert driver.viewer.files.map_name == "trap"
     assert driver.session.displayed.environment.name == "Trap"
-    driver.choose("start", "inside")
+    driver.choose_option("start", "inside")
     assert driver.session.timeline.scenario.start_name == "inside"
 
 
 def test_a_covered_start_stays_in_the_menu_until_another_is_chosen(driver: Driver) -> None:
-    driver.choose("start", "far")
-    driver.key("c")
+    driver.choose_option("start", "far")
+    driver.press_key("c")
     driver.drag_at((5.2, 3.2), (5.2, 3.5), (5.2, 3.75))
     assert "far" not in driver.session.displayed.environment.starts
     assert driver.session.timeline.scenario.start_name == "far"
-    driver.push("seed:next")
-    driver.choose("start", "spread")
+    driver.push_button("seed:next")
+    driver.choose_option("start", "spread")
     assert driver.session.timeline.scenario.start_name == "spread"
 
 
 def test_a_click_outside_a_menu_only_closes_it(driver: Driver) -> None:
-    driver.click(*driver.widget("menu", "map").rect.center)
+    driver.click(*driver.get_widget("menu", "map").rect.center)
     assert driver.window.panel.ui.open_list is not None
     camera = driver.window.canvas._painters[0].camera
     driver.click_at(MIDDLE)
@@ -107,9 +107,9 @@ def test_a_click_outside_a_menu_only_closes_it(driver: Driver) -> None:
 
 
 def test_escape_only_closes_a_menu(driver: Driver) -> None:
-    driver.key("p")
-    driver.click(*driver.widget("menu", "map").rect.center)
-    driver.key("escape")
+    driver.press_key("p")
+    driver.click(*driver.get_widget("menu", "map").rect.center)
+    driver.press_key("escape")
     driver.settle()
     assert driver.window.panel.ui.open_list is None
     assert driver.viewer.tool.name == "polygon"
@@ -117,8 +117,8 @@ def test_escape_only_closes_a_menu(driver: Driver) -> None:
 
 def test_an_open_menu_covers_the_buttons_below_it(driver: Driver) -> None:
     """A choice from the list presses none of the buttons under it."""
-    step = driver.widget("button", "step").rect
-    driver.click(*driver.widget("menu", "map").rect.center)
+    step = driver.get_widget("button", "step").rect
+    driver.click(*driver.get_widget("menu", "map").rect.center)
     found = driver.window.panel.ui.open_list
     name = found.options[found.find_item((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
@@ -127,202 +127,202 @@ def test_an_open_menu_covers_the_buttons_below_it(driver: Driver) -> None:
 
 
 def test_a_dragged_slider_sets_its_gain(driver: Driver) -> None:
-    driver.slide("k_rep", 0.75)
+    driver.drag_slider("k_rep", 0.75)
     value = driver.session.timeline.panes[0].controller.get_value("k_rep")
     assert value == pytest.approx(0.3 * 30**0.5, rel=0.2)
-    assert driver.widget("entry", "k_rep").text == f"{value:.4g}"
+    assert driver.get_widget("entry", "k_rep").text == f"{value:.4g}"
     assert driver.session.timeline.events[-1].kind == "law"
 
 
 def test_a_click_beside_the_knob_moves_it_there(driver: Driver) -> None:
-    slider = driver.widget("slider", "team.max_speed")
+    slider = driver.get_widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
     assert driver.session.timeline.panes[0].setup.properties.max_speed > 4.0
-    assert driver.knob("team.max_speed")[0].collidepoint(driver.at)
+    assert driver.find_knob("team.max_speed")[0].collidepoint(driver.at)
 
 
 def test_a_knob_can_be_dragged_beyond_its_slider(driver: Driver) -> None:
-    knob, _ = driver.knob("speed")
+    knob, _ = driver.find_knob("speed")
     driver.drag(knob.center, (knob.centerx + 40, 10), (20, 590))
     assert driver.session.playback.clock.speed == 0.1
 
 
 def test_the_speed_slider_snaps_to_speeds(driver: Driver) -> None:
-    driver.slide("speed", 0.81)
+    driver.drag_slider("speed", 0.81)
     assert driver.session.playback.clock.speed == 8.0
-    driver.frames(3)
-    assert driver.widget("slider", "speed").value == 6
-    driver.slide("speed", 1.0)
+    driver.run_frames(3)
+    assert driver.get_widget("slider", "speed").value == 6
+    driver.drag_slider("speed", 1.0)
     assert math.isinf(driver.session.playback.clock.speed)
 
 
 def test_enter_accepts_a_typed_value(driver: Driver) -> None:
-    driver.write("k_rep", "1.25")
+    driver.type_into("k_rep", "1.25")
     assert driver.session.timeline.panes[0].controller.get_value("k_rep") != 1.25
     assert driver.window.panel.ui.edit
-    driver.key("return")
+    driver.press_key("return")
     assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 1.25
     assert not driver.window.panel.ui.edit
-    assert driver.widget("slider", "k_rep").value > 0.5
+    assert driver.get_widget("slider", "k_rep").value > 0.5
 
 
 def test_keypad_enter_accepts_a_typed_value(driver: Driver) -> None:
-    driver.write("team.max_speed", "0.5")
-    driver.key("enter")
+    driver.type_into("team.max_speed", "0.5")
+    driver.press_key("enter")
     assert driver.session.timeline.panes[0].setup.properties.max_speed == 0.5
 
 
 @pytest.mark.parametrize(("field", "text"), [("k_rep", "much"), ("team.max_speed", "-1"), ("robots", "1.5")])
 def test_an_invalid_value_is_reported_and_the_field_restored(field: str, text: str, driver: Driver) -> None:
-    before = driver.widget("entry", field).text
-    driver.write(field, text)
-    assert driver.widget("entry", field).text == text
-    driver.key("return")
+    before = driver.get_widget("entry", field).text
+    driver.type_into(field, text)
+    assert driver.get_widget("entry", field).text == text
+    driver.press_key("return")
     assert driver.viewer.has_error_message
     assert driver.viewer.message
-    assert driver.widget("entry", field).text == before
+    assert driver.get_widget("entry", field).text == before
 
 
 @pytest.mark.parametrize("how", ["escape", "click elsewhere", "another field"])
 def test_text_without_enter_is_discarded(how: str, driver: Driver) -> None:
-    driver.write("k_rep", "7")
+    driver.type_into("k_rep", "7")
     if how == "escape":
-        driver.key("escape")
+        driver.press_key("escape")
     elif how == "another field":
-        driver.click(*driver.widget("entry", "rho_0").rect.center)
+        driver.click(*driver.get_widget("entry", "rho_0").rect.center)
     else:
         driver.click_at(MIDDLE)
-    driver.frames(2)
-    assert driver.widget("entry", "k_rep").text == "0.3"
+    driver.run_frames(2)
+    assert driver.get_widget("entry", "k_rep").text == "0.3"
     assert driver.session.timeline.panes[0].controller == RAPF
 
 
 def test_keys_typed_into_a_field_are_not_shortcuts(driver: Driver) -> None:
     shown = set(driver.viewer.view.layers)
-    driver.write("k_rep", "1r t")
-    driver.key("space")
-    driver.key("home")
-    driver.key("delete")
+    driver.type_into("k_rep", "1r t")
+    driver.press_key("space")
+    driver.press_key("home")
+    driver.press_key("delete")
     assert driver.viewer.view.layers == shown
     assert driver.viewer.view.theme == "light"
     assert not driver.session.playback.is_playing
-    driver.key("f1")
+    driver.press_key("f1")
     assert driver.window.is_help_open
 
 
 def test_typing_keeps_the_key_repeat(driver: Driver) -> None:
-    driver.write("k_rep", "1")
-    driver.key("return")
-    driver.frames(2)
+    driver.type_into("k_rep", "1")
+    driver.press_key("return")
+    driver.run_frames(2)
     assert pygame.key.get_repeat() == KEY_REPEAT_MS
 
 
 def test_a_second_click_places_the_text_cursor(driver: Driver) -> None:
-    entry = driver.widget("entry", "seed")
-    driver.write("seed", "123")
+    entry = driver.get_widget("entry", "seed")
+    driver.type_into("seed", "123")
     time.sleep(DOUBLE_CLICK_S)
     driver.click(entry.rect.left + 8, entry.rect.centery)
     driver.type("9")
-    assert sorted(driver.widget("entry", "seed").text) == ["1", "2", "3", "9"]
+    assert sorted(driver.get_widget("entry", "seed").text) == ["1", "2", "3", "9"]
 
 
 def test_the_reset_button_restores_the_default(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.window.commands.run_text("k_rep 4"))
     driver.settle()
-    assert driver.widget("slider", "k_rep").value > 0.7
-    driver.push("reset:k_rep")
+    assert driver.get_widget("slider", "k_rep").value > 0.7
+    driver.push_button("reset:k_rep")
     assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 0.3
-    assert driver.widget("slider", "k_rep").value == pytest.approx(0.5, abs=0.02)
-    assert driver.widget("entry", "k_rep").text == "0.3"
+    assert driver.get_widget("slider", "k_rep").value == pytest.approx(0.5, abs=0.02)
+    assert driver.get_widget("entry", "k_rep").text == "0.3"
 
 
 def test_robots_and_seed_are_typed_and_stepped(driver: Driver) -> None:
-    driver.write("robots", "5")
-    driver.key("return")
+    driver.type_into("robots", "5")
+    driver.press_key("return")
     assert len(driver.session.displayed.numbers) == 5
-    driver.push("fewer")
-    driver.push("more")
-    driver.push("more")
+    driver.push_button("fewer")
+    driver.push_button("more")
+    driver.push_button("more")
     assert driver.session.timeline.scenario.robots == 6
-    assert driver.widget("entry", "robots").text == "6"
-    driver.write("seed", "41")
-    driver.key("return")
-    driver.push("seed:next")
+    assert driver.get_widget("entry", "robots").text == "6"
+    driver.type_into("seed", "41")
+    driver.press_key("return")
+    driver.push_button("seed:next")
     assert driver.session.timeline.scenario.seed == 42
-    assert driver.widget("entry", "seed").text == "42"
-    assert driver.widget("button", "seed:next").text == "↻"
+    assert driver.get_widget("entry", "seed").text == "42"
+    assert driver.get_widget("button", "seed:next").text == "↻"
 
 
 def test_tabs_show_pages_and_check_boxes_toggle_layers(driver: Driver) -> None:
     for tab in ViewerPanel.tabs:
-        driver.turn(tab)
+        driver.open_tab(tab)
         assert driver.window.panel.tab == tab
-        assert driver.widget("button", f"tab:{tab}").value
-    driver.turn("show")
+        assert driver.get_widget("button", f"tab:{tab}").value
+    driver.open_tab("show")
     for name in ("cells", "grid"):
         assert name in driver.viewer.view.layers
-        driver.tick(name)
+        driver.toggle_check_box(name)
         assert name not in driver.viewer.view.layers
-        assert not driver.widget("check", name).value
-    box = driver.widget("check", "cells").rect
+        assert not driver.get_widget("check", name).value
+    box = driver.get_widget("check", "cells").rect
     driver.click(box.left + 40, box.centery)  # on the words
     assert "cells" in driver.viewer.view.layers
-    driver.key("1")
-    driver.frames(3)
+    driver.press_key("1")
+    driver.run_frames(3)
     assert "cells" not in driver.viewer.view.layers
-    assert not driver.widget("check", "cells").value
-    driver.key("ctrl+tab")
+    assert not driver.get_widget("check", "cells").value
+    driver.press_key("ctrl+tab")
     assert driver.window.panel.tab == "robot"
 
 
 def test_up_to_four_panes_are_added_and_closed(driver: Driver) -> None:
     for count in (2, 3, 4):
-        driver.push("pane:add")
+        driver.push_button("pane:add")
         assert len(driver.session.timeline.panes) == count
-    assert driver.find("button", "pane:add") is None
+    assert driver.find_widget("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1
-    driver.frames(3)
+    driver.run_frames(3)
     names = [pane.controller.name for pane in driver.session.timeline.panes]
-    driver.push("close:1")
+    driver.push_button("close:1")
     assert [pane.controller.name for pane in driver.session.timeline.panes] == [names[0], *names[2:]]
-    driver.push("close:0")
-    driver.push("close:1")
+    driver.push_button("close:0")
+    driver.push_button("close:1")
     assert [pane.controller.name for pane in driver.session.timeline.panes] == [names[2]]
-    assert driver.find("button", "close:0") is None
+    assert driver.find_widget("button", "close:0") is None
 
 
 def test_the_parameters_belong_to_the_clicked_pane(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, RPF) as driver:
-        assert driver.find("entry", "k_att") is not None
-        driver.click(*driver.pixel(MIDDLE, 1))
+        assert driver.find_widget("entry", "k_att") is not None
+        driver.click(*driver.find_pixel(MIDDLE, 1))
         assert driver.viewer.active_pane == 1
-        assert driver.find("entry", "k_att") is None
-        driver.write("k_rep", "5")
-        driver.key("return")
+        assert driver.find_widget("entry", "k_att") is None
+        driver.type_into("k_rep", "5")
+        driver.press_key("return")
         assert [pane.controller.get_value("k_rep") for pane in driver.session.timeline.panes] == [0.3, 5.0]
 
 
 def test_fail_and_remove_buttons_act_on_the_selected_robot(driver: Driver) -> None:
-    driver.click(*driver.robot(2))
-    driver.push("robot:fail")
+    driver.click(*driver.find_robot_pixel(2))
+    driver.push_button("robot:fail")
     assert driver.session.displayed.numbers == (1, 3)
-    assert driver.widget("button", "robot:fail").text == "Revive"
-    driver.push("robot:fail")
-    assert driver.widget("button", "robot:fail").text == "Fail"
-    driver.push("robot:next")
-    driver.push("robot:remove")
+    assert driver.get_widget("button", "robot:fail").text == "Revive"
+    driver.push_button("robot:fail")
+    assert driver.get_widget("button", "robot:fail").text == "Fail"
+    driver.push_button("robot:next")
+    driver.push_button("robot:remove")
     assert driver.session.displayed.numbers == (1, 2)
 
 
 def test_the_arena_fills_the_place_of_a_hidden_panel(driver: Driver) -> None:
-    driver.key("h")
+    driver.press_key("h")
     assert driver.window.layout.panel[2] == 0
     assert driver.window.panel.hidden
     assert driver.window.layout.arena[2] == 900
     driver.click(880, 40)
-    driver.key("space")
-    driver.frames(3)
-    driver.key("h")
+    driver.press_key("space")
+    driver.run_frames(3)
+    driver.press_key("h")
     assert not driver.window.panel.hidden
     assert driver.session.timeline.end_time > 0.0
 
@@ -333,26 +333,26 @@ def test_pages_look_the_same_when_shown_again(tmp_path: Path) -> None:
         pictures = {}
         for tab in ViewerPanel.tabs * 2:
             driver.window.panel.show_tab(tab)
-            driver.frames(9)
+            driver.run_frames(9)
             if tab in pictures:
-                assert driver.same(pictures[tab]), tab
-            pictures[tab] = driver.picture()
+                assert driver.shows_frame(pictures[tab]), tab
+            pictures[tab] = driver.copy_frame()
         driver.viewer.inspection.active_pane = 1
         driver.window.panel.show_tab("parameters")
-        driver.frames(2, 0.3)
-        assert not driver.same(pictures["parameters"])
+        driver.run_frames(2, 0.3)
+        assert not driver.shows_frame(pictures["parameters"])
         driver.viewer.inspection.active_pane = 0
         driver.viewer.revision += 1
-        driver.frames(2, 0.3)
-        assert driver.same(pictures["parameters"])
+        driver.run_frames(2, 0.3)
+        assert driver.shows_frame(pictures["parameters"])
 
 
 def test_the_panel_does_not_depend_on_earlier_sizes_and_panes(tmp_path: Path) -> None:
     def draw_panel(driver: Driver) -> np.ndarray:
         driver.move(300, 300)
-        driver.frames(3, 0.3)
+        driver.run_frames(3, 0.3)
         left = driver.window.layout.panel[0]
-        return driver.picture()[:, left:].copy()
+        return driver.copy_frame()[:, left:].copy()
 
     with open_viewer(tmp_path, RAPF, RPF, RPF, size=(1100, 700)) as driver:
         expected = draw_panel(driver)
@@ -370,13 +370,13 @@ def test_the_panel_does_not_depend_on_earlier_sizes_and_panes(tmp_path: Path) ->
 
 
 def test_tool_tips_show_the_action_and_its_key(driver: Driver) -> None:
-    button = driver.widget("button", "step")
+    button = driver.get_widget("button", "step")
     driver.move(*button.rect.center)
-    before = driver.picture()
+    before = driver.copy_frame()
     assert button.tip == "Single step (.)"
     time.sleep(TIP_DELAY_S)
-    driver.frames(1)
-    assert not driver.same(before)
+    driver.run_frames(1)
+    assert not driver.shows_frame(before)
 
 
 def test_tool_tips_of_gains_show_their_units(driver: Driver) -> None:

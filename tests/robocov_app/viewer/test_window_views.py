@@ -18,7 +18,7 @@ def play_steps(driver: Driver, steps: int) -> Driver:
     for _ in range(steps):
         driver.session.playback.step()
         driver.window._cost_curves.update()
-    driver.frames(2, 0.2)
+    driver.run_frames(2, 0.2)
     return driver
 
 
@@ -45,18 +45,18 @@ def test_dragging_the_time_line_shows_the_past_and_the_present(driver: Driver) -
 def test_branching_leaves_a_ghost_curve(driver: Driver) -> None:
     play_steps(driver, 120)
     driver.click(*find_time(driver, 0.5))
-    driver.key("b")
+    driver.press_key("b")
     assert driver.session.timeline.is_live
     assert driver.session.playback.is_playing
     assert driver.session.timeline.end_time < 0.7
     assert len(driver.session.timeline.ghosts) == 1
-    driver.frames(3)
+    driver.run_frames(3)
 
 
 def test_an_edit_in_the_past_continues_from_there(driver: Driver) -> None:
     play_steps(driver, 120)
     driver.click(*find_time(driver, 0.5))
-    driver.key("c")
+    driver.press_key("c")
     driver.drag_at((1.0, 3.2), (1.3, 3.2))
     assert driver.session.timeline.is_live
     assert driver.session.timeline.end_time == pytest.approx(0.5, abs=0.05)
@@ -66,26 +66,26 @@ def test_an_edit_in_the_past_continues_from_there(driver: Driver) -> None:
 def test_events_are_marked_on_the_time_line(driver: Driver) -> None:
     play_steps(driver, 60)
     driver.move(*find_time(driver, 0.5))
-    quiet = driver.picture()
+    quiet = driver.copy_frame()
     driver.viewer.attempt(lambda: driver.session.fail_robot(2))
     play_steps(driver, 60)
     (event,) = driver.session.timeline.events
     assert event.time == pytest.approx(1.0)
     assert event.text == "robot 2 failed"
-    assert not driver.same(quiet)
+    assert not driver.shows_frame(quiet)
     driver.move(*find_time(driver, 1.0))
     assert driver.window.chart.hover == driver.at
 
 
 def test_home_end_and_arrow_keys_move_through_time(driver: Driver) -> None:
     play_steps(driver, 120)
-    driver.key("home")
+    driver.press_key("home")
     assert driver.session.displayed.time == 0.0
-    driver.key("right")
+    driver.press_key("right")
     assert 0.0 < driver.session.displayed.time < 0.2
-    driver.key("shift+right")
+    driver.press_key("shift+right")
     assert driver.session.displayed.time == pytest.approx(1.0, abs=0.2)
-    driver.key("end")
+    driver.press_key("end")
     assert driver.session.timeline.is_live
 
 
@@ -99,48 +99,48 @@ def find_cursor(driver: Driver, pane: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("amount", [3, -1])
 def test_zooming_keeps_the_point_under_the_cursor(amount: int, driver: Driver) -> None:
-    driver.wheel(200, 150, 2)
+    driver.turn_wheel(200, 150, 2)
     before = find_cursor(driver)
     zoom = driver.window.canvas._painters[0].camera.zoom
-    driver.wheel(200, 150, amount)
+    driver.turn_wheel(200, 150, amount)
     assert np.allclose(find_cursor(driver), before, atol=1e-9)
     assert (driver.window.canvas._painters[0].camera.zoom > zoom) == (amount > 0)
 
 
 @pytest.mark.parametrize("button", [2, 3])
 def test_other_buttons_pan_with_any_tool(button: int, driver: Driver) -> None:
-    driver.key("p")
-    before = driver.pixel(MIDDLE)
+    driver.press_key("p")
+    before = driver.find_pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
-    assert np.allclose(driver.pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
+    assert np.allclose(driver.find_pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
     assert driver.viewer.tool.build_draw_state(driver.session) == ViewerDrawState()
 
 
 def test_panning_back_to_the_start_completes_no_drawing(driver: Driver) -> None:
-    driver.key("p")
+    driver.press_key("p")
     for corner in ((200, 200), (260, 200), (260, 260)):
         driver.click(*corner)
-    before = driver.pixel(MIDDLE)
+    before = driver.find_pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (200, 200), button=3)
-    assert np.allclose(driver.pixel(MIDDLE), before, atol=1)
+    assert np.allclose(driver.find_pixel(MIDDLE), before, atol=1)
     assert len(driver.viewer.tool.outline.points) == 3
-    driver.key("escape", 2)
+    driver.press_key("escape", 2)
 
 
 def test_fit_shows_the_whole_map_after_zooming_and_panning(driver: Driver) -> None:
     camera = driver.window.canvas._painters[0].camera
     for key in ("ctrl+=", "ctrl+=", "ctrl+left", "ctrl+up", "ctrl+-", "ctrl+right", "ctrl+down"):
         before = driver.window.canvas._painters[0].camera
-        driver.key(key)
+        driver.press_key(key)
         assert driver.window.canvas._painters[0].camera != before, key
-    driver.key("f")
+    driver.press_key("f")
     assert driver.window.canvas._painters[0].camera == camera
 
 
 def test_panes_share_the_camera(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, RPF) as driver:
-        x, y = driver.pixel(MIDDLE, 1)
-        driver.wheel(x, y, 3)
+        x, y = driver.find_pixel(MIDDLE, 1)
+        driver.turn_wheel(x, y, 3)
         first, second = driver.window.canvas._painters
         assert first.camera.zoom == second.camera.zoom
         assert first.camera.center == second.camera.center

@@ -103,14 +103,14 @@ def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(2)
         advance_session(driver.session, 10)
-        driver.key("ctrl+z")
+        driver.press_key("ctrl+z")
         assert driver.viewer.message.startswith("undone: robot 2 failed; back at 0.2 s")
         driver.session.fail_robot(1)
-        driver.key("ctrl+s")
+        driver.press_key("ctrl+s")
         (path,) = tmp_path.glob("*.robocov")
         assert str(path) in driver.viewer.message
         driver.window.commands.run_text(f"open {path}")
-        driver.frames(2)
+        driver.run_frames(2)
         session = driver.viewer.session
         assert session.displayed.numbers == (2, 3)
         assert len(session.timeline.document.list_branches()) == 2
@@ -124,10 +124,10 @@ def test_branches_are_entered_by_keys(tmp_path: Path) -> None:
         advance_session(driver.session, 10)
         driver.session.undo()
         driver.session.fail_robot(1)
-        driver.key("alt+left")
+        driver.press_key("alt+left")
         assert driver.viewer.message == "branch 1 of 2: robot 2 failed"
         assert driver.session.displayed.numbers == (1, 3)
-        driver.key("alt+right")
+        driver.press_key("alt+right")
         assert driver.session.displayed.numbers == (2, 3)
 
 
@@ -144,11 +144,11 @@ def test_a_file_that_is_no_session_is_rejected(tmp_path: Path) -> None:
 def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.session.playback.is_playing = True
-        driver.frames(90)
+        driver.run_frames(90)
         driver.session.fail_robot(2)
-        driver.frames(90)
-        driver.key("ctrl+z")
-        driver.frames(30)
+        driver.run_frames(90)
+        driver.press_key("ctrl+z")
+        driver.run_frames(30)
         ((node, points),) = driver.window.chart.ghosts
         x, y = points[-1].tolist()
         driver.click(x, y + driver.window.layout.chart[1])
