@@ -37,7 +37,7 @@ LEVELS = {
 
 
 @given(sound_sketches(least=2), st.sampled_from(SIDES), st.booleans())
-def test_what_is_aligned_is_level_and_moves_along_one_axis(sketch, side, to_boundary):
+def test_aligned_objects_are_level_and_move_along_one_axis(sketch, side, to_boundary):
     keys = [item.key for item in sketch.obstacles]
     before = boxes(sketch, keys)
     selection = Selection.of(*keys, BOUNDARY) if to_boundary else Selection.of(*keys)
@@ -102,12 +102,12 @@ def test_single_vertices_are_aligned(sketch):
         (lambda s: distribute(s, Selection.of(0, 1, 2), "z"), "an axis"),
     ],
 )
-def test_what_cannot_be_arranged_is_said(sketch, deed, words):
+def test_impossible_arrangements_raise_a_map_error(sketch, deed, words):
     with pytest.raises(MapError, match=words):
         deed(sketch)
 
 
-def test_there_must_be_a_boundary_to_align_with(sketch):
+def test_aligning_with_a_boundary_requires_one(sketch):
     without, keys = Sketch().with_obstacles([box(0.0, 0.0, 1.0, 1.0)])
     with pytest.raises(MapError, match="no boundary"):
         align(without, Selection.of(*keys, BOUNDARY), "left")

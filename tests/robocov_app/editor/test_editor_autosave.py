@@ -31,7 +31,7 @@ def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> N
     keeper.close(discard=False)
 
 
-def test_a_map_comes_back_with_its_file(tmp_path):
+def test_a_draft_is_recovered_with_the_path_of_its_file(tmp_path):
     path = tmp_path / "hall.json"
     disk = write_sketch(SKETCH, path)
     kept(tmp_path / "drafts", with_circles(5), path, disk)
@@ -43,7 +43,7 @@ def test_a_map_comes_back_with_its_file(tmp_path):
     assert check_file(found.version) == "same"
 
 
-def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
+def test_a_draft_with_the_content_of_its_file_is_not_offered(tmp_path):
     path = tmp_path / "hall.json"
     disk = write_sketch(with_circles(3), path)
     kept(tmp_path / "drafts", with_circles(3), path, disk)
@@ -52,7 +52,7 @@ def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
     assert len(find_recoverable(tmp_path / "drafts")) == 1
 
 
-def test_one_that_vanishes_meanwhile_is_said(tmp_path):
+def test_a_draft_that_has_been_removed_raises_an_error(tmp_path):
     kept(tmp_path, SKETCH)
     (found,) = find_recoverable(tmp_path)
     assert found.describe().endswith("never saved")
@@ -61,7 +61,7 @@ def test_one_that_vanishes_meanwhile_is_said(tmp_path):
         found.read_sketch()
 
 
-def test_what_is_no_map_or_has_a_strange_file_is_left_alone(tmp_path):
+def test_drafts_that_are_not_maps_or_have_invalid_versions_are_left_alone(tmp_path):
     kept(tmp_path, SKETCH)
     (file,) = tmp_path.glob("*/draft.json")
     held = json.loads(file.read_text())
@@ -72,7 +72,7 @@ def test_what_is_no_map_or_has_a_strange_file_is_left_alone(tmp_path):
     assert len(find_recoverable(tmp_path)) == 1
 
 
-def test_words_for_days():
+def test_drafts_describe_their_day():
     now = datetime(2030, 5, 17, 12, 0).astimezone()
     for when, words in [
         (now - timedelta(hours=2), "today 10:00"),
@@ -84,7 +84,7 @@ def test_words_for_days():
 
 
 @pytest.mark.parametrize("ends", ["killed", "closed"])
-def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
+def test_changes_during_a_trial_are_in_the_draft(ends, tmp_path):
     drafts = tmp_path / "drafts"
     with open_editor(tmp_path, load_sketch("square"), drafts=drafts) as driver:
         before = len(driver.shapes)

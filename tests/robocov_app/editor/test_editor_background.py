@@ -26,7 +26,7 @@ def pixel_at(background: Background, place):
 
 
 @given(backgrounds, st.floats(-100, 5000), st.floats(-100, 5000))
-def test_pixels_and_places_belong_together(background, x, y):
+def test_pixels_and_positions_correspond(background, x, y):
     place = background.to_world((x, y))
     size = max(1.0, *map(abs, background.corner), *map(abs, place)) / background.scale
     assert pixel_at(background, place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
@@ -41,7 +41,7 @@ def test_pixels_count_downwards_from_the_upper_left_corner():
 
 
 @given(backgrounds)
-def test_a_document_gives_it_back(background):
+def test_a_background_survives_a_document(background):
     assert Background.from_document(background.to_document()) == background
 
 
@@ -63,12 +63,12 @@ def test_a_document_gives_it_back(background):
         {"more": 1},
     ],
 )
-def test_what_is_none_is_none(change):
+def test_invalid_documents_give_no_background(change):
     assert Background.from_document({**PLAN.to_document(), **change}) is None
     assert Background.from_document([]) is None
 
 
-def test_a_picture_is_laid_as_wide_as_asked():
+def test_a_new_background_has_the_given_width():
     background = create_background("plan.png", (400, 300), 10.0)
     assert background.scale == 0.025
     assert background.corners[2] == pytest.approx((10.0, 7.5))
@@ -82,7 +82,7 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 
 
 @given(backgrounds, st.tuples(st.integers(0, 99), st.integers(0, 99)), st.sampled_from([0.1, 2.5, 40.0]))
-def test_two_clicked_points_come_to_be_so_far_apart(background, offset, meters):
+def test_scaling_gives_two_points_the_given_distance(background, offset, meters):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world((offset[0] + 5, offset[1]))
     pixel_a, pixel_b = pixel_at(background, a), pixel_at(background, b)
@@ -92,7 +92,7 @@ def test_two_clicked_points_come_to_be_so_far_apart(background, offset, meters):
     assert scaled.turn == background.turn
 
 
-def test_what_gives_no_scale_is_said():
+def test_impossible_scales_raise_a_map_error():
     for a, b, meters, words in [
         ((1.0, 1.0), (1.01, 1.0), 3.0, "farther apart"),
         ((1.0, 1.0), (5.0, 1.0), 0.0, "above 0 m"),
@@ -104,7 +104,7 @@ def test_what_gives_no_scale_is_said():
 
 
 @given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))
-def test_two_clicked_points_come_to_lie_level_or_upright(background, offset):
+def test_levelling_makes_two_points_level_or_upright(background, offset):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world(offset)
     level = level_background(background, a, b)

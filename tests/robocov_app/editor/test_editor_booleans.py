@@ -34,7 +34,7 @@ WANTED = {
     st.lists(sound_shapes(), min_size=2, max_size=4),
     st.sampled_from(["unite", "subtract", "intersect", "divide"]),
 )
-def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shapes, name):
+def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, name):
     sketch, keys = Sketch("n", boundary=HALL).with_obstacles(shapes)
     raw = [shape.polygon for shape in shapes]
     first, others = raw[0], shapely.union_all(raw[1:])
@@ -80,7 +80,7 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
     np.testing.assert_array_equal(shapely.contains(covered(change.sketch), points), expected)
 
 
-def test_holes_stay():
+def test_booleans_preserve_holes():
     frame = PolygonObstacle(
         ((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)),
         (((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)),),
@@ -101,7 +101,7 @@ def test_holes_stay():
     assert item.shape.polygon.area == pytest.approx(16.0 - np.pi, abs=5e-3)
 
 
-def test_the_result_takes_the_place_of_the_lowest():
+def test_the_result_replaces_the_lowest_obstacle():
     sketch = Sketch(
         obstacles=(
             Item(5, CircleObstacle((9.0, 9.0), 0.5, "other")),
@@ -131,14 +131,14 @@ def test_the_result_takes_the_place_of_the_lowest():
         ("unite", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
     ],
 )
-def test_what_cannot_be_is_said(name, shapes, words):
+def test_impossible_booleans_raise_a_map_error(name, shapes, words):
     sketch, keys = Sketch().with_obstacles(shapes)
     with pytest.raises(MapError, match=words):
         getattr(boolean, name)(sketch, Selection.of(*keys))
 
 
 @given(sound_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
-def test_an_offset_is_as_far_away_as_asked(shape, by):
+def test_an_offset_has_the_given_distance(shape, by):
     sketch, (key,) = Sketch().with_obstacles([shape])
     before = shape.polygon
     try:
@@ -161,7 +161,7 @@ def test_an_offset_is_as_far_away_as_asked(shape, by):
         assert change.sketch.get_item(key).shape.radius == pytest.approx(shape.radius + by, abs=1e-4)
 
 
-def test_what_sticks_out_is_cut_off():
+def test_obstacles_are_clipped_to_the_boundary():
     shapes = [
         CircleObstacle((5.0, 4.0), 1.0, "inside"),
         CircleObstacle((12.0, 4.0), 1.0, "half"),
@@ -200,7 +200,7 @@ def test_crossing_outlines_are_repaired():
 
 
 @given(sound_sketches(least=1))
-def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
+def test_walls_and_circles_become_polygons_of_the_same_area(sketch):
     keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
     assume(keys)
     change = properties.convert_to_polygons(sketch, Selection.of(*keys))

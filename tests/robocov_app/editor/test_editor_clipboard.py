@@ -19,7 +19,7 @@ PILLAR = CircleObstacle((6.0, 4.0), 0.5)
 
 @settings(max_examples=80)
 @given(st.one_of(drafts(), sound_sketches(least=1)))
-def test_what_is_copied_comes_back(sketch):
+def test_copied_objects_can_be_pasted(sketch):
     everything = Selection.select_all(sketch)
     assume(everything)
     text = copy_selection(sketch, everything)
@@ -36,7 +36,7 @@ def test_what_is_copied_comes_back(sketch):
 
 
 @given(sound_sketches(least=1), st.sampled_from([(0.0, 0.0), (3.25, -1.5)]))
-def test_it_comes_where_the_cursor_is(sketch, at):
+def test_objects_are_pasted_at_the_cursor(sketch, at):
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
     change = paste(sketch, copy_selection(sketch, whole), at)
     low_x, low_y, high_x, high_y = transform.compute_bounds(change.sketch, change.selection)
@@ -57,14 +57,14 @@ def test_names_of_starts_stay_apart_and_a_second_boundary_is_left_out_unless_it_
     assert alone.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
 
 
-def test_what_was_on_the_grid_stays_on_it():
+def test_pasted_objects_stay_on_the_grid():
     wall = WallObstacle(((1.0, 1.5), (2.0, 1.5)), 0.1)
     sketch, keys = Sketch(boundary=HALL).with_obstacles([wall])
     change = paste(sketch, copy_selection(sketch, Selection.of(*keys)), (5.13, 3.38), grid=0.5)
     assert change.sketch.obstacles[-1].shape.points == ((4.5, 3.5), (5.5, 3.5))
 
 
-def test_copying_nothing_is_said():
+def test_copying_nothing_raises_a_map_error():
     with pytest.raises(MapError, match="to copy"):
         copy_selection(Sketch(), Selection())
     with pytest.raises(MapError, match="to copy"):
@@ -113,7 +113,7 @@ def test_other_texts_can_be_pasted_too():
         '{"kind": "circle", "kind": "wall"}',
     ],
 )
-def test_what_cannot_be_pasted_is_said_in_a_sentence(text):
+def test_unusable_text_raises_a_map_error(text):
     with pytest.raises(MapError) as caught:
         paste(Sketch(boundary=HALL), text)
     assert "\n" not in str(caught.value)

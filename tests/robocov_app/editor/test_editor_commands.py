@@ -33,7 +33,7 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
 # the list of actions
 
 
-def test_no_key_does_two_things_and_every_command_has_a_group(driver: EditorDriver) -> None:
+def test_keys_are_unique_and_every_command_has_a_group(driver: EditorDriver) -> None:
     listed = driver.window.commands.commands
     keys = [key for command in listed for key in command.keys]
     assert len(keys) == len(set(keys))
@@ -42,7 +42,7 @@ def test_no_key_does_two_things_and_every_command_has_a_group(driver: EditorDriv
     assert {command.group for command in listed if not command.hidden} == set(GROUPS)
 
 
-def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> None:
+def test_shared_commands_have_the_same_keys_in_the_viewer(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         theirs = {command.name: command.keys for command in driver.window.commands.commands}
     with open_editor(tmp_path) as driver:
@@ -68,7 +68,7 @@ def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> 
     assert ours["show:grid"] == theirs["layer:grid"] and ours["tool:select"] == theirs["tool:hand"]
 
 
-def test_every_action_of_the_menus_is_one(driver: EditorDriver) -> None:
+def test_every_menu_item_is_a_command(driver: EditorDriver) -> None:
     known = {command.name for command in driver.window.commands.commands}
     vertex = frozenset({Vertex(0, 0, 1)})
     for selection in (
@@ -105,7 +105,7 @@ def test_booleans_unite_subtract_and_intersect(driver: EditorDriver) -> None:
     assert driver.sketch.obstacles[0].geometry.area == pytest.approx(1)
 
 
-def test_aligning_and_distributing(driver: EditorDriver) -> None:
+def test_commands_align_and_distribute(driver: EditorDriver) -> None:
     driver.select(0, 1, 2)
     driver.press_key("alt+left")
     assert {item.geometry.bounds[0] for item in driver.sketch.obstacles[:3]} == {1.0}
@@ -117,7 +117,7 @@ def test_aligning_and_distributing(driver: EditorDriver) -> None:
     assert lows[1] - highs[0] == pytest.approx(lows[2] - highs[1], abs=1e-3)
 
 
-def test_turning_and_mirroring(driver: EditorDriver) -> None:
+def test_commands_turn_and_mirror(driver: EditorDriver) -> None:
     driver.select(3)
     driver.press_key("q")
     assert {x for x, _ in driver.shapes[3].points} == {2.0}
@@ -165,7 +165,7 @@ def test_copies_go_through_the_clipboard_also_to_another_window(driver: EditorDr
         assert "empty" in other.said
 
 
-def test_deleting_and_duplicating(driver: EditorDriver) -> None:
+def test_commands_delete_and_duplicate(driver: EditorDriver) -> None:
     driver.select(0)
     driver.press_key("ctrl+d")
     assert len(driver.shapes) == 6 and driver.shapes[5].vertices[0] == (1.5, 0.5)
@@ -178,7 +178,7 @@ def test_deleting_and_duplicating(driver: EditorDriver) -> None:
     assert driver.shapes == []
 
 
-def test_tab_goes_round_all_things(driver: EditorDriver) -> None:
+def test_tab_cycles_through_all_objects(driver: EditorDriver) -> None:
     seen = []
     for _ in range(7):
         driver.press_key("tab")
@@ -223,7 +223,7 @@ def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
         ("rotate 90", (1, 1, 4, 4)),
     ],
 )
-def test_typed_commands_change_what_is_selected(
+def test_typed_commands_change_the_selection(
     driver: EditorDriver, text: str, wanted: tuple[float, ...]
 ) -> None:
     driver.select(0)
@@ -272,7 +272,7 @@ def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -
         assert palette(driver).text == "array "
 
 
-def test_a_problem_is_mended_by_the_button_beside_it(driver: EditorDriver) -> None:
+def test_a_problem_is_fixed_by_the_button_next_to_it(driver: EditorDriver) -> None:
     driver.editor.apply(create.add_obstacle(driver.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
     driver.settle()
     driver.press_key("ctrl+tab", times=3)
@@ -284,7 +284,7 @@ def test_a_problem_is_mended_by_the_button_beside_it(driver: EditorDriver) -> No
     assert driver.message == "circle “lamp” deleted"
 
 
-def test_what_was_typed_and_cannot_be_done_stays_to_be_corrected(tmp_path: Path) -> None:
+def test_a_refused_command_stays_for_correction(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
         driver.run_command("grid 99999")
         assert "99999" in palette(driver).error and palette(driver).text == "grid 99999"

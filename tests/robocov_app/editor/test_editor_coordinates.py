@@ -48,7 +48,7 @@ LAST = (1.0, 2.0)
         ("@1<0.5rad", (1.0 + math.cos(0.5), 2.0 + math.sin(0.5))),
     ],
 )
-def test_places(text, point):
+def test_typed_positions_are_parsed(text, point):
     assert parse_point(text, last=LAST) == pytest.approx(point, abs=1e-9)
 
 
@@ -77,14 +77,14 @@ def test_places(text, point):
         "٣ ٢ x",
     ],
 )
-def test_what_is_no_place_is_said_in_a_sentence(text):
+def test_invalid_positions_raise_a_map_error(text):
     with pytest.raises(MapError) as caught:
         parse_point(text, last=LAST)
     assert "\n" not in str(caught.value)
     assert repr(text) in str(caught.value)
 
 
-def test_relative_places_need_a_point_before():
+def test_relative_positions_require_a_previous_point():
     with pytest.raises(MapError, match="no point before"):
         parse_point("@1 0")
     assert parse_point("1 0") == (1.0, 0.0)
@@ -114,7 +114,7 @@ def test_relative_places_need_a_point_before():
         ("1.1in", None, 0.02794),
     ],
 )
-def test_lengths(text, now, length):
+def test_typed_lengths_are_parsed(text, now, length):
     assert parse_length(text, now=now) == length
 
 
@@ -133,7 +133,7 @@ def test_lengths(text, now, length):
         ("3 furlongs", None),
     ],
 )
-def test_what_is_no_length_is_said(text, now):
+def test_invalid_lengths_raise_a_map_error(text, now):
     with pytest.raises(MapError, match=r"^'"):
         parse_length(text, now=now)
 
@@ -151,17 +151,17 @@ def test_what_is_no_length_is_said(text, now):
         ("1.5", (1.5, 1.5)),
     ],
 )
-def test_sizes(text, size):
+def test_typed_sizes_are_parsed(text, size):
     assert parse_size(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "0", "3 x 0", "-1 x 2", "3 x", "x", "3 x 2 x 1", "50%"])
-def test_what_is_no_size_is_said(text):
+def test_invalid_sizes_raise_a_map_error(text):
     with pytest.raises(MapError, match=r"^'"):
         parse_size(text)
 
 
-def test_angles():
+def test_typed_angles_are_parsed():
     assert [parse_angle(text) for text in ("45", "45°", "-90 deg", "22,5", "3.141592653589793rad")] == [
         45.0,
         45.0,
@@ -173,7 +173,7 @@ def test_angles():
         parse_angle("north")
 
 
-def test_a_mere_length_goes_towards_the_cursor():
+def test_a_single_length_leads_towards_the_cursor():
     assert parse_next_point("2", LAST, (1.0, 9.0)) == (1.0, 4.0)
     assert parse_next_point("2", LAST, (4.0, 6.0)) == pytest.approx((2.2, 3.6))
     assert parse_next_point("50 cm", LAST, (0.0, 2.0)) == (0.5, 2.0)
@@ -190,7 +190,7 @@ meters = st.integers(-(10**7), 10**7).map(lambda k: k / 1000)
 
 
 @given(meters, meters, st.sampled_from([" ", "; ", " ;", ", "]), st.booleans())
-def test_what_is_written_plainly_is_read(x, y, between, comma):
+def test_plainly_formatted_numbers_are_parsed(x, y, between, comma):
     text = f"{x:.3f}{between}{y:.3f}"
     if comma and between != ", ":
         text = text.replace(".", ",")
@@ -199,7 +199,7 @@ def test_what_is_written_plainly_is_read(x, y, between, comma):
 
 
 @given(st.text(alphabet=st.sampled_from("0123456789 .,;<@+-*/%x'\"mcke°ÿ∠"), max_size=12))
-def test_whatever_is_typed_gives_a_number_or_a_sentence(text):
+def test_any_text_gives_a_number_or_a_map_error(text):
     for read in (
         lambda: parse_point(text, last=LAST),
         lambda: parse_next_point(text, LAST, (3.0, 3.0)),

@@ -30,7 +30,7 @@ def heavy(density=ONE) -> Sketch:
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
-def test_it_passes_through_unchanged(density, tmp_path):
+def test_a_density_survives_editing_and_saving(density, tmp_path):
     path = tmp_path / "heavy.json"
     save_map(Environment("heavy", RING, density=density), path)
     sketch, disk = read_sketch(path)
@@ -57,7 +57,7 @@ def test_a_picture_is_read_when_the_map_is(tmp_path):
         read_sketch(path)
 
 
-def test_what_is_no_density_is_refused_with_its_place():
+def test_an_invalid_density_is_reported_with_its_path():
     text = json.dumps(to_json(Environment("heavy", RING)) | {"density": {"kind": "gausians"}})
     with pytest.raises(MapError, match=r"density\.kind"):
         parse_sketch(text, "mine.json")
@@ -67,7 +67,7 @@ def test_what_is_no_density_is_refused_with_its_place():
     assert build_sketch(document).density == ONE
 
 
-def test_a_density_that_is_nothing_in_the_free_space_is_a_problem():
+def test_a_density_of_zero_in_the_free_space_is_a_problem():
     nothing = WeightedPolygons(KINDS["rooms"].areas[1:], 0.0)
     covering = sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
     grave = [problem.message for problem in problems(covering) if problem.is_error]
@@ -83,13 +83,13 @@ class TestEdits:
         assert len(density_edits.list_features(two)) == 2
         assert density_edits.add_peak(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
 
-    def test_with_the_last_one_the_density_goes(self):
+    def test_removing_the_last_hot_spot_removes_the_density(self):
         assert density_edits.remove_feature(heavy(), 0).sketch.density is None
         assert density_edits.remove_density(heavy()).sketch.density is None
         with pytest.raises(MapError, match="the same weight already"):
             density_edits.remove_density(sheet())
 
-    def test_move_size_weigh(self):
+    def test_hot_spots_are_moved_resized_and_weighted(self):
         moved = density_edits.move_feature(heavy(), 0, 1.0, 2.0).sketch
         assert density_edits.list_features(moved)[0].center == (4.0, 5.0)
         sized = density_edits.resize_peak(moved, 0, 2.5).sketch
@@ -98,7 +98,7 @@ class TestEdits:
         assert weighed.density == Gaussians((Gaussian((4.0, 5.0), 7.0, sigma=2.5),), 0.5)
         assert density_edits.set_floor(weighed, 0.0).sketch.density.floor == 0.0
 
-    def test_one_that_is_not_round_keeps_its_shape(self):
+    def test_an_elliptic_hot_spot_keeps_its_shape(self):
         slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
         sketch = heavy(Gaussians((slanted,), 0.5))
         spread = density_edits.compute_spread(slanted)
@@ -119,7 +119,7 @@ class TestEdits:
             (lambda: density_edits.add_peak(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
         ],
     )
-    def test_what_cannot_be(self, act, words):
+    def test_impossible_edits_raise_a_map_error(self, act, words):
         with pytest.raises(MapError, match=words):
             act()
 
@@ -129,19 +129,19 @@ class TestEdits:
         weight=st.floats(0.001, 1000.0),
     )
     @settings(max_examples=15, deadline=None)
-    def test_whatever_is_drawn_can_be_saved(self, center, sigma, weight):
+    def test_any_drawn_density_can_be_saved(self, center, sigma, weight):
         sketch = density_edits.add_peak(heavy(), center, sigma, weight).sketch
         assert parse_sketch(dump_sketch(sketch), "again").density == sketch.density
         assert sketch.build_environment().density == sketch.density
 
-    def test_in_words(self):
+    def test_densities_are_described(self):
         assert density_edits.describe_density(None) == "none: all positions have the same weight"
         assert density_edits.describe_density(ONE) == "1 hot spot, floor 0.5"
         assert density_edits.describe_density(KINDS["bilinear"]) == "picture, 13 x 11"
         assert density_edits.describe_density(KINDS["rooms"]) == "2 areas, 0.3 to 4"
 
 
-def test_with_the_mouse_and_by_typing(tmp_path):
+def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
     with open_editor(tmp_path, sheet()) as driver:
         plain = driver.copy_frame()
         driver.press_key("d")
@@ -186,7 +186,7 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         driver.run_frames(2)
 
 
-def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
+def test_a_canceled_drag_changes_nothing(tmp_path):
     with open_editor(tmp_path, sheet()) as driver:
         driver.press_key("d")
         driver.press(*driver.find_pixel((3, 3)))
@@ -201,7 +201,7 @@ AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
 
 
 class TestAreas:
-    def test_they_are_added_moved_weighed_and_taken_away(self):
+    def test_areas_are_added_moved_weighted_and_removed(self):
         sketch = density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch
         assert sketch.density == WeightedPolygons((WeightedArea(AREA, 3.0),), 1.0)
         moved = density_edits.move_feature(sketch, 0, 1.0, -1.0).sketch
@@ -239,7 +239,7 @@ class TestAreas:
             (lambda s: density_edits.set_weight(density_edits.set_floor(s, 0.0).sketch, 0, 0.0), "above 0"),
         ],
     )
-    def test_what_cannot_be(self, act, words):
+    def test_impossible_edits_raise_a_map_error(self, act, words):
         with pytest.raises(MapError, match=words):
             act(density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch)
 

@@ -35,7 +35,7 @@ EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 
 @settings(max_examples=150)
 @given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), sound_sketches()))
-def test_a_sketch_comes_back_from_its_document(sketch):
+def test_a_sketch_survives_its_document(sketch):
     document = to_document(sketch)
     again = build_sketch(json.loads(json.dumps(document)), "again")
     assert again == sketch
@@ -46,14 +46,14 @@ def test_a_sketch_comes_back_from_its_document(sketch):
 
 @settings(max_examples=60)
 @given(st.one_of(drafts(), sound_sketches()))
-def test_a_sketch_comes_back_from_its_text(sketch):
+def test_a_sketch_survives_its_text(sketch):
     text = dump_sketch(sketch)
     assert parse_sketch(text.encode(), "again") == sketch
     assert dump_sketch(parse_sketch(text, "again")) == text
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())
-def test_bundled_maps_pass_through_unchanged(name):
+def test_bundled_maps_are_unchanged(name):
     environment = load_map(name)
     sketch = Sketch.from_environment(environment)
     assert sketch.build_environment() == environment
@@ -63,7 +63,7 @@ def test_bundled_maps_pass_through_unchanged(name):
 
 
 @given(sound_sketches())
-def test_what_runs_is_what_a_saved_map_is(sketch):
+def test_a_sketch_runs_like_its_saved_map(sketch):
     try:
         environment = sketch.build_environment("here")
     except MapError as error:
@@ -83,7 +83,7 @@ def test_keys_are_not_in_the_file():
     assert again == renumbered(sketch)
 
 
-def test_a_number_too_long_for_a_map_is_still_a_draft():
+def test_a_draft_may_contain_numbers_that_no_map_can_have():
     sketch = Sketch(boundary=((0.0, 0.0), (1e300, 0.0), (0.0, 1e-300)))
     assert build_sketch(json.loads(json.dumps(to_document(sketch)))) == sketch
     with pytest.raises(MapError, match="boundary"):
@@ -119,7 +119,7 @@ def test_a_number_too_long_for_a_map_is_still_a_draft():
         ({**EMPTY, "boundary": [[0, float("nan")]]}, "finite"),
     ],
 )
-def test_what_is_made_differently_is_refused_with_its_place(document, words):
+def test_invalid_documents_are_reported_with_the_path(document, words):
     with pytest.raises(MapError, match=words) as caught:
         build_sketch(document, "mine.json")
     assert str(caught.value).startswith("mine.json: ")
@@ -134,7 +134,7 @@ def test_errors_in_text_have_lines():
         parse_sketch("# a map", "mine.json")
 
 
-def test_almost_nothing_is_a_draft():
+def test_a_header_is_a_draft():
     sketch = build_sketch({"format": "robocov-map", "version": 1})
     assert sketch == Sketch(name="")
     assert sketch.bounds is None
@@ -158,7 +158,7 @@ def test_moving_a_vertex_changes_one_line(data):
     assert len(before) == len(after)
 
 
-def test_numbers_have_no_noise():
+def test_numbers_are_written_without_rounding_errors():
     sketch = Sketch(boundary=((0.1 + 0.2, -0.0), (3.0, 1e-17), (0.5, 2.0)))
     (line,) = [line for line in dump_sketch(sketch).splitlines() if "boundary" in line]
     assert line == '  "boundary": [[0.3, 0], [3, 0], [0.5, 2]],'
@@ -176,7 +176,7 @@ def noted() -> Sketch:
     return Sketch("n", boundary=HALL, obstacles=items, background=Background("plan.png", (40, 30)))
 
 
-def test_notes_are_free_keys_of_a_map_that_runs():
+def test_notes_are_in_the_free_keys_of_a_valid_map():
     environment = noted().build_environment()
     assert environment.extra["editor"]["notes"] == [
         {"obstacle": 0, "name": "pillar", "note": "ask Ada"},
@@ -213,7 +213,7 @@ def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
         {"notes": [{"obstacle": 0, "note": "x", "by": "somebody"}]},
     ],
 )
-def test_what_others_keep_stays_untouched(foreign):
+def test_free_keys_of_other_programs_are_unchanged(foreign):
     document = {**EMPTY, "boundary": [[0, 0], [1, 0], [0, 1]], "extra": {"editor": foreign, "mine": 1}}
     sketch = build_sketch(document)
     assert sketch.extra == {"editor": foreign, "mine": 1}
@@ -228,7 +228,7 @@ MARKS = {"note": "x", "group": "desks", "locked": True}
 
 
 @given(st.dictionaries(st.sampled_from(["editor", "editor 2", "mine"]), json_values))
-def test_free_keys_with_notes_come_apart_again(extra):
+def test_notes_are_separated_from_other_free_keys(extra):
     notes, background, others = read_marks(write_marks(extra, {1: MARKS}, ["a", "b"], None), ["a", "b"])
     assert (notes, background) == ({1: MARKS}, None)
     # an empty object of the editor's own is none
@@ -246,7 +246,7 @@ def test_every_shape_has_a_valid_geometry(shape):
     assert np.isfinite(points).all()
 
 
-def test_geometry_of_sound_shapes_is_theirs():
+def test_valid_shapes_keep_their_geometry():
     for shape in (
         CircleObstacle((1.0, 2.0), 0.5),
         WallObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.1),
@@ -258,7 +258,7 @@ def test_geometry_of_sound_shapes_is_theirs():
     assert build_geometry(PolygonObstacle(())).is_empty
 
 
-def test_what_no_map_could_hold_covers_nothing():
+def test_shapes_beyond_the_limits_of_maps_cover_nothing():
     # a circle of 1e12 m would be a polygon of millions of sides
     for shape in (
         CircleObstacle((1.0, 1.0), 1e12),
@@ -272,7 +272,7 @@ def test_what_no_map_could_hold_covers_nothing():
     assert build_geometry(holed).area == pytest.approx(96.0)
 
 
-def test_parts_are_found_by_key():
+def test_obstacles_and_starts_are_found_by_key():
     sketch, (a, b) = Sketch().with_annotated_obstacles(
         [(CircleObstacle((0.0, 0.0), 1.0), ""), (WallObstacle(HALL, 0.1), "note")]
     )
@@ -291,7 +291,7 @@ def test_parts_are_found_by_key():
     assert sketch.get_start("t") == UniformStart()
 
 
-def test_bounds_hold_everything():
+def test_bounds_contain_everything():
     sketch = Sketch(
         boundary=HALL,
         obstacles=(Item(0, CircleObstacle((-1.0, 3.0), 2.0)),),
@@ -303,7 +303,7 @@ def test_bounds_hold_everything():
     assert hidden.bounds == pytest.approx((-3.0, -4.0, 13.0, 9.0))
 
 
-def test_a_pickled_item_leaves_out_what_can_be_derived():
+def test_a_pickled_item_omits_derived_values():
     item = Item(0, CircleObstacle((1.0, 1.0), 0.5), "x")
     bare = pickle.dumps(item)
     assert item.geometry.area > 0.0

@@ -22,7 +22,7 @@ def changed(document: Document, radius: float = 1.0) -> None:
     document.update_draft()
 
 
-def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None:
+def test_a_new_document_has_a_boundary_and_no_changes(tmp_path: Path) -> None:
     document = Document.new(None)
     assert document.history.sketch.boundary == DEFAULT_BOUNDARY
     assert not document.history.has_unsaved_changes and document.title == "Untitled"
@@ -31,7 +31,7 @@ def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None
     assert document.suggest_path(tmp_path) == tmp_path / "untitled-1.json"
 
 
-def test_saving_and_opening_again(tmp_path: Path) -> None:
+def test_a_saved_document_can_be_opened(tmp_path: Path) -> None:
     document = Document.new(None)
     changed(document)
     assert document.history.has_unsaved_changes
@@ -61,7 +61,7 @@ def test_a_bundled_map_opens_as_a_copy_and_is_never_written(tmp_path: Path) -> N
     assert bundled.read_bytes() == before
 
 
-def test_another_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+def test_another_file_is_not_replaced_without_permission(tmp_path: Path) -> None:
     target = tmp_path / "there.json"
     target.write_text("something else")
     document = Document.new(None)
@@ -96,7 +96,7 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
     assert document.history.sketch == mine
 
 
-def test_keeping_mine_lets_saving_replace_what_is_there(tmp_path: Path) -> None:
+def test_ignoring_a_change_lets_saving_replace_the_file(tmp_path: Path) -> None:
     document = Document.new(None)
     changed(document)
     document.save(tmp_path / "plan.json")
@@ -107,7 +107,7 @@ def test_keeping_mine_lets_saving_replace_what_is_there(tmp_path: Path) -> None:
     assert len(load_map(tmp_path / "plan.json").obstacles) == 1
 
 
-def test_a_file_that_goes_is_noticed(tmp_path: Path) -> None:
+def test_a_removed_file_is_noticed(tmp_path: Path) -> None:
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
     (tmp_path / "plan.json").unlink()
@@ -116,7 +116,7 @@ def test_a_file_that_goes_is_noticed(tmp_path: Path) -> None:
     assert (tmp_path / "plan.json").exists()
 
 
-def test_a_draft_is_kept_and_recovered_and_saving_takes_it_away(tmp_path: Path) -> None:
+def test_a_draft_is_recovered_and_removed_by_saving(tmp_path: Path) -> None:
     drafts = tmp_path / "drafts"
     document = Document(sheet(), drafts)
     changed(document)
@@ -134,7 +134,7 @@ def test_a_draft_is_kept_and_recovered_and_saving_takes_it_away(tmp_path: Path) 
     assert find_recoverable(drafts) == ()
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_reported(tmp_path: Path) -> None:
     document = Document.new(None)
     with pytest.raises(RobocovError, match="no-such-folder"):
         document.save(tmp_path / "no-such-folder" / "plan.json")
@@ -142,7 +142,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     assert document.autosaver.problem == ""
 
 
-def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):
+def test_naming_a_map_on_saving_preserves_redo(tmp_path):
     document = Document.new(None)
     changed(document)
     changed(document, 2.0)
@@ -163,7 +163,7 @@ def test_a_file_with_a_long_or_strange_name_names_its_map_as_far_as_it_can(tmp_p
     assert document.history.sketch.name == "a b" + 97 * "x"
 
 
-def test_a_map_that_cannot_run_would_spoil_a_valid_one(tmp_path):
+def test_an_invalid_map_would_replace_a_valid_one(tmp_path):
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
     assert not document.would_replace_valid_map(tmp_path / "plan")

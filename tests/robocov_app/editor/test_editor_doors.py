@@ -26,7 +26,7 @@ def test_the_pieces_keep_name_note_and_group(sketch):
     assert change.selection.items == {3, second.key}
 
 
-def test_a_door_goes_round_a_corner_and_to_an_end(sketch):
+def test_a_door_may_include_a_corner_or_an_end(sketch):
     round_it = create.open_wall(sketch, 3, (3.5, 0.1), (4.0, 0.5)).sketch
     assert [i.shape.points for i in round_it.obstacles[:2]] == [
         ((0.0, 0.0), (3.5, 0.0)),
@@ -36,7 +36,7 @@ def test_a_door_goes_round_a_corner_and_to_an_end(sketch):
     assert [i.shape.points for i in at_end.obstacles[:-1]] == [((1.0, 0.0), (4.0, 0.0), (4.0, 3.0))]
 
 
-def test_which_wall_is_meant(sketch):
+def test_the_nearest_wall_is_found(sketch):
     assert create.find_wall(sketch, (2.0, 0.05), 0.1) == 3
     assert create.find_wall(sketch, (8.0, 8.0), 0.1) is None
     a, b = create.compute_door_ends(sketch, 3, (0.1, 0.0), 1.0)
@@ -52,6 +52,6 @@ def test_which_wall_is_meant(sketch):
         (lambda s: create.open_wall(s, 5, (0.0, 0.0), (4.0, 3.0)), "opened in walls"),
     ],
 )
-def test_what_cannot_be(sketch, deed, words):
+def test_impossible_doors_raise_a_map_error(sketch, deed, words):
     with pytest.raises(MapError, match=words):
         deed(sketch)

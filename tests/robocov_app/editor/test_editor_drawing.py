@@ -29,7 +29,7 @@ def test_a_polygon_is_closed_by_enter_a_double_click_or_its_first_corner(driver:
     assert driver.message == "polygon drawn"
 
 
-def test_what_is_drawn_snaps_to_the_grid_and_with_ctrl_to_nothing(driver: EditorDriver) -> None:
+def test_drawing_snaps_to_the_grid_unless_ctrl_is_pressed(driver: EditorDriver) -> None:
     driver.press_key("r")
     driver.drag_at((1.02, 0.98), (2.0, 2.0), (3.03, 2.01))
     assert set(driver.shapes[0].vertices) == {(1, 1), (3, 1), (3, 2), (1, 2)}
@@ -38,7 +38,7 @@ def test_what_is_drawn_snaps_to_the_grid_and_with_ctrl_to_nothing(driver: Editor
     assert all(abs(x * 10 - round(x * 10)) > 1e-3 for x, _ in driver.shapes[1].vertices)
 
 
-def test_escape_gives_up_and_backspace_takes_a_point_back(driver: EditorDriver) -> None:
+def test_escape_cancels_and_backspace_removes_a_point(driver: EditorDriver) -> None:
     driver.press_key("p")
     driver.click_all((2, 2), (4, 2), (5, 5))
     driver.press_key("backspace")
@@ -52,7 +52,7 @@ def test_escape_gives_up_and_backspace_takes_a_point_back(driver: EditorDriver) 
     assert driver.editor.tool.name == "select"
 
 
-def test_too_few_points_are_told(driver: EditorDriver) -> None:
+def test_too_few_points_are_reported(driver: EditorDriver) -> None:
     driver.press_key("p")
     driver.click_all((2, 2), (4, 2))
     driver.press_key("return")
@@ -76,7 +76,7 @@ def test_a_wall_takes_typed_lengths_and_coordinates(driver: EditorDriver) -> Non
     assert driver.shapes == [WallObstacle(((1, 1), (1, 3.5), (3, 3.5), (3, 2.5)), 0.1)]
 
 
-def test_what_is_typed_can_be_corrected_given_up_and_wrong(driver: EditorDriver) -> None:
+def test_typed_values_can_be_corrected_and_canceled(driver: EditorDriver) -> None:
     driver.press_key("w")
     driver.click_all((1, 1))
     driver.move_to((1, 4))
@@ -105,7 +105,7 @@ def test_the_width_of_walls_is_changed_by_brackets(driver: EditorDriver) -> None
     assert driver.shapes[0].width == pytest.approx(0.156, abs=1e-3)
 
 
-def test_rectangles_and_circles_by_two_clicks_and_by_size(driver: EditorDriver) -> None:
+def test_rectangles_and_circles_are_drawn_by_clicks_and_by_size(driver: EditorDriver) -> None:
     driver.press_key("r")
     driver.click_all((1, 1))
     driver.move_to((0.5, 3))
@@ -220,7 +220,7 @@ def test_doors_are_opened_by_a_click_and_by_dragging(driver: EditorDriver) -> No
     assert driver.editor.has_error_message and "in walls" in driver.message
 
 
-def test_starts_are_discs_places_and_anywhere(driver: EditorDriver) -> None:
+def test_starts_are_discs_positions_or_the_free_space(driver: EditorDriver) -> None:
     driver.press_key("s")
     driver.drag_at((2, 2), (2.5, 2), (3, 2))
     driver.press_key("shift+s")
@@ -233,7 +233,7 @@ def test_starts_are_discs_places_and_anywhere(driver: EditorDriver) -> None:
     assert len(specs) == 3 and len({name for name, _ in driver.sketch.starts}) == 3
 
 
-def test_measuring_tells_and_changes_nothing(driver: EditorDriver) -> None:
+def test_measuring_shows_lengths_and_changes_nothing(driver: EditorDriver) -> None:
     before = driver.sketch
     driver.press_key("m")
     driver.drag_at((1, 1), (3, 3), (4, 5))
@@ -270,13 +270,13 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDri
     assert driver.sketch.background is None
 
 
-def test_two_points_for_a_picture_that_is_not_there(driver: EditorDriver) -> None:
+def test_scaling_requires_a_picture(driver: EditorDriver) -> None:
     driver.press_key("i")
     driver.click_all((2, 2))
     assert driver.editor.has_error_message and "no picture" in driver.message
 
 
-def test_a_map_is_made_level_along_a_line_that_was_measured(driver: EditorDriver) -> None:
+def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:
     driver.press_key("w")
     driver.drag_at((1, 1), (2, 1), (5, 2.5))
     driver.run_command("level")

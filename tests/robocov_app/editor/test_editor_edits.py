@@ -51,7 +51,7 @@ ALL = Selection(frozenset({0, 1, 2}), frozenset(), frozenset({"corner", "two", "
 # drawing
 
 
-def test_what_is_drawn_lies_on_top_and_is_selected(sketch):
+def test_drawn_obstacles_are_on_top_and_selected(sketch):
     change = create.add_circle(sketch, (2.00004, 3.0), 0.70001)
     item = change.sketch.obstacles[-1]
     assert item.shape == CircleObstacle((2.0, 3.0), 0.7)
@@ -129,7 +129,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: properties.convert_to_boundary(s, Selection.of(1)), "select one polygon"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_a_sentence(sketch, deed, words):
+def test_impossible_edits_raise_a_map_error(sketch, deed, words):
     with pytest.raises(MapError, match=words) as caught:
         deed(sketch)
     assert "\n" not in str(caught.value)
@@ -151,7 +151,7 @@ def distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
 
 
 @given(sound_sketches(least=1), st.sampled_from([0.0, 1.0, -2.7, 0.1234]), places)
-def test_moving_is_what_shapely_says(sketch, dx, about):
+def test_moving_agrees_with_shapely(sketch, dx, about):
     change = transform.move(sketch, Selection.select_all(sketch), dx, 0.5)
     expected = affinity.translate(everything(sketch), dx, 0.5)
     assert distance(everything(change.sketch), expected) <= 1e-4
@@ -160,7 +160,7 @@ def test_moving_is_what_shapely_says(sketch, dx, about):
 
 
 @given(sound_sketches(least=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), places)
-def test_turning_is_what_shapely_says(sketch, degrees, about):
+def test_turning_agrees_with_shapely(sketch, degrees, about):
     polygons = [item.key for item in sketch.obstacles if isinstance(item.shape, PolygonObstacle)]
     change = transform.rotate(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
     for key in polygons:
@@ -210,7 +210,7 @@ def test_stretching_makes_polygons_of_circles_and_keeps_the_width_of_walls(sketc
 
 
 @given(sound_shapes(), st.sampled_from([0.2, 1.0, 3.7]), st.sampled_from([0.5, 2.0]))
-def test_a_typed_size_is_the_size(shape, width, height):
+def test_resizing_gives_the_typed_size(shape, width, height):
     sketch, (key,) = Sketch().with_obstacles([shape])
     before = transform.compute_bounds(sketch, Selection.of(key))
     for wanted in ((width, height), (width, None), (None, height)):
@@ -230,7 +230,7 @@ def test_a_typed_size_is_the_size(shape, width, height):
             assert (low_x, low_y) == pytest.approx(before[:2], abs=3e-4)
 
 
-def test_a_typed_place_is_the_place(sketch):
+def test_placing_gives_the_typed_position(sketch):
     change = transform.place(sketch, Selection.of(0), 4.0, None)
     assert transform.compute_bounds(change.sketch, change.selection) == (4.0, 1.0, 6.0, 2.0)
     change = transform.place(sketch, Selection.of(1, "corner"), 0.0, 0.0)
@@ -240,13 +240,13 @@ def test_a_typed_place_is_the_place(sketch):
 
 
 @given(sound_sketches(least=1), st.sampled_from(["x", "y"]))
-def test_mirroring_twice_is_nothing(sketch, axis):
+def test_mirroring_twice_changes_nothing(sketch, axis):
     whole = Selection.select_all(sketch)
     once = transform.mirror(sketch, whole, axis).sketch
     assert distance(everything(transform.mirror(once, whole, axis).sketch), everything(sketch)) <= 3e-4
 
 
-def test_single_vertices_go_along_unless_their_owner_does(sketch):
+def test_vertices_are_moved_once_with_their_owner(sketch):
     corner = Vertex(0, 0, 2)
     change = transform.move(sketch, Selection(frozenset({1}), frozenset({corner})), 1.0, 0.0)
     assert change.sketch.get_item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
@@ -257,7 +257,7 @@ def test_single_vertices_go_along_unless_their_owner_does(sketch):
     assert turned.sketch.get_item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
 
-def test_copies(sketch):
+def test_objects_are_duplicated_and_copied_to_a_grid(sketch):
     noted = properties.set_note(sketch, Selection.of(0), "oak").sketch
     change = transform.duplicate(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
@@ -277,7 +277,7 @@ def test_copies(sketch):
 # the rest
 
 
-def test_deleting(sketch):
+def test_objects_and_vertices_are_deleted(sketch):
     change = properties.delete(
         sketch, Selection(frozenset({0}), frozenset({Vertex(2, 0, 1)}), frozenset({"two"}))
     )
@@ -289,7 +289,7 @@ def test_deleting(sketch):
     assert properties.delete(sketch, Selection(boundary=True)).sketch.boundary is None
 
 
-def test_names_and_notes(sketch):
+def test_objects_are_renamed_and_annotated(sketch):
     assert properties.rename(sketch, 2, " west\twall ").sketch.get_item(2).shape.name == "west wall"
     change = properties.rename(sketch, 0, "")
     assert change.sketch.get_item(0).shape.name is None
@@ -307,7 +307,7 @@ def test_names_and_notes(sketch):
     assert properties.rename(sketch, 0, "a\ud800b").sketch.get_item(0).shape.name == "ab"
 
 
-def test_widths_and_radii(sketch):
+def test_widths_and_radii_are_set(sketch):
     change = properties.set_width(sketch, ALL, 0.25)
     assert change.sketch.get_item(2).shape == replace(WALL, width=0.25)
     assert change.description == "wall made 0.25 m wide"
@@ -320,12 +320,12 @@ def test_widths_and_radii(sketch):
     ("where", "order"),
     [("top", [1, 2, 3, 0]), ("bottom", [0, 1, 2, 3])],
 )
-def test_order(where, order):
+def test_obstacles_are_restacked(where, order):
     sketch, _ = Sketch().with_obstacles([BOX, PILLAR, WALL, PILLAR])
     assert [item.key for item in properties.restack(sketch, Selection.of(0), where).sketch.obstacles] == order
 
 
-def test_several_things_keep_their_order_among_each_other():
+def test_restacked_obstacles_keep_their_order():
     sketch, _ = Sketch().with_obstacles([BOX, PILLAR, WALL, PILLAR])
     for where, order in [("bottom", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
         change = properties.restack(sketch, Selection.of(1, 2), where)
@@ -334,7 +334,7 @@ def test_several_things_keep_their_order_among_each_other():
     assert there.sketch == sketch
 
 
-def test_groups_locks_and_what_is_hidden_are_kept_in_the_map(sketch):
+def test_groups_locks_and_hidden_obstacles_are_saved(sketch):
     change = properties.group(sketch, Selection.of(0, 1))
     assert change.description == "2 obstacles grouped as “group 1”"
     assert properties.group(change.sketch, Selection.of(1, 2)).sketch.get_item(2).group == "group 2"
@@ -373,7 +373,7 @@ def test_a_polygon_becomes_the_boundary(sketch):
     assert properties.set_background(sketch, Background("p.png", (3, 4))).description == "picture laid under"
 
 
-def test_bounds(sketch):
+def test_bounds_enclose_objects_and_vertices(sketch):
     assert transform.compute_bounds(sketch, Selection.of(0)) == (1.0, 1.0, 3.0, 2.0)
     assert transform.compute_bounds(sketch, Selection.of(2)) == pytest.approx((4.95, 0.0, 7.0, 2.45))
     assert transform.compute_bounds(sketch, Selection.of("corner")) == pytest.approx((0.2, 4.2, 1.8, 5.8))
@@ -387,14 +387,14 @@ def test_bounds(sketch):
     assert transform.compute_bounds(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
 
 
-def test_what_is_gone_is_not_moved_and_the_rest_is(sketch):
+def test_removed_objects_are_not_moved(sketch):
     change = transform.move(sketch, Selection(frozenset({0, 99}), starts=frozenset({"none"})), 1.0, 0.0)
     assert change.selection == Selection.of(0) and change.sketch.get_item(0).shape.vertices[0] == (2.0, 1.0)
     with pytest.raises(MapError, match="select something"):
         transform.rotate(sketch, Selection.of(99), 90.0, (0.0, 0.0))
 
 
-def test_the_bounds_of_many_things_are_those_of_each():
+def test_bounds_of_many_objects_enclose_each():
     shapes = [
         CircleObstacle((k, 1.0), 0.3) if k % 3 else WallObstacle(((k, 2.0), (k, 3.0)), 0.2)
         for k in range(150)
@@ -420,7 +420,7 @@ def test_rounding_is_stable_and_the_same_everywhere(x, y):
 
 
 @given(st.floats(-1e4, 1e4))
-def test_cosine_and_sine(degrees):
+def test_cosine_and_sine_are_exact_at_quarter_turns(degrees):
     cos, sin = compute_cos_sin(degrees)
     assert (cos, sin) == pytest.approx(
         (math.cos(math.radians(degrees)), math.sin(math.radians(degrees))), abs=1e-9
@@ -428,7 +428,7 @@ def test_cosine_and_sine(degrees):
     assert compute_cos_sin(450.0) == (0.0, 1.0)
 
 
-def test_factors_of_maps():
+def test_affine_maps_have_a_common_factor():
     assert Affine.turn(33.0, (1.0, 2.0)).factor == 1.0
     assert Affine.stretch(2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
     assert Affine.stretch(-2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
@@ -436,7 +436,7 @@ def test_factors_of_maps():
     assert Affine(1.0, 0.5, 0.0, 1.0).factor is None
 
 
-def test_a_tilted_scan_is_made_level_by_two_points_on_a_wall():
+def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     path = ObstaclePath(((6.0, 4.0), (8.0, 4.0)), 0.5)
     level, keys = Sketch(boundary=HALL, starts=(("a", DiscStart((1.0, 1.0), 0.5)),)).with_obstacles(
         [WallObstacle(((2.0, 3.0), (5.0, 3.0)), 0.1), CircleObstacle((6.0, 4.0), 0.5, None, path)]

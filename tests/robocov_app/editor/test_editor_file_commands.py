@@ -54,7 +54,7 @@ def test_saving_asks_for_a_name_once(driver: EditorDriver, tmp_path: Path) -> No
     assert driver.editor.recent == [str(tmp_path / "plan.json")]
 
 
-def test_another_file_is_only_replaced_when_that_is_said(driver: EditorDriver, tmp_path: Path) -> None:
+def test_another_file_is_replaced_only_after_confirmation(driver: EditorDriver, tmp_path: Path) -> None:
     (tmp_path / "mine.json").write_text("{}")
     driver.press_key("ctrl+shift+s")
     driver.press_key("ctrl+a")
@@ -71,7 +71,7 @@ def test_another_file_is_only_replaced_when_that_is_said(driver: EditorDriver, t
     assert load_map(tmp_path / "mine.json").obstacles
 
 
-def test_a_draft_is_saved_and_called_one(driver: EditorDriver, tmp_path: Path) -> None:
+def test_an_invalid_map_is_saved_as_a_draft(driver: EditorDriver, tmp_path: Path) -> None:
     driver.editor.apply(create.add_polygon(driver.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     driver.window.run_frame(0.0)
     driver.press_key("ctrl+s")
@@ -80,7 +80,7 @@ def test_a_draft_is_saved_and_called_one(driver: EditorDriver, tmp_path: Path) -
     assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumbered(driver.sketch)
 
 
-def test_a_folder_that_is_not_there_is_told_and_nothing_lost(driver: EditorDriver) -> None:
+def test_a_missing_folder_is_reported_and_nothing_is_lost(driver: EditorDriver) -> None:
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+s")
     driver.press_key("ctrl+a")
@@ -104,7 +104,7 @@ def test_leaving_unsaved_work_asks_to_save_discard_or_stay(driver: EditorDriver,
     assert driver.window.closed and (tmp_path / "untitled.json").exists()
 
 
-def test_discarding_is_for_good_but_for_what_is_in_files(driver: EditorDriver, tmp_path: Path) -> None:
+def test_discarding_removes_the_draft_and_keeps_files(driver: EditorDriver, tmp_path: Path) -> None:
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+n")
     driver.press_key("d")
@@ -113,7 +113,7 @@ def test_discarding_is_for_good_but_for_what_is_in_files(driver: EditorDriver, t
     assert find_recoverable(tmp_path / "drafts") == ()
 
 
-def test_answers_are_clicked_too(driver: EditorDriver) -> None:
+def test_answers_can_be_clicked(driver: EditorDriver) -> None:
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+n")
     driver.click_answer("Cancel")
@@ -123,7 +123,7 @@ def test_answers_are_clicked_too(driver: EditorDriver) -> None:
     assert driver.shapes == []
 
 
-def test_opening_a_map_a_bundled_one_and_something_else(driver: EditorDriver, tmp_path: Path) -> None:
+def test_maps_bundled_maps_and_other_files_can_be_opened(driver: EditorDriver, tmp_path: Path) -> None:
     save_map(load_map("l-shape"), tmp_path / "ell.json")
     driver.press_key("ctrl+o")
     assert isinstance(driver.editor.dialogs.current, Choice)
@@ -174,7 +174,7 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_p
     assert "no longer exists" in driver.message
 
 
-def test_a_picture_is_laid_under_by_its_path_from_the_map(driver: EditorDriver, tmp_path: Path) -> None:
+def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_path: Path) -> None:
     Image.new("RGB", (400, 200)).save(tmp_path / "plan.png")
     driver.press_key("ctrl+s")
     driver.press_key("return")
@@ -194,9 +194,7 @@ def test_a_picture_is_laid_under_by_its_path_from_the_map(driver: EditorDriver, 
     assert "gone.png cannot be shown" in driver.message
 
 
-def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
-    driver: EditorDriver, tmp_path: Path
-) -> None:
+def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDriver, tmp_path: Path) -> None:
     driver.press_key("ctrl+e")
     assert driver.editor.dialogs.current.text == "untitled.svg"
     driver.press_key("return")
@@ -255,7 +253,7 @@ def test_settings_are_remembered(places: Path) -> None:
         assert "edges" not in editor.snaps and editor.recent == [str(places / "x.json")]
 
 
-def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
+def test_options_are_not_saved_as_settings(places: Path) -> None:
     with opening(places, theme="dark") as window:
         assert window.editor.theme == "dark"
         window.documents.may_close = True
@@ -264,7 +262,7 @@ def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
         window.documents.may_close = True
 
 
-def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places: Path) -> None:
+def test_a_picture_given_as_an_option_is_shown(places: Path) -> None:
     Image.new("RGB", (40, 30)).save(places / "plan.png")
     with opening(places) as window:
         window.editor.shown.discard("picture")
@@ -281,7 +279,7 @@ def test_recent_files_are_found_from_every_folder(
     assert driver.editor.recent == [str(tmp_path / "x.json")]
 
 
-def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
+def test_abandoned_drafts_are_offered_and_recovered(places: Path) -> None:
     lost = Document(sheet(), places / "drafts")
     lost.history.apply(create.add_circle(lost.history.sketch, (5, 5), 1.0))
     lost.update_draft()
@@ -329,7 +327,7 @@ def test_a_new_name_is_a_new_map(places: Path) -> None:
     assert load_map(places / "fresh.json").area == 100.0
 
 
-def test_pictures_without_a_display(places: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_screenshots_need_no_display(places: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Image.new("RGB", (60, 40), (200, 0, 0)).save(places / "plan.png")
     target = places / "shot.png"
     words = ["edit", "rooms", "--screenshot", str(target), "--size", "900x600", "--scale", "1"]
@@ -341,7 +339,7 @@ def test_pictures_without_a_display(places: Path, capsys: pytest.CaptureFixture[
         assert picture.size == (900, 600)
 
 
-def test_without_a_display_one_line_says_so(places: Path, monkeypatch, capsys) -> None:
+def test_a_missing_display_is_reported_in_one_line(places: Path, monkeypatch, capsys) -> None:
     for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     line = complaint(capsys, "edit", "rooms")
@@ -358,11 +356,13 @@ def test_without_a_display_one_line_says_so(places: Path, monkeypatch, capsys) -
         (["--screenshot", "x.jpg"], "ending in .png"),
     ],
 )
-def test_bad_options_are_one_line(places: Path, capsys, words: list[str], wanted: str) -> None:
+def test_invalid_options_are_reported_in_one_line(
+    places: Path, capsys, words: list[str], wanted: str
+) -> None:
     assert wanted in complaint(capsys, "edit", *words)
 
 
-def test_a_broken_file_is_told_before_a_window_opens(places: Path, capsys) -> None:
+def test_a_broken_file_is_reported_before_a_window_opens(places: Path, capsys) -> None:
     (places / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
     assert "boundery" in complaint(capsys, "edit", str(places / "bad.json"))
     (places / "draft.json").write_text(
@@ -372,7 +372,7 @@ def test_a_broken_file_is_told_before_a_window_opens(places: Path, capsys) -> No
     assert main(["edit", str(places / "draft.json"), "--screenshot", str(target)]) == 0
 
 
-def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> None:
+def test_a_map_of_another_format_opens_the_import_dialog(places: Path) -> None:
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
     with opening(places, places / "flat.json") as window:
@@ -387,14 +387,14 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
         window.documents.may_close = True
 
 
-def test_a_file_of_no_map_is_named_for_what_it_is(places: Path) -> None:
+def test_an_unsupported_file_is_reported_by_its_format(places: Path) -> None:
     (places / "plan.shp").write_bytes(b"\0\0'\x0a" + bytes(96))
     wanted = pytest.raises(MapError, match="a shapefile, which cannot be imported: ogr2ogr")
     with wanted, opening(places, places / "plan.shp"):
         pass
 
 
-def test_the_polygon_that_was_drawn_is_in_the_file(driver: EditorDriver, tmp_path: Path) -> None:
+def test_a_drawn_polygon_is_saved(driver: EditorDriver, tmp_path: Path) -> None:
     driver.press_key("p")
     driver.click_all((1, 1), (3, 1), (3, 3))
     driver.press_key("return")
@@ -403,7 +403,7 @@ def test_the_polygon_that_was_drawn_is_in_the_file(driver: EditorDriver, tmp_pat
     assert PolygonObstacle(((1, 1), (3, 1), (3, 3))) in load_map(tmp_path / "untitled.json").obstacles
 
 
-def test_a_draft_is_not_saved_over_a_valid_map_unasked(driver: EditorDriver, tmp_path: Path) -> None:
+def test_saving_a_draft_over_a_valid_map_asks_first(driver: EditorDriver, tmp_path: Path) -> None:
     driver.press_key("ctrl+s")
     driver.press_key("return")
     (path,) = tmp_path.glob("*.json")

@@ -18,7 +18,7 @@ SKETCH = Sketch("Hall", boundary=HALL)
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(drafts())
-def test_what_is_saved_is_opened_again(tmp_path, sketch):
+def test_a_saved_sketch_can_be_read(tmp_path, sketch):
     path = tmp_path / "draft.json"
     write_sketch(sketch, path, overwrites=True)
     again, disk = read_sketch(path)
@@ -27,12 +27,12 @@ def test_what_is_saved_is_opened_again(tmp_path, sketch):
     assert [file.name for file in tmp_path.iterdir()] == ["draft.json"]
 
 
-def test_what_runs_can_be_loaded(tmp_path):
+def test_a_valid_sketch_can_be_loaded(tmp_path):
     write_sketch(SKETCH, tmp_path / "map.json")
     assert load_map(tmp_path / "map.json") == SKETCH.build_environment()
 
 
-def test_a_file_that_is_there_is_not_overwritten_unasked(tmp_path):
+def test_an_existing_file_is_not_overwritten_without_permission(tmp_path):
     path = tmp_path / "map.json"
     path.write_text("precious")
     with pytest.raises(FileChangedError, match="it already exists"):
@@ -78,7 +78,7 @@ def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and modes")
-def test_links_and_modes_stay(tmp_path):
+def test_writing_preserves_links_and_modes(tmp_path):
     target = tmp_path / "target.json"
     write_sketch(SKETCH, target)
     target.chmod(0o640)
@@ -91,7 +91,7 @@ def test_links_and_modes_stay(tmp_path):
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
 
-def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
+def test_a_failed_write_leaves_the_file_unchanged(tmp_path, monkeypatch):
     path = tmp_path / "map.json"
     disk = write_sketch(SKETCH, path)
     before = path.read_bytes()
@@ -113,7 +113,7 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
         write_sketch(SKETCH, tmp_path / "a\0b.json")
 
 
-def test_what_cannot_be_opened_is_said(tmp_path):
+def test_unreadable_files_raise_a_map_error(tmp_path):
     with pytest.raises(MapError, match="no such file"):
         read_sketch(tmp_path / "none.json")
     (tmp_path / "not.json").write_text("{")

@@ -47,7 +47,7 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
         assert near(without_message(driver), at, red, 6) == 0
 
 
-def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
+def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as driver:
         driver.open_tab("map")
         assert len(driver.editor.measurement.components) == 2
@@ -56,7 +56,7 @@ def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
         assert "cut off" in words
 
 
-def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: Path) -> None:
+def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
     outside = CircleObstacle((30, 30), 1.0)
     with open_editor(tmp_path, sheet(CROSSED, outside)) as driver:
         problems = driver.editor.problems
@@ -77,7 +77,7 @@ def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: P
         assert driver.window.canvas.contains(driver.find_pixel((where.x, where.y)))
 
 
-def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -> None:
+def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(CROSSED)) as driver:
         assert describe_map(driver.editor).endswith("draft: 1 problem")
         driver.press_key("ctrl+a")
@@ -85,7 +85,7 @@ def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -
         assert describe_map(driver.editor).startswith("● Untitled   ·   0 obstacles")
 
 
-def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
+def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:
     with open_editor(tmp_path, Sketch()) as driver:
         assert "no boundary" in driver.editor.problems[0].message or driver.editor.problems[0].is_error
         for tool in driver.editor.toolbox.by_name:
@@ -96,7 +96,7 @@ def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
-def test_everything_at_once_is_drawn_at_every_scale_and_in_the_dark(tmp_path: Path, scale: float) -> None:
+def test_all_layers_are_drawn_at_every_scale_and_theme(tmp_path: Path, scale: float) -> None:
     starts = (("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1)))))
     size = round(900 * scale), round(600 * scale)
     sketch = sheet(CROSSED, *NARROW, CircleObstacle((8, 8), 1.0), starts=starts)
@@ -109,7 +109,7 @@ def test_everything_at_once_is_drawn_at_every_scale_and_in_the_dark(tmp_path: Pa
         assert picture.mean() < 110 and picture.std() > 15
 
 
-def test_lengths_stand_beside_the_cursor_and_what_is_typed_below_it(tmp_path: Path) -> None:
+def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet()) as driver:
         driver.press_key("p")
         driver.click_all((2, 2), (6, 2))
@@ -143,7 +143,7 @@ def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> Non
         assert len(driver.window.canvas.team.positions) == 7
 
 
-def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Path) -> None:
+def test_problems_are_marked_during_a_drag(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0))) as driver:
         assert not driver.editor.problems
         driver.press(*driver.find_pixel((5, 5)))

@@ -51,7 +51,7 @@ def rooms(width: float) -> Sketch:
         (hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)), "no room", "“a” moved"),
     ],
 )
-def test_a_problem_that_is_mended_is_gone(sketch, kind, words):
+def test_a_fix_solves_its_problem(sketch, kind, words):
     radius = 0.2
     before = measure(sketch, radius).problems
     problem = next(each for each in before if each.kind == kind)
@@ -63,7 +63,7 @@ def test_a_problem_that_is_mended_is_gone(sketch, kind, words):
     assert len(after) < len(before)
 
 
-def test_all_that_cannot_be_reached_is_filled_at_once():
+def test_all_unreachable_areas_are_filled_at_once():
     frame = PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)),))
     fork = ((8.0, 0.0), (8.0, 3.0), (8.2, 3.0), (8.2, 0.2), (8.5, 0.2), (8.5, 3.0), (9.0, 0.0))
     sketch = hall(frame, PolygonObstacle(fork))
@@ -76,7 +76,7 @@ def test_all_that_cannot_be_reached_is_filled_at_once():
         fill_unreachable(hall(), 5.0)
 
 
-def test_what_cannot_be_mended_is_none():
+def test_problems_without_a_fix_give_none():
     locked = rooms(0.3)
     locked = replace(locked, obstacles=tuple(replace(item, locked=True) for item in locked.obstacles))
     narrow = next(each for each in measure(locked, 0.2).problems if each.kind == "narrow")

@@ -14,7 +14,7 @@ HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 @settings(max_examples=120)
 @given(st.data())
-def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
+def test_undo_is_the_exact_inverse_of_any_change(data):
     history = UndoHistory(data.draw(st.one_of(sound_sketches(least=2), drafts())))
     was = [(history.sketch, history.selection)]
     for _ in range(data.draw(st.integers(1, 6))):
@@ -42,7 +42,7 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
 
 @settings(max_examples=100)
 @given(st.data())
-def test_coordinates_come_out_to_the_tenth_of_a_millimeter(data):
+def test_coordinates_are_rounded_to_a_tenth_of_a_millimeter(data):
     sketch = data.draw(sound_sketches(least=1))
     change = data.draw(changes(sketch))
     document = to_document(change.sketch) if change is not None else {}
@@ -86,7 +86,7 @@ def test_a_drag_is_one_step():
     assert history.undo_descriptions == ("circle moved", "circle drawn")
 
 
-def test_a_drag_that_comes_back_is_none():
+def test_a_drag_that_returns_is_no_step():
     history = drawn(1)
     before = history.sketch
     history.mark_saved()
@@ -98,7 +98,7 @@ def test_a_drag_that_comes_back_is_none():
     assert not history.has_unsaved_changes
 
 
-def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone():
+def test_an_edit_without_effect_is_no_step_and_preserves_redo():
     history = drawn(2)
     history.undo()
     assert not history.apply(Change(history.sketch, Selection.of(0), "nothing"))
@@ -122,7 +122,7 @@ def test_undo_has_no_limit():
     assert history.sketch == first
 
 
-def test_saved_is_what_the_file_holds_wherever_one_goes():
+def test_unsaved_changes_are_relative_to_the_saved_state():
     history = drawn(3)
     assert history.has_unsaved_changes
     history.mark_saved()
@@ -137,7 +137,7 @@ def test_saved_is_what_the_file_holds_wherever_one_goes():
     assert not UndoHistory(Sketch()).has_unsaved_changes
 
 
-def test_undoing_selects_what_was_selected():
+def test_undoing_restores_the_selection():
     history = drawn(2)
     history.selection = Selection.of(0)
     history.apply(properties.delete(history.sketch, Selection.of(0)))

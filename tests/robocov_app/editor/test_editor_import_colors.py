@@ -48,7 +48,7 @@ def free_area(asked: ImportDialog) -> float:
     return asked.imported.environment.free_area
 
 
-def test_a_color_goes_through_its_roles_and_back(drawing: Path) -> None:
+def test_clicks_cycle_a_color_through_its_roles(drawing: Path) -> None:
     asked = dialog(drawing)
     assert free_area(asked) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
@@ -61,7 +61,7 @@ def test_a_color_goes_through_its_roles_and_back(drawing: Path) -> None:
     assert asked.form.entries == {}
 
 
-def test_what_was_typed_stays_beside_what_is_clicked() -> None:
+def test_clicked_colors_are_added_to_typed_ones() -> None:
     given = {"free_color": "red, lightblue", "cell": "1"}
     set_role(given, (0, 0, 255), "free")
     assert given == {"free_color": "red, lightblue, #0000ff", "cell": "1"}
@@ -76,7 +76,7 @@ def test_what_was_typed_stays_beside_what_is_clicked() -> None:
     assert choose_next_role(choose_next_role(choose_next_role(choose_next_role(None)))) is None
 
 
-def test_the_topmost_shape_is_the_one_that_is_clicked(drawing: Path) -> None:
+def test_a_click_finds_the_topmost_shape(drawing: Path) -> None:
     found = build_color_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
     assert found is not None
     assert found.colors == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
@@ -97,7 +97,7 @@ def picture(folder: Path) -> Path:
     return folder / "plan.png"
 
 
-def test_colors_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
+def test_colors_of_a_picture_ignore_soft_edges(tmp_path: Path) -> None:
     found = build_color_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
     assert found is not None
     names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
@@ -175,7 +175,7 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDr
     )
 
 
-def test_colors_are_reached_by_the_keyboard(driver: EditorDriver) -> None:
+def test_colors_can_be_set_by_keyboard(driver: EditorDriver) -> None:
     shown(driver)
     ui = driver.window.dialogs.ui
     for _ in range(60):
@@ -200,7 +200,7 @@ def test_colors_are_reached_by_the_keyboard(driver: EditorDriver) -> None:
     assert asked.form.entries == {"solid_color": "#e0e0ff"}
 
 
-def test_the_report_is_in_sight(driver: EditorDriver) -> None:
+def test_the_report_is_visible(driver: EditorDriver) -> None:
     asked, _ = shown(driver)
     foot = max(camera.view[1] + camera.view[3] for camera in asked.preview.cameras)
     left = round(asked.preview.cameras[0].view[0])

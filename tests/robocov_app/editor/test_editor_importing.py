@@ -46,7 +46,7 @@ def free(asked: ImportDialog) -> float:
 
 
 @pytest.mark.parametrize("name", IMPORTERS)
-def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
+def test_the_dialog_has_the_options_of_the_format(name: str, tmp_path: Path) -> None:
     options = list_options(IMPORTERS[name])
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
@@ -67,7 +67,7 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
         assert getattr(asked.form.build_settings()[option.name in shaping], option.name) == value
 
 
-def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
+def test_every_change_updates_the_preview(plan: Path) -> None:
     asked = question(plan)
     assert "--cell" in asked.problem and not asked.is_ready
     asked.form.set("cell", "0.1")
@@ -100,7 +100,7 @@ def waited(asked: ImportDialog) -> None:
 
 
 @pytest.mark.slow
-def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
+def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
     # every older import is given up
     worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportJob", "imports", patience=0.0)
     asked = question(plan, worker)
@@ -132,7 +132,7 @@ def shown(driver: EditorDriver) -> tuple[ImportDialog, Any]:
     return driver.editor.dialogs.current, driver.window.dialogs.ui.widgets
 
 
-def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(driver: EditorDriver, plan: Path) -> None:
+def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path) -> None:
     driver.press_key("ctrl+o")
     driver.type("plan.png")
     driver.press_key("return")
@@ -156,7 +156,7 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(driver: EditorD
     assert driver.message == "imported: plan.png, not saved yet"
 
 
-def test_widgets_of_options_and_buttons(driver: EditorDriver, plan: Path) -> None:
+def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
     asked, view = shown(driver)
     driver.type("0.1")
@@ -181,7 +181,7 @@ def test_widgets_of_options_and_buttons(driver: EditorDriver, plan: Path) -> Non
     assert driver.editor.dialogs.current is None and driver.sketch is before
 
 
-def test_what_cannot_be_imported_is_told_and_not_taken(driver: EditorDriver, plan: Path) -> None:
+def test_unusable_settings_are_reported_and_not_accepted(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
     asked, _ = shown(driver)
     driver.press_key("return")
@@ -194,7 +194,7 @@ def test_what_cannot_be_imported_is_told_and_not_taken(driver: EditorDriver, pla
     assert driver.editor.dialogs.current is None
 
 
-def test_what_is_open_is_not_lost(driver: EditorDriver, plan: Path) -> None:
+def test_importing_asks_before_closing_the_open_map(driver: EditorDriver, plan: Path) -> None:
     driver.editor.apply(set_title(driver.sketch, "mine"))
     driver.post(pygame.DROPFILE, file=str(plan))
     driver.settle()
@@ -208,7 +208,7 @@ def test_what_is_open_is_not_lost(driver: EditorDriver, plan: Path) -> None:
     assert driver.sketch.name == "mine"
 
 
-def test_closing_the_window_leaves_it(driver: EditorDriver, plan: Path) -> None:
+def test_closing_the_window_closes_the_dialog(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
     shown(driver)
     driver.post(pygame.QUIT)
@@ -217,7 +217,7 @@ def test_closing_the_window_leaves_it(driver: EditorDriver, plan: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
-def test_options_maps_and_report_keep_apart(tmp_path: Path, plan: Path, size: tuple[int, int]) -> None:
+def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size: tuple[int, int]) -> None:
     with open_editor(tmp_path, sheet(), size=size) as driver:
         driver.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
         driver.run_frames(2)

@@ -44,7 +44,7 @@ def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.nda
 @pytest.mark.slow
 @settings(max_examples=25)
 @given(sound_sketches(least=1, most=6), st.sampled_from([0.1, 0.25, 0.6]))
-def test_what_robots_reach_is_what_a_raster_says(sketch, radius):
+def test_reach_agrees_with_a_raster(sketch, radius):
     free = sketch.build_unchecked_environment().free
     if free.is_empty:
         return
@@ -73,7 +73,7 @@ def test_what_robots_reach_is_what_a_raster_says(sketch, radius):
     ("width", "radius", "passes"),
     [(0.9, 0.4, True), (0.9, 0.45, True), (0.9, 0.4501, False), (0.5, 0.3, False)],
 )
-def test_a_door_lets_pass_whom_it_lets_pass(width, radius, passes):
+def test_robots_pass_doors_wider_than_they_are(width, radius, passes):
     result = measure(doors(width), radius)
     assert result.gap.width == pytest.approx(width)
     assert result.components == pytest.approx([96.0 - 0.2 * (8.0 - width)])
@@ -107,7 +107,7 @@ def test_one_of_three_doors_is_too_narrow():
     assert result.vertices == 4 + 6 * 2
 
 
-def test_a_passage_that_leads_back_to_the_same_place_is_marked_too():
+def test_a_passage_that_returns_to_the_same_room_is_marked():
     # two blocks 0.3 m apart in the middle of the hall: the way round is open
     blocks = [
         PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0))),
@@ -142,7 +142,7 @@ def test_niches_and_sealed_pockets_are_marked_but_not_corners():
     assert measure(Sketch(boundary=HALL), 0.3).impassable.is_empty
 
 
-def test_where_no_robot_fits_it_is_said():
+def test_a_map_in_which_no_robot_fits_has_a_warning():
     result = measure(Sketch("n", boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 0.3), (0.0, 0.3))), 0.2)
     assert result.reached == ()
     assert result.impassable.area == pytest.approx(2.7)
@@ -150,7 +150,7 @@ def test_where_no_robot_fits_it_is_said():
 
 
 @pytest.mark.parametrize("name", ["rooms", "office", "gaps", "cave", "museum"])
-def test_it_says_what_check_says(name):
+def test_measurements_agree_with_the_check_command(name):
     environment = load_map(name)
     report, result = check_map(environment, 0.1), measure(Sketch.from_environment(environment), 0.1)
     assert result.free_area == report.free_area
@@ -162,7 +162,7 @@ def test_it_says_what_check_says(name):
 
 @settings(max_examples=50)
 @given(drafts(), st.sampled_from([0.05, 0.3]))
-def test_every_draft_can_be_read_out(sketch, radius):
+def test_every_draft_can_be_measured(sketch, radius):
     result = measure(sketch, radius)
     assert isinstance(result.impassable, MultiPolygon)
     assert result.free_area == pytest.approx(sum(result.components))
@@ -172,7 +172,7 @@ def test_every_draft_can_be_read_out(sketch, radius):
     ]
 
 
-def test_broken_parts_count_as_far_as_they_are_sound():
+def test_invalid_parts_count_as_far_as_they_are_valid():
     assert measure(Sketch()).free_area == 0.0
     bow_tie = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
     result = measure(Sketch("n", boundary=HALL).with_obstacles([bow_tie, WallObstacle((), 0.1)])[0])

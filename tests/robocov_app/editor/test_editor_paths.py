@@ -32,7 +32,7 @@ def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
 # the model
 
 
-def test_the_first_way_point_makes_a_path_from_the_obstacles_middle() -> None:
+def test_the_first_waypoint_starts_a_path_at_the_center() -> None:
     sketch = sheet(DESK)
     change = paths.add_waypoint(sketch, 0, (1.0, 3.00004), speed=0.3)
     assert led(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
@@ -44,7 +44,7 @@ def test_the_first_way_point_makes_a_path_from_the_obstacles_middle() -> None:
     assert led(between).points == ((6.0, 7.5), (3.0, 6.0), (1.0, 3.0), (1.0, 1.0))
 
 
-def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
+def test_waypoints_are_moved_and_removed() -> None:
     sketch = sheet(MOVING)
     moved = paths.move_waypoint(sketch, 0, 1, (7.0, 3.0)).sketch
     assert led(moved).points[1] == (7.0, 3.0)
@@ -59,7 +59,7 @@ def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
         paths.move_waypoint(sketch, 0, 0, (float("nan"), 0.0))
 
 
-def test_speed_and_what_happens_at_the_end() -> None:
+def test_speed_and_repetition_are_set() -> None:
     sketch, both = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND)), Selection.of(0, 1, 2)
     turned = paths.toggle_repeat(sketch, both).sketch
     assert [led(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
@@ -78,12 +78,12 @@ def test_speed_and_what_happens_at_the_end() -> None:
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "11", "fast", "nan"])
-def test_what_is_no_speed_is_refused(text: str) -> None:
+def test_invalid_speeds_raise_a_map_error(text: str) -> None:
     with pytest.raises(MapError, match=r"expected .*m/s"):
         paths.parse_speed(text)
 
 
-def test_what_is_near() -> None:
+def test_the_nearest_waypoint_and_leg_are_found() -> None:
     assert paths.find_waypoint(ROUND, (8.1, 2.1), 0.2) == 1
     assert paths.find_waypoint(ROUND, (5.0, 2.0), 0.2) is None
     assert paths.find_leg(ROUND, (5.0, 2.1), 0.2) == 1
@@ -93,7 +93,7 @@ def test_what_is_near() -> None:
 
 
 @pytest.mark.parametrize("points", [(), ((1.0, 1.0),), ((1.0, 1.0), (1.0, 1.0))])
-def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path) -> None:
+def test_a_path_that_leads_nowhere_is_harmless(points, tmp_path: Path) -> None:
     broken = replace(CART, path=ObstaclePath(points, 0.0))
     assert not paths.leads_somewhere(broken.path)
     assert paths.describe_path(broken.path) == "leads nowhere"
@@ -110,7 +110,7 @@ def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path)
 @pytest.mark.parametrize(
     "shape", [CART, DESK, WallObstacle(((2.0, 2.0), (3.0, 4.0)), 0.2)], ids=["circle", "polygon", "wall"]
 )
-def test_who_is_moved_turned_or_scaled_takes_its_path_along(shape) -> None:
+def test_transforms_apply_to_paths(shape) -> None:
     sketch, one = sheet(replace(shape, path=ROUND)), Selection.of(0)
     moved = transform.move(sketch, one, 1.0, -0.5).sketch
     assert led(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
@@ -120,13 +120,13 @@ def test_who_is_moved_turned_or_scaled_takes_its_path_along(shape) -> None:
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
 
-def test_a_circle_that_becomes_a_polygon_goes_on_moving() -> None:
+def test_a_circle_that_becomes_a_polygon_keeps_its_path() -> None:
     change = properties.convert_to_polygons(sheet(MOVING), Selection.of(0))
     (item,) = change.sketch.obstacles
     assert isinstance(item.shape, PolygonObstacle) and item.shape.path == ROUND
 
 
-def test_it_is_kept_in_the_file() -> None:
+def test_paths_are_saved() -> None:
     sketch = paths.add_waypoint(sheet(DESK), 0, (1.0, 3.0)).sketch
     again = parse_sketch(dump_sketch(sketch), "map")
     assert led(again) == led(sketch)
@@ -169,7 +169,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         assert paths.list_moving_obstacles(driver.sketch) == ()
 
 
-def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
+def test_the_tool_continues_with_another_obstacle(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(MOVING, DESK)) as driver:
         driver.press_key("o")
         driver.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
@@ -188,7 +188,7 @@ def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -> None:
+def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: str) -> None:
     still = sheet(CART)
     with open_editor(tmp_path, still, theme=theme) as driver:
         driver.press_key("l")
@@ -214,7 +214,7 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
         assert driver.editor.moves_since is None
 
 
-def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
+def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     with open_editor(tmp_path, sheet(CART)) as driver:
         driver.editor.apply(paths.add_waypoint(driver.sketch, 0, (8.0, 2.0)))
@@ -223,7 +223,7 @@ def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
     assert environment.at(4.0).obstacles[0].center == pytest.approx((4.0, 2.0))
 
 
-def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
+def test_commands_and_buttons_change_paths(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(MOVING)) as driver:
         driver.editor.select(Selection.of(0))
         run_typed_command(driver.editor, "0.75", "speed")

@@ -22,7 +22,7 @@ def tried(driver: EditorDriver):
     return trial
 
 
-def test_back_with_nothing_lost(tmp_path: Path) -> None:
+def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as driver:
         driver.press_key("r")
         driver.drag_at((4, 4), (4.5, 4.5), (5, 5))
@@ -49,7 +49,7 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         assert len(driver.shapes) == 1
 
 
-def test_escape_leads_back_but_first_closes_what_is_open(tmp_path: Path) -> None:
+def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
     with open_editor(tmp_path, load_sketch("square")) as driver:
         trial = tried(driver)
         driver.press_key("f1")
@@ -77,7 +77,7 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
         assert driver.window.trial is None and "room for about" in driver.message
 
 
-def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
+def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR)) as driver:
         driver.editor.apply(properties.set_note(driver.sketch, Selection.of(0), "old oak"))
         trial = tried(driver)
@@ -91,7 +91,7 @@ def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> N
         assert len(driver.shapes) == 1
 
 
-def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
+def test_another_map_opened_in_a_trial_is_discarded(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR)) as driver:
         trial = tried(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
@@ -108,7 +108,7 @@ def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
         driver.press_key("escape")
 
 
-def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Path) -> None:
+def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet()) as driver:
         driver.press_key("c")
         driver.drag_at((4, 4), (4.5, 4), (5, 4))
@@ -121,7 +121,7 @@ def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Pa
         assert driver.window.closed
 
 
-def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
+def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet()) as driver:
         tried(driver)
         driver.press_key("t")
@@ -129,7 +129,7 @@ def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
         assert driver.editor.theme == "dark"
 
 
-def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
+def test_a_trial_without_changes_is_no_edit() -> None:
     sketch = sheet(PILLAR, PILLAR)
     environment = sketch.build_environment()
     assert build_trial_change(sketch, environment, environment) is None
@@ -138,7 +138,7 @@ def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
     assert build_trial_change(sketch, environment, other) is None
 
 
-def test_a_key_that_is_held_down_while_it_opens_does_not_lead_back(tmp_path: Path) -> None:
+def test_a_held_key_does_not_end_the_trial(tmp_path: Path) -> None:
     with open_editor(tmp_path, load_sketch("square")) as driver:
         press = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_F5, mod=0, unicode="")
         for _ in range(3):

@@ -30,7 +30,7 @@ def handle(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> t
     return driver.find_pixel(found.at)
 
 
-def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(driver: EditorDriver) -> None:
+def test_a_click_selects_shift_toggles_and_the_floor_clears(driver: EditorDriver) -> None:
     driver.click_all((3, 3))
     assert driver.editor.selection == Selection.of(0)
     driver.hold_keys("shift")
@@ -47,7 +47,7 @@ def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(driver: 
     assert driver.editor.selection == Selection.of(BOUNDARY)
 
 
-def test_a_box_takes_what_lies_in_it_and_leftwards_what_it_touches(driver: EditorDriver) -> None:
+def test_a_box_selects_objects_inside_or_leftwards_also_touched_ones(driver: EditorDriver) -> None:
     driver.drag_at((1.5, 1.5), (3, 3), (5, 5))
     assert driver.editor.selection == Selection.of(0)
     driver.press_key("escape")
@@ -68,7 +68,7 @@ def test_dragging_moves_and_can_be_undone_as_one(driver: EditorDriver) -> None:
     assert driver.shapes[0].vertices[0] == (4, 2)
 
 
-def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(driver: EditorDriver) -> None:
+def test_escape_cancels_a_drag(driver: EditorDriver) -> None:
     before = driver.sketch
     driver.press(*driver.find_pixel((3, 3)))
     driver.move_to((4, 4), (5, 5), held=1)
@@ -126,7 +126,7 @@ def test_corners_are_cut_off_and_rounded(driver: EditorDriver) -> None:
     assert len(driver.shapes[0].vertices) > 6
 
 
-def test_a_box_around_some_vertices_of_what_is_selected_takes_them(driver: EditorDriver) -> None:
+def test_a_box_selects_vertices_of_the_selection(driver: EditorDriver) -> None:
     driver.click_all((3, 3))
     driver.drag_at((4.6, 1.4), (4.2, 3), (3.6, 4.6))
     assert driver.editor.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
@@ -143,7 +143,7 @@ def test_the_rim_of_a_circle_and_of_a_start_are_dragged(driver: EditorDriver) ->
     assert driver.sketch.get_start("corner") == DiscStart((1, 8.5), 0.9)
 
 
-def test_the_knob_turns_and_takes_degrees(driver: EditorDriver) -> None:
+def test_the_knob_turns_by_dragging_and_by_degrees(driver: EditorDriver) -> None:
     driver.select(2)
     x, y = handle(driver, "turn")
     driver.press(x, y)
@@ -207,7 +207,7 @@ def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(driver: EditorDrive
     assert driver.shapes[0] == SQUARE  # pressed in a row, they are one
 
 
-def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
+def test_clicking_again_selects_the_object_below(tmp_path: Path) -> None:
     lower, upper = (
         PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6))),
         PolygonObstacle(((2, 2), (4, 2), (4, 4))),
@@ -221,7 +221,7 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
         assert driver.editor.selection == Selection.of(1)
 
 
-def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
+def test_many_objects_are_dragged_as_an_image_with_the_same_result(tmp_path: Path) -> None:
     from robocov_app.editor.edits import transform
     from robocov_app.editor.tools.drags import MANY_POINTS
 
@@ -237,7 +237,7 @@ def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path
         assert driver.shapes == [item.shape for item in wanted.obstacles]
 
 
-def test_grips_know_whose_vertices_are_shown(driver: EditorDriver) -> None:
+def test_handles_belong_to_the_shown_vertices(driver: EditorDriver) -> None:
     assert list_vertex_owners(Selection()) == () and list_vertex_owners(Selection.of(0, 1)) == ()
     assert list_vertex_owners(Selection.of(2)) == (2,)
     assert list_vertex_owners(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
@@ -248,7 +248,7 @@ def test_grips_know_whose_vertices_are_shown(driver: EditorDriver) -> None:
     assert find_handle(found, (3, 3), 0.2) is None
 
 
-def test_the_cursor_tells_what_a_press_would_do(driver: EditorDriver) -> None:
+def test_the_cursor_shows_the_effect_of_a_press(driver: EditorDriver) -> None:
     selector = driver.editor.toolbox.selector
     driver.move_to((9, 5))
     assert selector.choose_cursor(driver.editor) == "arrow"
@@ -261,7 +261,7 @@ def test_the_cursor_tells_what_a_press_would_do(driver: EditorDriver) -> None:
     assert selector.choose_cursor(driver.editor) == "rising"
 
 
-def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path: Path) -> None:
+def test_small_objects_are_dragged_instead_of_their_vertices(tmp_path: Path) -> None:
     pillar = PolygonObstacle(((5, 5), (5.4, 5), (5.4, 5.4), (5, 5.4)))
     wide = replace(sheet(pillar), boundary=((0, 0), (80, 0), (80, 80), (0, 80)))
     with open_editor(tmp_path, wide) as driver:

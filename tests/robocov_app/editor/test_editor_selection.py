@@ -47,7 +47,7 @@ def owner_at(sketch: Sketch, point, reach: float):
     return next(iter(find_owners(sketch, point, reach)), None)
 
 
-def test_a_click_takes_the_topmost(sketch):
+def test_a_click_finds_the_topmost_obstacle(sketch):
     assert owner_at(sketch, (4.0, 4.0), 0.1) == 1
     assert find_owners(sketch, (4.0, 4.0), 0.1) == (1, 0)
     assert owner_at(sketch, (1.2, 1.2), 0.1) == 0
@@ -56,7 +56,7 @@ def test_a_click_takes_the_topmost(sketch):
     assert owner_at(sketch, (2.7, 2.05), 0.1) == 0
 
 
-def test_starts_lie_above_at_their_center_and_rim_but_not_inside(sketch):
+def test_starts_are_above_obstacles_at_their_center_and_rim(sketch):
     assert owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
     assert owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
     assert find_owners(sketch, (4.5, 1.5), 0.1) == (0, "disc")
@@ -64,7 +64,7 @@ def test_starts_lie_above_at_their_center_and_rim_but_not_inside(sketch):
     assert owner_at(sketch, (8.05, 6.0), 0.1) == "two"
 
 
-def test_what_is_near_is_taken_where_nothing_covers(sketch):
+def test_nearby_obstacles_are_found_where_none_covers_the_point(sketch):
     assert owner_at(sketch, (9.0, 1.1), 0.1) == 2
     assert owner_at(sketch, (9.0, 1.2), 0.1) is None
     assert owner_at(sketch, (12.0, 6.0), 0.1) == BOUNDARY
@@ -74,7 +74,7 @@ def test_what_is_near_is_taken_where_nothing_covers(sketch):
 
 
 @given(sound_sketches(least=2), places, st.sampled_from([0.05, 0.5]))
-def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
+def test_the_nearest_vertices_and_edges_are_found(sketch, point, reach):
     owners = [BOUNDARY, *(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
     lines = [
         shapely.LineString([*points, *points[:1]] if closed else points)
@@ -92,7 +92,7 @@ def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
         assert shapely.LineString([a, b]).distance(shapely.Point(edge.point)) < 1e-9
 
 
-def test_handles(sketch):
+def test_objects_have_the_expected_vertices(sketch):
     assert [at for _, at in list_vertices(sketch, 1)] == [
         (4.0, 4.0),
         (6.0, 4.0),
@@ -112,7 +112,7 @@ def test_handles(sketch):
         find_position(sketch, Vertex(0, 0, 4))
 
 
-def test_boxes(sketch):
+def test_boxes_select_objects(sketch):
     assert find_in_box(sketch, (0.5, 0.5), (5.4, 5.5)) == Selection(frozenset({0}))
     everything = find_in_box(sketch, (13.0, 9.0), (-1.0, -1.0))
     assert everything == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}), boundary=True)
@@ -126,7 +126,7 @@ def test_boxes(sketch):
 
 
 @given(sound_sketches(least=1), places, places)
-def test_boxes_hold_what_shapely_says(sketch, a, b):
+def test_boxes_agree_with_shapely(sketch, a, b):
     box = shapely.box(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))
     inside = {item.key for item in sketch.obstacles if box.covers(item.shape.polygon.envelope)}
     assert find_in_box(sketch, a, b).items == inside
@@ -134,7 +134,7 @@ def test_boxes_hold_what_shapely_says(sketch, a, b):
     assert find_in_box(sketch, a, b, touched=True).items == touched
 
 
-def test_selections_add_up(sketch):
+def test_selections_can_be_united_and_toggled(sketch):
     a = Selection.of(0, "disc", BOUNDARY)
     assert a == Selection(frozenset({0}), frozenset(), frozenset({"disc"}), True)
     assert a.owners == {0, "disc", BOUNDARY}
@@ -152,7 +152,7 @@ def test_selections_add_up(sketch):
     assert not gone.restrict_to(Sketch())
 
 
-def test_selections_in_words(sketch):
+def test_selections_are_described(sketch):
     vertex = frozenset({Vertex(0, 0, 0), Vertex(0, 0, 1)})
     words = {
         "nothing": Selection(),
@@ -171,7 +171,7 @@ def test_selections_in_words(sketch):
     assert sketch.display_name(BOUNDARY) == "boundary"
 
 
-def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):
+def test_picking_among_a_thousand_obstacles_measures_only_nearby_ones(monkeypatch):
     rng = np.random.default_rng(0)
     shapes = [CircleObstacle((float(x), float(y)), 0.3) for x, y in rng.uniform(0, 50, (1000, 2))]
     sketch, keys = Sketch(boundary=HALL).with_obstacles(shapes)

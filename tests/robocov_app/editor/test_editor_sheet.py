@@ -59,7 +59,7 @@ def drawn(page: pygame.Surface, at: View) -> np.ndarray:
     st.lists(st.tuples(st.integers(0, 5), st.integers(-40, 40), st.integers(-40, 40)), max_size=8),
     st.booleans(),
 )
-def test_patches_and_scrolling_give_the_same_page_as_drawing_anew(steps, dark: bool) -> None:
+def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
     sketch = sheet(*SHAPES)
     theme = DARK if dark else LIGHT
     kept, center = Sheet(), (5.0, 5.0)
@@ -103,7 +103,7 @@ class Watched(Sheet):
         return "all" if self.boxes == [at.clip] else len(self.boxes)
 
 
-def test_only_what_changed_is_drawn_anew() -> None:
+def test_only_changes_are_redrawn() -> None:
     sketch = sheet(*SHAPES)
     page = Watched()
     assert page.painted(view(), sketch) == "all"
@@ -116,7 +116,7 @@ def test_only_what_changed_is_drawn_anew() -> None:
     assert page.painted(view(zoom=40.0, theme=DARK), moved) == "all"
 
 
-def test_what_is_lifted_is_not_on_the_page() -> None:
+def test_lifted_obstacles_are_not_on_the_page() -> None:
     sketch = sheet(*SHAPES)
     at = view()
     x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
@@ -138,7 +138,7 @@ def test_a_hole_shows_what_lies_below() -> None:
     assert color((11.0, 5.0)) == choose_outside_color(LIGHT)
 
 
-def test_what_the_hull_adds_is_told_apart() -> None:
+def test_areas_added_by_the_hull_are_distinguished() -> None:
     sketch = load_sketch("l-shape")
     area = compute_hull_excess(sketch)
     assert area is not None and area.area > 1.0
@@ -174,7 +174,7 @@ def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
     assert page.reference_image.error == ""
 
 
-def test_a_picture_that_cannot_be_read_is_told_and_all_else_is_drawn(tmp_path: Path) -> None:
+def test_an_unreadable_picture_is_reported_and_the_rest_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     page = Sheet()
     sketch = replace(sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
@@ -193,14 +193,14 @@ def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
             assert coarse * zoom >= 54
 
 
-def test_names_stand_where_there_is_room() -> None:
+def test_names_are_written_where_they_fit() -> None:
     ring = shapely.Polygon([(0, 0), (6, 0), (6, 1), (1, 1), (1, 6), (0, 6)])
     x, y, room, high = build_outline(ring).name_space
     assert ring.contains(shapely.Point(x, y)) and 1.0 - 1e-9 <= room <= 6.0 + 1e-9 and high >= 1.0 - 1e-9
     assert build_outline(shapely.Polygon()).name_space.width == 0.0
 
 
-def test_outlines_are_made_once_for_each_obstacle() -> None:
+def test_outlines_are_built_once_for_each_obstacle() -> None:
     outlines, sketch = Outlines(), sheet(*SHAPES)
     first = outlines.get(sketch.obstacles[0])
     moved = transform.move(sketch, Selection.of(1), 1, 0).sketch

@@ -25,7 +25,7 @@ def wobbly(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
 
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(8, 120), st.sampled_from([0.001, 0.02, 0.1, 0.5, 2.0]))
-def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tolerance):
+def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
     ring = wobbly(count, seed)
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     try:
@@ -43,7 +43,7 @@ def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tol
     assert places == sorted(places)
 
 
-def test_holes_do_not_come_to_cross_their_outline():
+def test_holes_do_not_cross_their_outline():
     # a thin frame: a coarse tolerance would let the hole stick out
     outer, inner = wobbly(120, 0, 3.0, 0.0), wobbly(120, 1, 2.9, 0.0)
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(outer, (inner,))])
@@ -53,7 +53,7 @@ def test_holes_do_not_come_to_cross_their_outline():
     assert len(change.sketch.list_vertex_rings(key)[1]) < 120
 
 
-def test_walls_keep_their_ends_and_the_boundary_is_asked_for():
+def test_walls_keep_their_ends_and_the_boundary_must_be_selected():
     line = tuple((k / 10, 0.001 * (k % 2)) for k in range(40))
     sketch, (key,) = Sketch(boundary=(*HALL[:2], (12.0, 4.0), *HALL[2:])).with_obstacles(
         [WallObstacle(line, 0.1)]
@@ -93,7 +93,7 @@ def test_traced_plans_become_straight():
 
 
 @given(sound_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
-def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
+def test_straightening_is_idempotent(sketch, degrees):
     try:
         change = straighten(sketch, Selection(), degrees)
     except MapError:
@@ -126,7 +126,7 @@ def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
         (lambda s: straighten(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
     ],
 )
-def test_what_cannot_be_done_is_said(deed, words):
+def test_impossible_edits_raise_a_map_error(deed, words):
     sketch, _ = Sketch(boundary=HALL).with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
     with pytest.raises(MapError, match=words):
         deed(sketch)

@@ -11,7 +11,7 @@ SMALL = sheet(PolygonObstacle(((1, 1), (2, 1), (2, 2))))
 LARGE = sheet(PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY_VERTICES + 1))))
 
 
-def test_small_maps_are_known_at_once_and_kept() -> None:
+def test_targets_of_small_maps_are_available_at_once_and_cached() -> None:
     snapper = Snapper()
     first = snapper.find_targets(SMALL)
     assert first is not None and snapper.find_targets(SMALL) is first
@@ -19,7 +19,7 @@ def test_small_maps_are_known_at_once_and_kept() -> None:
     snapper.close()
 
 
-def test_large_maps_are_known_later_unless_there_is_time() -> None:
+def test_targets_of_large_maps_are_computed_in_the_background() -> None:
     assert count_vertices(LARGE) > MANY_VERTICES
     snapper = Snapper()
     first = snapper.find_targets(LARGE)

@@ -41,7 +41,7 @@ def targets() -> SnapTargets:
     some_kinds,
     st.one_of(st.none(), cursor),
 )
-def test_a_snap_never_moves_farther_than_its_reach_and_tells_why(sketch, point, reach, grid, kinds, origin):
+def test_a_snap_stays_within_reach_and_has_a_guide(sketch, point, reach, grid, kinds, origin):
     targets = collect_snap_targets(sketch)
     snapping = SnapSettings(reach, grid, kinds=kinds)
     snap = snap_point(point, targets, snapping, origin)
@@ -106,13 +106,13 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
         ((11.0, 3.04), ("aligned",), (11.0, 3.0), "in line"),
     ],
 )
-def test_what_is_near_is_snapped_to(targets, point, kinds, where, words):
+def test_nearby_targets_are_snapped_to(targets, point, kinds, where, words):
     snap = snap_point(point, targets, to(*kinds))
     assert snap.point == pytest.approx(where, abs=1e-9)
     assert snap.guides[0].label == words
 
 
-def test_two_lines_come_before_one(targets):
+def test_crossings_of_lines_win_over_single_lines(targets):
     # in line with the pillar's rim at the right, and with the top of the box
     snap = snap_point((7.5, 3.05), targets, to("aligned", "grid"))
     assert snap.point == pytest.approx((7.54, 3.0))
@@ -124,7 +124,7 @@ def test_two_lines_come_before_one(targets):
     assert {guide.label for guide in snap.guides} == {"45°", "edge"}
 
 
-def test_crossings_of_edges():
+def test_crossings_of_edges_are_targets():
     plank = PolygonObstacle(((0.0, 1.9), (8.0, 1.9), (8.0, 2.1), (0.0, 2.1)))
     targets = collect_snap_targets(Sketch().with_obstacles([BOX, plank])[0])
     snap = snap_point((4.05, 2.06), targets, to("crossing", "edge"))
@@ -132,7 +132,7 @@ def test_crossings_of_edges():
     assert snap.guides[0].kind == "crossing"
 
 
-def test_angles_and_lengths_on_the_grid(targets):
+def test_angles_and_grid_are_combined(targets):
     origin = (8.0, 1.0)
     snap = snap_point((9.02, 1.05), targets, to("angle"), origin)
     assert snap.point == pytest.approx((9.02, 1.0))
@@ -151,7 +151,7 @@ def test_angles_and_lengths_on_the_grid(targets):
     assert snap_point((8.05, 1.05), targets, to("angle"), origin).guides == ()
 
 
-def test_a_coarse_grid_pulls_along_one_axis_only(targets):
+def test_a_coarse_grid_snaps_along_one_axis_only(targets):
     snapping = replace(to("grid"), grid=1.0)
     assert snap_point((9.1, 6.5), targets, snapping).point == (9.0, 6.5)
     assert snap_point((9.1, 6.05), targets, snapping).point == (9.0, 6.0)
@@ -159,7 +159,7 @@ def test_a_coarse_grid_pulls_along_one_axis_only(targets):
     assert snap_point((0.30000001, 0.1), targets, replace(to("grid"), grid=0.1)).point == (0.3, 0.1)
 
 
-def test_what_is_dragged_is_no_target():
+def test_dragged_objects_are_no_targets():
     sketch, (key,) = Sketch(starts=(("two", PointsStart(((6.0, 1.0), (8.0, 1.0)))),)).with_obstacles([BOX])
     near = (1.02, 1.02)
     assert (
@@ -185,7 +185,7 @@ def test_what_is_dragged_is_no_target():
     assert snap_point((9.02, 5.0), with_drawn_point, to("vertex")).point == (9.0, 5.0)
 
 
-def test_walls_have_faces_and_circles_rims():
+def test_faces_of_walls_and_rims_of_circles_are_targets():
     wall = WallObstacle(((1.0, 1.0), (5.0, 1.0)), 0.2)
     targets = collect_snap_targets(Sketch().with_obstacles([wall, PILLAR])[0])
     assert snap_point((5.03, 1.12), targets, to("vertex", reach=0.05)).point == pytest.approx((5.0, 1.1))
@@ -196,7 +196,7 @@ def test_walls_have_faces_and_circles_rims():
     assert math.dist(on_rim, PILLAR.center) == pytest.approx(0.51, abs=2e-3)
 
 
-def test_what_is_moved_snaps_with_the_point_that_is_nearest(targets):
+def test_a_move_snaps_by_its_nearest_point(targets):
     corners = [(10.0, 6.0), (11.0, 6.0), (11.0, 7.0), (10.0, 7.0)]
     # the lower left corner comes near the upper right one of the box
     snap = snap_move(corners, -5.96, -2.95, targets, to("vertex"))
@@ -216,7 +216,7 @@ def test_what_is_moved_snaps_with_the_point_that_is_nearest(targets):
     assert math.dist(snap.point, (-4.95, -3.0)) <= 0.15
 
 
-def test_angles_of_turning():
+def test_rotations_snap_to_round_angles():
     assert snap_angle(44.0) == 45.0
     assert snap_angle(-1.0) == 0.0
     assert math.copysign(1.0, snap_angle(-1.0)) == 1.0
@@ -224,7 +224,7 @@ def test_angles_of_turning():
     assert snap_angle(182.0, 90.0) == 180.0
 
 
-def test_nothing_is_no_target():
+def test_an_empty_map_has_no_targets():
     targets = collect_snap_targets(Sketch())
     assert snap_point((1.04, 2.03), targets, EVERYTHING).point == (1.0, 2.0)
     assert snap_point((1.04, 2.03), targets, to("vertex", "edge", "aligned")).guides == ()

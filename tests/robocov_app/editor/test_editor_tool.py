@@ -48,7 +48,7 @@ def test_shift_holds_the_angle_and_nothing_else_does() -> None:
     assert shifted.constrain(None) == (3.0, 0.2)
 
 
-def test_lengths_and_angles_are_told_as_people_write_them() -> None:
+def test_lengths_and_angles_are_formatted() -> None:
     assert format_bearing((0, 0), (-1, 0)) == "1.00 m  ∠ 180°"
     assert format_bearing((0, 0), (1, 1)) == "1.41 m  ∠ 45°"
     assert format_bearing((0, 0), (1, -1e-9)) == "1.00 m  ∠ 0°"

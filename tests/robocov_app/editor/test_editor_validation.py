@@ -39,7 +39,7 @@ def runs(sketch: Sketch) -> bool:
 
 @settings(max_examples=200)
 @given(st.one_of(drafts(), sound_sketches()))
-def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
+def test_there_is_an_error_exactly_if_the_map_is_invalid(sketch):
     found = problems(sketch)
     assert any(problem.is_error for problem in found) != runs(sketch), [problem.message for problem in found]
     keys = {item.key for item in sketch.obstacles} | {name for name, _ in sketch.starts} | {BOUNDARY, None}
@@ -53,7 +53,7 @@ def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())
-def test_bundled_maps_have_nothing_grave(name):
+def test_bundled_maps_have_no_errors(name):
     assert not any(each.is_error for each in problems(Sketch.from_environment(load_map(name))))
 
 
@@ -199,7 +199,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
     ],
 )
-def test_what_is_wrong_is_said_where_it_is(sketch, words, where, of):
+def test_problems_are_reported_at_their_position(sketch, words, where, of):
     (found, *_) = [
         problem for problem in problems(sketch) if problem.is_error and problem.message == words
     ] or [pytest.fail(str([problem.message for problem in problems(sketch)]))]
@@ -211,7 +211,7 @@ def test_what_is_wrong_is_said_where_it_is(sketch, words, where, of):
         assert found.geometry.distance(shapely.Point(where)) < 1e-9
 
 
-def test_what_is_broken_keeps_nothing_else_from_being_found():
+def test_a_broken_object_does_not_hide_other_problems():
     sketch = hall(
         PolygonObstacle(BOW_TIE),
         CircleObstacle((6.0, 6.0), 1.0),
@@ -234,7 +234,7 @@ def warned(sketch: Sketch, radius: float = 0.15) -> list[str]:
     return [problem.message for problem in found]
 
 
-def test_warnings_of_what_may_be_a_mistake():
+def test_possible_mistakes_are_warnings():
     assert warned(hall()) == []
     assert warned(hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
         "circle “lamp” lies outside the boundary"
@@ -250,7 +250,7 @@ def test_warnings_of_what_may_be_a_mistake():
     assert not [words for words in warned(hall(ended)) if "two vertices" in words]
 
 
-def test_paths_through_what_stands_are_told_where_they_do():
+def test_paths_through_obstacles_are_reported_at_the_overlap():
     wall = WallObstacle(((6.0, 0.0), (6.0, 4.0)), 0.2, "screen")
     cart = CircleObstacle((2.0, 2.0), 0.5, "cart", ObstaclePath(((2.0, 2.0), (10.0, 2.0)), 1.0))
     assert warned(hall(cart)) == []
@@ -262,7 +262,7 @@ def test_paths_through_what_stands_are_told_where_they_do():
     assert warned(hall(out)) == ["circle “cart” moves through the boundary"]
 
 
-def test_sealed_rooms_and_pockets_are_told_of():
+def test_sealed_rooms_and_pockets_are_reported():
     frame = PolygonObstacle(
         ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0)), (((2.5, 2.5), (5.5, 2.5), (5.5, 5.5), (2.5, 5.5)),)
     )
@@ -293,7 +293,7 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     ]
 
 
-def test_each_spot_that_is_too_tight_is_told_of_where_it_is():
+def test_tight_positions_are_reported_at_their_position():
     spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
     found = problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
     assert [(problem.message, problem.geometry.centroid.coords[0]) for problem in found] == [
@@ -309,7 +309,7 @@ def test_each_spot_that_is_too_tight_is_told_of_where_it_is():
     ]
 
 
-def test_messages_of_the_map_name_things_and_where_they_are():
+def test_messages_name_objects_instead_of_paths():
     pillar = CircleObstacle((1.0, 1.0), 0.3, "pillar")
     sketch = hall(pillar, PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 3.0))))
     for message, words in [

@@ -40,7 +40,7 @@ def picked(*chosen: Vertex) -> Selection:
 
 
 @given(st.data())
-def test_a_vertex_that_is_put_is_there(data):
+def test_a_placed_vertex_has_its_position(data):
     sketch = data.draw(sound_sketches(least=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
     vertex, before = data.draw(st.sampled_from(list_vertices(sketch, owner)))
@@ -61,7 +61,7 @@ def test_a_vertex_that_is_put_is_there(data):
     assert back == sketch
 
 
-def test_several_things_move_together(sketch):
+def test_vertices_of_several_objects_move_together(sketch):
     chosen = picked(
         Vertex(0, 0, 2),
         Vertex(0, 1, 0),
@@ -82,7 +82,7 @@ def test_several_things_move_together(sketch):
     assert after.get_start("two").positions == ((7.0, 6.0), (8.5, 5.75))
 
 
-def test_center_and_rim_of_discs(sketch):
+def test_center_and_rim_of_discs_are_vertices(sketch):
     assert vertices.place_vertices(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).get_start("disc") == DiscStart(
         (9.0, 5.0), 1.0
     )
@@ -128,7 +128,7 @@ def test_center_and_rim_of_discs(sketch):
         (lambda s: vertices.join_walls(s, Selection.of(2)), "walls to join"),
     ],
 )
-def test_what_cannot_be_done_is_said(sketch, deed, words):
+def test_impossible_edits_raise_a_map_error(sketch, deed, words):
     with pytest.raises(MapError, match=words) as caught:
         deed(sketch)
     assert "\n" not in str(caught.value)
@@ -138,7 +138,7 @@ def test_what_cannot_be_done_is_said(sketch, deed, words):
 
 
 @given(st.data())
-def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
+def test_inserting_on_an_edge_keeps_the_shape(data):
     sketch = data.draw(sound_sketches(least=1))
     edges = [
         Edge(owner, ring, k, (0.0, 0.0))
@@ -160,7 +160,7 @@ def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
     assert vertices.delete_vertices(change.sketch, change.selection).sketch == sketch
 
 
-def test_rings_with_too_few_vertices_go(sketch):
+def test_rings_with_too_few_vertices_are_removed(sketch):
     gone = vertices.delete_vertices(sketch, picked(Vertex(0, 1, 0), Vertex(0, 1, 1)))
     assert gone.sketch.get_item(0).shape.holes == ()
     assert gone.description == "2 vertices deleted"
@@ -179,7 +179,7 @@ def test_rings_with_too_few_vertices_go(sketch):
 
 
 @given(st.floats(20.0, 160.0), st.floats(0.1, 0.9))
-def test_a_bevel_is_as_long_as_asked_and_a_rounding_touches_both_edges(degrees, length):
+def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, length):
     angle = math.radians(degrees)
     corner = ((2.0, 0.0), (0.0, 0.0), (2.0 * math.cos(angle), 2.0 * math.sin(angle)))
     sketch, (key,) = Sketch().with_obstacles([WallObstacle(corner, 0.1)])
@@ -218,7 +218,7 @@ def test_corners_of_rings_are_cut_all_at_once(sketch):
     assert shapely.Polygon(disc.vertices).area == pytest.approx(math.pi * 4.0, abs=0.02)
 
 
-def test_what_has_no_angle_is_no_corner():
+def test_a_straight_vertex_is_no_corner():
     ring = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0))
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     with pytest.raises(MapError, match="select corners"):
@@ -241,7 +241,7 @@ def test_holes_are_filled(sketch):
     assert filled.sketch.get_item(0).shape.holes == ()
 
 
-def test_a_wall_goes_on_is_cut_and_joined(sketch):
+def test_a_wall_is_extended_split_and_joined(sketch):
     longer = vertices.extend_wall(sketch, Vertex(2, 0, 2), (11.0, 3.0))
     assert longer.sketch.get_item(2).shape.points[-1] == (11.0, 3.0)
     assert longer.selection == picked(Vertex(2, 0, 3))
@@ -267,7 +267,7 @@ def test_walls_join_in_any_order_either_way_round(order, turned):
     assert list(item.shape.points) in (whole, whole[::-1])
 
 
-def test_walls_that_are_apart_are_joined_where_they_are_nearest():
+def test_separate_walls_are_joined_at_their_nearest_ends():
     walls = [WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.1), WallObstacle(((5.0, 0.0), (2.0, 0.5)), 0.3, "b")]
     sketch, keys = Sketch().with_obstacles(walls)
     (item,) = vertices.join_walls(sketch, Selection.of(*keys)).sketch.obstacles

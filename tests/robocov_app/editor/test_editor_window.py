@@ -35,7 +35,7 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
 # the panel
 
 
-def test_every_button_does_what_its_action_does(driver: EditorDriver) -> None:
+def test_every_button_runs_its_command(driver: EditorDriver) -> None:
     driver.push_button("tool:wall")
     assert driver.editor.tool.name == "wall"
     driver.push_button("tool:select")
@@ -49,7 +49,7 @@ def test_every_button_does_what_its_action_does(driver: EditorDriver) -> None:
     assert driver.window.is_help_open
 
 
-def test_the_map_page_takes_name_radius_and_team(driver: EditorDriver) -> None:
+def test_the_map_page_edits_name_radius_and_team(driver: EditorDriver) -> None:
     driver.open_tab("map")
     driver.type_into("title", "Our office")
     driver.press_key("return")
@@ -66,11 +66,11 @@ def test_the_map_page_takes_name_radius_and_team(driver: EditorDriver) -> None:
     assert "robots" in driver.editor.shown
 
 
-def test_numbers_stand_in_fields_without_needless_zeros() -> None:
+def test_numbers_in_fields_have_no_trailing_zeros() -> None:
     assert [format_number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
 
 
-def test_the_object_page_takes_names_places_and_sizes(driver: EditorDriver) -> None:
+def test_the_object_page_edits_names_positions_and_sizes(driver: EditorDriver) -> None:
     driver.select(0)
     driver.open_tab("object")
     assert driver.get_widget("entry", "name").text == "box"
@@ -124,7 +124,7 @@ def test_the_list_of_vertices_selects_and_scrolls(driver: EditorDriver) -> None:
     assert vertex.index == 61
 
 
-def test_the_snap_page_switches_and_sets(driver: EditorDriver) -> None:
+def test_the_snap_page_edits_snapping_and_layers(driver: EditorDriver) -> None:
     driver.open_tab("snap")
     driver.toggle_check_box("snap:grid")
     assert "grid" not in driver.editor.snaps
@@ -135,7 +135,7 @@ def test_the_snap_page_switches_and_sets(driver: EditorDriver) -> None:
     assert driver.editor.grid == 0.5
 
 
-def test_pages_are_turned_by_keys(driver: EditorDriver) -> None:
+def test_keys_switch_pages(driver: EditorDriver) -> None:
     seen = []
     for _ in EditorPanel.tabs:
         driver.press_key("ctrl+tab")
@@ -150,7 +150,7 @@ def test_pages_are_turned_by_keys(driver: EditorDriver) -> None:
     assert driver.sketch.name == "New name"
 
 
-def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(driver: EditorDriver) -> None:
+def test_the_cursor_depends_on_tool_and_panel(driver: EditorDriver) -> None:
     driver.press_key("w")
     driver.move_to((5.0, 5.0))
     driver.wait()
@@ -168,7 +168,7 @@ def test_keys_go_into_fields_and_not_to_actions_while_typing(driver: EditorDrive
     assert not driver.window.panel.ui.edit and driver.sketch.name == "Untitled"
 
 
-def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(driver: EditorDriver) -> None:
+def test_undo_in_a_field_does_not_change_the_map(driver: EditorDriver) -> None:
     driver.editor.apply(add_circle(driver.sketch, (5, 5), 0.2))
     drawn = driver.sketch
     driver.open_tab("map")
@@ -183,7 +183,7 @@ def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(driver: E
     assert texts == ["acb", "ab", "Untitled", "Untitled", "ab", "acb"] and driver.sketch is drawn
 
 
-def test_the_list_of_what_was_done_leads_back_and_forth(driver: EditorDriver) -> None:
+def test_the_history_page_undoes_and_redoes(driver: EditorDriver) -> None:
     for radius in (0.2, 0.3, 0.4):
         driver.editor.apply(add_circle(driver.sketch, (5, 5), radius))
     driver.open_tab("history")
@@ -241,7 +241,7 @@ def test_space_and_the_pan_tool_move_the_sheet(driver: EditorDriver) -> None:
     assert driver.sketch is not before
 
 
-def test_the_map_cannot_be_lost_from_sight(driver: EditorDriver) -> None:
+def test_the_map_always_stays_visible(driver: EditorDriver) -> None:
     for _ in range(80):
         driver.press_key("ctrl+left")
         driver.turn_wheel(300, 300, -5)
@@ -254,7 +254,7 @@ def test_the_map_cannot_be_lost_from_sight(driver: EditorDriver) -> None:
     assert high_x - low_x < 5
 
 
-def test_the_menu_offers_what_applies_and_does_it(driver: EditorDriver) -> None:
+def test_the_menu_offers_and_runs_applicable_commands(driver: EditorDriver) -> None:
     driver.click_at((3, 3), button=3)
     menu = driver.editor.dialogs.current
     assert isinstance(menu, Menu) and driver.editor.selection == Selection.of(0)
@@ -279,7 +279,7 @@ def test_the_menu_offers_what_applies_and_does_it(driver: EditorDriver) -> None:
     assert driver.editor.dialogs.current is None and "nowhere.txt" in driver.message
 
 
-def test_a_right_click_ends_what_is_being_drawn(driver: EditorDriver) -> None:
+def test_a_right_click_completes_a_drawing(driver: EditorDriver) -> None:
     driver.press_key("p")
     driver.click_all((5, 1), (6, 1), (6, 2))
     driver.click_at((6, 2), button=3)
@@ -289,7 +289,7 @@ def test_a_right_click_ends_what_is_being_drawn(driver: EditorDriver) -> None:
 # palette, help, look
 
 
-def test_the_palette_does_actions_and_commands(driver: EditorDriver) -> None:
+def test_the_palette_runs_commands(driver: EditorDriver) -> None:
     driver.select(0)
     driver.press_key("ctrl+k")
     driver.type("mirror left")
@@ -304,7 +304,7 @@ def test_the_palette_does_actions_and_commands(driver: EditorDriver) -> None:
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
-def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatch) -> None:
+def test_the_help_lists_all_keys(tmp_path: Path, size, scale: float, monkeypatch) -> None:
     words: set[str] = set()
     real = help_page.render_text
 
@@ -321,7 +321,7 @@ def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatc
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
 
 
-def test_light_dark_and_every_size(driver: EditorDriver) -> None:
+def test_the_window_is_drawn_in_every_theme_and_size(driver: EditorDriver) -> None:
     driver.press_key("t")
     assert driver.copy_frame().mean() < 90
     for size in (MIN_SIZE_PX, (640, 480), (1600, 500), (700, 1200)):
@@ -341,7 +341,7 @@ def test_a_screenshot_is_saved(driver: EditorDriver, tmp_path: Path) -> None:
     assert (tmp_path / "robocov-1.png").exists()
 
 
-def test_the_status_line_says_where_what_and_how(driver: EditorDriver) -> None:
+def test_the_status_line_shows_position_tool_and_selection(driver: EditorDriver) -> None:
     driver.move_to((3, 3))
     driver.select(0)
     said = list_status(driver.editor, 60.0, None)
@@ -350,14 +350,14 @@ def test_the_status_line_says_where_what_and_how(driver: EditorDriver) -> None:
     assert any(each.startswith("Wall: click its points") for each in list_status(driver.editor, 60.0, None))
 
 
-def test_the_title_of_the_window_tells_what_is_unsaved(driver: EditorDriver) -> None:
+def test_the_title_of_the_window_marks_unsaved_changes(driver: EditorDriver) -> None:
     driver.select(0)
     driver.press_key("right")
     driver.run_frames(1)
     assert pygame.display.get_caption()[0] == "● Untitled · robocov edit"
 
 
-def test_the_clipboard_keeps_texts_also_without_a_display() -> None:
+def test_the_clipboard_works_without_a_display() -> None:
     pygame.display.quit()
     clipboard = Clipboard()
     clipboard.put("text")
@@ -412,7 +412,7 @@ def test_a_double_click_that_drags_still_drags(tmp_path: Path) -> None:
         assert driver.sketch.obstacles[0].geometry.bounds == (3.0, 2.0, 7.0, 6.0)
 
 
-def test_all_things_are_listed_also_those_that_are_hidden(driver: EditorDriver) -> None:
+def test_all_objects_are_listed_including_hidden_ones(driver: EditorDriver) -> None:
     driver.select(0)
     driver.press_key("ctrl+h")
     driver.press_key("ctrl+tab")
@@ -425,7 +425,7 @@ def test_all_things_are_listed_also_those_that_are_hidden(driver: EditorDriver) 
 
 
 @pytest.mark.slow
-def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path, monkeypatch) -> None:
+def test_many_selected_objects_are_outlined_once_with_the_same_pixels(tmp_path: Path, monkeypatch) -> None:
     shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]
     pictures = []
     for many in (200, 10_000):
@@ -437,9 +437,7 @@ def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path
     assert np.abs(pictures[0] - pictures[1]).max() < 8
 
 
-def test_a_window_that_nobody_touches_is_not_drawn_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_idle_window_is_not_redrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_editor(tmp_path) as driver:
         driver.move(300, 300)
         driver.run_frames(3)
@@ -462,7 +460,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         assert driver.window.dialogs.is_open and not drawn
 
 
-def test_a_map_that_is_fitted_stays_so_in_a_window_of_another_size(tmp_path: Path) -> None:
+def test_a_fitted_map_stays_fitted_when_the_window_is_resized(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
         shown, zooms = driver.window.canvas, [driver.window.canvas.camera.zoom]
         for size in ((1700, 1300), (900, 600)):

@@ -58,7 +58,7 @@ class Sheet:
         return px, py
 
 
-def test_a_floor_plan_from_nothing_to_a_running_demo_and_saved(display: str, tmp_path: Path) -> None:
+def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))  # the boundary that is offered
         hands.press("b")
@@ -134,7 +134,7 @@ def differs(hands: Hands, from_picture: np.ndarray, part: float) -> np.ndarray:
         time.sleep(0.2)
 
 
-def test_kill_9_in_the_middle_loses_nothing(display: str, tmp_path: Path) -> None:
+def test_a_killed_editor_loses_nothing(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         hands.press("r")
@@ -169,7 +169,7 @@ def kept(folder: Path) -> int:
     return max(found)
 
 
-def test_a_question_before_unsaved_work_is_closed(display: str, tmp_path: Path) -> None:
+def test_closing_unsaved_work_asks_first(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path, tmp_path / "fresh.json") as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         hands.press("c")

@@ -38,7 +38,7 @@ def same(a, b) -> bool:
 
 
 @pytest.mark.slow
-def test_it_says_what_the_function_says_after_every_change():
+def test_the_worker_agrees_with_the_function_after_every_change():
     history = [SKETCH]
     history.append(transform.move(history[-1], Selection.of(0), 1.0, 0.0).sketch)
     history.append(history[-1].with_obstacles([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
@@ -61,7 +61,7 @@ def test_it_says_what_the_function_says_after_every_change():
 
 @settings(max_examples=20)
 @given(st.data())
-def test_what_has_changed_is_enough_to_know_the_whole(data):
+def test_changes_are_enough_to_rebuild_the_sketch(data):
     measuring, wire = SketchMeasurer(), MeasurementWire()
     sketch, known = data.draw(sound_sketches(least=1)), {}
     questions = []

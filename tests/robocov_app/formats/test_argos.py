@@ -33,7 +33,7 @@ def read(folder: Path, body: str, **options: object) -> ForeignMap:
 ARENA = box(-2, -2, 4, 2)
 
 
-def test_bodies_stand_where_the_file_has_them(tmp_path: Path) -> None:
+def test_bodies_have_the_positions_of_the_file(tmp_path: Path) -> None:
     body = (
         WALL.format("long", 2, 0.5, 1, 1, 0)
         + WALL.format("turned", 1, 0.5, 2, -1, 30)
@@ -51,7 +51,7 @@ def test_bodies_stand_where_the_file_has_them(tmp_path: Path) -> None:
     assert read(tmp_path, body, skip=("c", "turned")).free.area == pytest.approx(24 - 1)
 
 
-def test_bodies_that_are_tilted_are_left_out(tmp_path: Path) -> None:
+def test_tilted_bodies_are_left_out(tmp_path: Path) -> None:
     tilted = WALL.format("a", 1, 1, 0, 0, "0,45").replace("0,45,0,0", "0,45,0")
     over = WALL.format("b", 1, 1, 0, 0, "0,180").replace("0,180,0,0", "0,180,0")
     foreign = read(tmp_path, tilted + over)
@@ -71,7 +71,7 @@ def distribute(position: str, quantity: int, thing: str, values: str = "0,0,0") 
     )
 
 
-def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path: Path) -> None:
+def test_grids_are_read_and_random_distributions_counted(tmp_path: Path) -> None:
     body = (
         distribute(GRID, 3, POST) + distribute(CHANCE, 30, POST) + distribute(CHANCE, 7, '<e-puck id="e"/>')
     )
@@ -106,7 +106,7 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
         ("<box>", "not XML: mismatched tag"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, body: str, expected: str | None) -> None:
+def test_mistakes_are_reported_with_the_line(tmp_path: Path, body: str, expected: str | None) -> None:
     if expected is None:
         assert read(tmp_path, body).free.equals(ARENA)
         return
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, body: str, expected
     assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_without_an_arena_there_is_no_map(tmp_path: Path) -> None:
+def test_a_file_without_an_arena_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "test.argos"
     path.write_text("<argos-configuration/>")
     with pytest.raises(MapError, match="no <arena>"):
@@ -131,7 +131,7 @@ def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
     assert (environment.starts["robots"].positions, report.size) == (((0.0, 0.0),), (6.0, 4.0))  # type: ignore[union-attr]
 
 
-def test_the_room_with_the_robots_stays(tmp_path: Path) -> None:
+def test_the_room_with_the_robots_is_kept(tmp_path: Path) -> None:
     # walls within the arena, as in most experiments: around them is more room than in them
     walls = [WALL.format(k, 2.1, 0.1, 0, y, 0) for k, y in enumerate((-1, 1))]
     walls += [WALL.format(k, 0.1, 2.1, x, 0, 0) for k, x in enumerate((-1, 1))]

@@ -68,7 +68,7 @@ _CHECKS = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_
 
 @settings(deadline=None, max_examples=12, suppress_health_check=_CHECKS)
 @given(_CASE)
-def test_files_made_by_rule_are_clean(
+def test_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
 ) -> None:
     _require_made_clean(tmp_path_factory, *given_case)
@@ -77,7 +77,7 @@ def test_files_made_by_rule_are_clean(
 @pytest.mark.slow
 @settings(deadline=None, max_examples=250, suppress_health_check=_CHECKS)
 @given(_CASE)
-def test_many_files_made_by_rule_are_clean(
+def test_many_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
 ) -> None:
     _require_made_clean(tmp_path_factory, *given_case)
@@ -89,7 +89,7 @@ _BLOCK = st.tuples(_NUMBER, _NUMBER, st.floats(0.001, 3.0), st.floats(0.001, 3.0
 
 @settings(deadline=None, max_examples=40, suppress_health_check=_CHECKS)
 @given(st.lists(_BLOCK, max_size=6), st.sampled_from([0.0, 0.02, 0.1]))
-def test_walls_move_by_the_tolerance_at_most(blocks: list[Any], tolerance: float) -> None:
+def test_walls_move_at_most_by_the_tolerance(blocks: list[Any], tolerance: float) -> None:
     solid = [
         shapely.affinity.rotate(box(x, y, x + width, y + height), angle)
         for x, y, width, height, angle in blocks
@@ -105,7 +105,7 @@ def test_walls_move_by_the_tolerance_at_most(blocks: list[Any], tolerance: float
     require_clean(environment, report)
 
 
-def test_repeats_and_straight_vertices_go() -> None:
+def test_repeated_and_straight_vertices_are_removed() -> None:
     ring = np.array([(0, 0), (0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (2, 2), (0, 2), (0, 1)], dtype=float)
     assert tidy_ring(ring, 4).tolist() == [[0, 0], [2, 0], [2, 2], [0, 2]]
     spike = np.array([(0, 0), (2, 0), (2, 2), (2, 5), (2, 2), (0, 2)], dtype=float)
@@ -173,7 +173,7 @@ def test_hairline_gaps_between_rooms_are_closed(gap: float, parts: int) -> None:
     assert len(close_gaps([box(0, 0, 5, 5), box(5 + gap, 0, 10, 5)], 0.0).area.geoms) == 2
 
 
-def test_a_thin_wall_with_a_door_is_no_gap() -> None:
+def test_a_thin_wall_with_a_door_is_not_a_gap() -> None:
     rooms = [box(0, 0, 5, 5), box(5.005, 0, 10, 5)]
     door = box(4.9, 2, 5.1, 3)
     closed = close_gaps([*rooms, door], 0.01)
@@ -183,14 +183,14 @@ def test_a_thin_wall_with_a_door_is_no_gap() -> None:
     assert close_gaps([rooms[0], box(5.0005, 0, 10, 5), door], 0.01).number == 1
 
 
-def test_gaps_that_are_drawn_on_purpose_stay() -> None:
+def test_intended_gaps_are_kept() -> None:
     slit = box(0, 0, 5, 5) - box(2.5, 1, 2.505, 5)
     assert close_gaps([slit, box(20, 0, 25, 5)], 0.01).area.area == pytest.approx(slit.area + 25)
     wedge = shapely.Polygon([(5, 0), (10, 0), (10, 5), (5.2, 5)])
     assert close_gaps([box(0, 0, 5, 5), wedge], 0.01).number == 0
 
 
-def test_rooms_of_a_grid_with_gaps_are_one() -> None:
+def test_rooms_of_a_grid_with_gaps_are_joined() -> None:
     rooms = [box(5.002 * i, 5.003 * j, 5.002 * i + 5, 5.003 * j + 5) for i in range(4) for j in range(4)]
     closed = close_gaps(rooms, 0.01)
     assert (len(closed.area.geoms), closed.number) == (1, 24)

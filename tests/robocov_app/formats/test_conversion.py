@@ -32,7 +32,7 @@ def lines(report: Any) -> str:
     return "\n".join(report.format_lines())
 
 
-def test_the_largest_part_and_its_obstacles() -> None:
+def test_the_largest_part_is_kept_with_its_obstacles() -> None:
     environment, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan.wkt")
     assert (environment.name, environment.description) == ("plan", "A plan.")
     assert environment.boundary == ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
@@ -47,7 +47,7 @@ def test_the_largest_part_and_its_obstacles() -> None:
     assert report.to_dict()["size_m"] == [10.0, 8.0]
 
 
-def test_the_part_around_a_place() -> None:
+def test_inside_keeps_the_part_around_a_position() -> None:
     track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
     whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
     environment, report = build_environment(whole, Shaping(inside=(21.0, 1.0)), "plan")
@@ -66,7 +66,7 @@ def test_the_part_around_a_place() -> None:
         build_environment(whole, Shaping(inside=(45.0, 10.0)), "plan")
 
 
-def test_a_word_where_a_considerable_part_is_left_out() -> None:
+def test_a_large_omitted_part_is_noted() -> None:
     _, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan")
     assert report.notes[0].startswith(
         "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
@@ -76,7 +76,7 @@ def test_a_word_where_a_considerable_part_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
-def test_what_is_all_but_zero_is_zero(tiny: float) -> None:
+def test_coordinates_near_zero_become_zero(tiny: float) -> None:
     environment, _ = build_environment(
         foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan"
     )
@@ -94,7 +94,7 @@ def test_all_parts_lie_in_their_convex_hull() -> None:
     )
 
 
-def test_specks() -> None:
+def test_specks_are_removed() -> None:
     environment, report = build_environment(foreign(ROOM), Shaping(specks=0.01), "plan")
     assert len(environment.obstacles) == 1
     assert report.dropped == ("1 obstacle smaller than 0.01 m², 0.0025 m² (--specks 0 keeps them)",)
@@ -112,13 +112,13 @@ def test_specks() -> None:
     assert report.dropped == ("1 hole of 2e-05 m², which come of rounding",)
 
 
-def test_what_a_format_takes_for_noise() -> None:
+def test_noise_depends_on_the_format() -> None:
     noisy = foreign(ROOM, specks=0.003)
     assert len(build_environment(noisy, Shaping(), "plan")[0].obstacles) == 1
     assert len(build_environment(noisy, Shaping(specks=0.0), "plan")[0].obstacles) == 2
 
 
-def test_hull_and_margin() -> None:
+def test_hull_and_margin_are_applied() -> None:
     corner = box(0, 0, 10, 8) - box(5, 4, 10, 8)
     environment, _ = build_environment(foreign(corner), Shaping(hull=True), "plan")
     assert environment.boundary_polygon.equals(corner.convex_hull)
@@ -132,7 +132,7 @@ def test_hull_and_margin() -> None:
     assert environment.region.area == pytest.approx(environment.area)
 
 
-def test_a_boundary_that_is_given() -> None:
+def test_a_given_boundary_is_kept() -> None:
     outer = box(-1, -1, 11, 9)
     named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="the shape called 'hall'")
     environment, report = build_environment(named, Shaping(), "plan")
@@ -149,7 +149,7 @@ def test_a_boundary_that_is_given() -> None:
     assert environment.free_area == pytest.approx(ROOM.area)
 
 
-def test_a_boundary_behind_walls_gives_way_to_them() -> None:
+def test_walls_replace_a_boundary_behind_them() -> None:
     outer = box(-1, -1, 11, 9)
     environment, report = build_environment(foreign(ROOM, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(box(0, 0, 10, 8))
@@ -175,7 +175,7 @@ def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
     assert environment.free_area == pytest.approx(room.area, abs=0.2)
 
 
-def test_outlines_that_meet_themselves() -> None:
+def test_self_crossing_outlines_are_repaired() -> None:
     bow = Polygon([(0, 0), (0, 4), (6, -2), (6, 0)])
     environment, report = build_environment(foreign(bow), Shaping(), "plan")
     assert environment.area == pytest.approx(8.0)
@@ -187,7 +187,7 @@ def test_outlines_that_meet_themselves() -> None:
     assert len(report.repaired) == 1
 
 
-def test_the_starts() -> None:
+def test_starts_are_added() -> None:
     environment, _ = build_environment(foreign(ROOM), Shaping(), "plan")
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
     assert len(environment.start().sample(6)) == 6
@@ -197,7 +197,7 @@ def test_the_starts() -> None:
     assert list(narrow.starts) == ["uniform"]
 
 
-def test_cells_larger_than_robots() -> None:
+def test_cells_larger_than_robots_are_noted() -> None:
     _, report = build_environment(foreign(ROOM, cell=1.0), Shaping(), "plan")
     assert report.tolerance == 0.2
     assert (
@@ -208,7 +208,7 @@ def test_cells_larger_than_robots() -> None:
     assert build_environment(foreign(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
 
 
-def test_where_robots_do_not_get() -> None:
+def test_unreachable_regions_are_noted() -> None:
     rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
     _, report = build_environment(foreign(rooms), Shaping(), "plan")
     (note,) = report.notes
@@ -231,7 +231,9 @@ def test_where_robots_do_not_get() -> None:
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], expected: str) -> None:
+def test_unusable_maps_are_refused(
+    parts: tuple[Polygon, ...], shaping: dict[str, Any], expected: str
+) -> None:
     with pytest.raises(MapError) as caught:
         build_environment(foreign(*parts), Shaping(**shaping), "plan")
     assert expected in str(caught.value)
@@ -252,7 +254,7 @@ def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], ex
         ({"default_start": "door"}, "default_start: expected one of room, uniform"),
     ],
 )
-def test_options_out_of_range(options: dict[str, Any], expected: str) -> None:
+def test_options_out_of_range_are_refused(options: dict[str, Any], expected: str) -> None:
     with pytest.raises(ParameterError, match=expected):
         Shaping(**options)
 
@@ -280,7 +282,7 @@ points = st.tuples(st.integers(0, 40), st.integers(0, 40))
     st.sampled_from([0.0, 0.05, 0.5, 3.0]), st.sampled_from(["largest", "all"]),
     st.booleans(), st.sampled_from([0.0, 0.3]), st.booleans(),
 )  # fmt: skip
-def test_any_rings_make_a_map_or_one_line(
+def test_any_rings_give_a_map_or_a_map_error(
     rings: list[list[tuple[int, int]]], tolerance: float, keep: Any, hull: bool, margin: float, given: bool
 ) -> None:
     parts = [Polygon([(x / 4, y / 4) for x, y in ring]) for ring in rings]
@@ -303,7 +305,7 @@ def test_any_rings_make_a_map_or_one_line(
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(points, min_size=3, max_size=9), st.booleans(), st.sampled_from([0.0, 0.4]))
-def test_boundary_and_obstacles_leave_what_was_free(
+def test_boundary_and_obstacles_preserve_the_free_space(
     ring: list[tuple[int, int]], hull: bool, margin: float
 ) -> None:
     free = round_polygons(shapely.make_valid(Polygon(ring)), 4)
@@ -314,7 +316,7 @@ def test_boundary_and_obstacles_leave_what_was_free(
     assert shapely.symmetric_difference(left, free).area < 1e-3 * (1 + free.area)
 
 
-def test_by_how_much_walls_moved() -> None:
+def test_the_deviation_of_walls_is_measured() -> None:
     # a bump of 15 mm goes: a triangle of 30 cm² changes sides
     bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
     _, report = build_environment(foreign(bumpy), Shaping(), "plan")
@@ -330,7 +332,7 @@ def test_by_how_much_walls_moved() -> None:
     assert (report.changed, report.moved, report.moved_area) == ((), 0.0, 0.0)
 
 
-def test_a_map_of_many_vertices_says_what_that_means() -> None:
+def test_a_map_of_many_vertices_has_a_note() -> None:
     angle = [k * math.tau / 6000 for k in range(6000)]
     round_room = Polygon([(400 * math.cos(a), 400 * math.sin(a)) for a in angle])
     _, report = build_environment(foreign(round_room), Shaping(simplify=0.0), "plan")
@@ -356,7 +358,7 @@ _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(_RECTANGLES, max_size=6))
-def test_the_roomiest_place(blocks: list[tuple[int, int, int, int]]) -> None:
+def test_the_start_is_where_clearance_is_largest(blocks: list[tuple[int, int, int, int]]) -> None:
     solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])
     room = max(shapely.get_parts(box(-1, -1, 16, 16) - solid), key=lambda part: part.area)
     (x, y), away = find_roomiest_point(room, 0.01)

@@ -82,7 +82,7 @@ def test_no_more_points_than_a_circle_needs() -> None:
     assert straight.tolist() == [[3.0, 0.0]]
 
 
-def test_many_at_once_are_each_one_alone() -> None:
+def test_batches_agree_with_single_curves() -> None:
     curves = np.random.default_rng(2).random((7, 4, 2)) * 10
     points, count = flatten_beziers(curves, 1e-2)
     assert len(set(count.tolist())) > 2
@@ -97,7 +97,7 @@ def test_many_at_once_are_each_one_alone() -> None:
 
 
 @pytest.mark.parametrize("radius", [1e8, 1e12, 1e30, math.nan])
-def test_what_is_huge_is_refused(radius: float) -> None:
+def test_huge_curves_are_refused(radius: float) -> None:
     with pytest.raises(ValueError, match=f"expected at most {MAX_POINTS} points, got more"):
         flatten_circle(radius, sweep=math.tau)
     with pytest.raises(ValueError, match="expected at most 250000 points"):

@@ -72,7 +72,7 @@ CASES: list[tuple[str, str, str]] = [
 
 
 @pytest.mark.parametrize(("suffix", "text", "expected"), CASES)
-def test_what_has_no_extent_is_no_shape(tmp_path: Path, suffix: str, text: str, expected: str) -> None:
+def test_shapes_without_extent_are_omitted(tmp_path: Path, suffix: str, text: str, expected: str) -> None:
     path = tmp_path / f"plan.{suffix}"
     path.write_text(text)
     options = ReadOptions(scale=1.0) if suffix in ("svg", "dxf") else ReadOptions()

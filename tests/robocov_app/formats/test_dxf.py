@@ -80,7 +80,7 @@ def read_obstacles(folder: Path, draw: Draw, **options: Any) -> Any:
         ),
     ],
 )
-def test_entities(tmp_path: Path, draw: Draw, expected: Any) -> None:
+def test_entities_become_areas_and_walls(tmp_path: Path, draw: Draw, expected: Any) -> None:
     assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-4
 
 
@@ -159,7 +159,7 @@ def add_chair(document: Any, name: str = "chair") -> Any:
     return block
 
 
-def test_blocks_are_carried_out_where_they_are_inserted(tmp_path: Path) -> None:
+def test_blocks_are_drawn_where_they_are_inserted(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
         add_chair(document)
         pair = document.blocks.new("pair")
@@ -180,7 +180,7 @@ def test_blocks_are_carried_out_where_they_are_inserted(tmp_path: Path) -> None:
     assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-6
 
 
-def test_circles_in_blocks_that_are_stretched(tmp_path: Path) -> None:
+def test_circles_in_stretched_blocks_become_ellipses(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
         document.blocks.new("table").add_circle((0, 0), 1)
         space.add_blockref("table", (5, 5), dxfattribs={"xscale": 3.0})
@@ -190,7 +190,7 @@ def test_circles_in_blocks_that_are_stretched(tmp_path: Path) -> None:
     assert oval.bounds == pytest.approx((2, 4, 8, 6), abs=2e-3)
 
 
-def test_layers_are_chosen_and_those_that_are_off_are_not_there(tmp_path: Path) -> None:
+def test_layers_are_selected_and_hidden_ones_omitted(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
         for name in ("WALLS", "Furniture", "hidden", "frozen"):
             document.layers.add(name)
@@ -228,7 +228,7 @@ def test_a_layer_of_lines_is_the_boundary(tmp_path: Path) -> None:
     assert walls.boundary.bounds == pytest.approx((-0.1, -0.1, 9.1, 6.1))
 
 
-def test_what_is_no_wall_is_told(tmp_path: Path) -> None:
+def test_unsupported_entities_are_counted(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
         space.add_text("Kitchen")
         space.add_mtext("Bath")
@@ -262,7 +262,7 @@ def test_multilines_are_their_lines(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("unit", sorted(UNITS))
-def test_units(tmp_path: Path, unit: int) -> None:
+def test_units_are_converted(tmp_path: Path, unit: int) -> None:
     scale = UNITS[unit][1]
     size = 10.0 / scale
 
@@ -289,7 +289,7 @@ def test_a_drawing_without_a_unit_needs_one(tmp_path: Path) -> None:
     ).free.area == pytest.approx(50.0)
 
 
-def test_a_binary_file(tmp_path: Path) -> None:
+def test_a_binary_file_is_read(tmp_path: Path) -> None:
     document = ezdxf.new()
     document.modelspace().add_lwpolyline([(0, 0), (9, 0), (9, 6), (0, 6)], close=True)
     document.saveas(tmp_path / "plan.dxf", fmt="bin")
@@ -371,7 +371,7 @@ def draw_many_entities(document: Any, space: Any) -> None:
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_what_cannot_be_used_is_refused(tmp_path: Path, content: Any, expected: str) -> None:
+def test_unusable_files_are_refused(tmp_path: Path, content: Any, expected: str) -> None:
     path = tmp_path / "plan.dxf"
     if isinstance(content, bytes):
         path.write_bytes(content)
@@ -384,7 +384,7 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, content: Any, expected: 
     assert "\n" not in str(caught.value)
 
 
-def test_without_ezdxf_there_is_one_line_with_the_way_to_get_it(
+def test_a_missing_ezdxf_is_reported_with_the_command_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "plan.dxf"
@@ -394,7 +394,7 @@ def test_without_ezdxf_there_is_one_line_with_the_way_to_get_it(
         IMPORTERS["dxf"].read(path, ReadOptions())
 
 
-def test_ezdxf_says_nothing_on_its_own(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_ezdxf_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "plan.dxf").write_bytes(b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n")
     with pytest.raises(MapError):
         IMPORTERS["dxf"].read(tmp_path / "plan.dxf", ReadOptions(scale=1.0))

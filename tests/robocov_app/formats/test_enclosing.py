@@ -40,7 +40,7 @@ def taken(found: Shapes, solid: bool = True) -> ForeignMap:
     return found.build_foreign_map(name="plan", description="", solid=solid)
 
 
-def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:
+def test_the_largest_outline_that_contains_the_rest_is_the_boundary() -> None:
     foreign = taken(shapes(square(2, 2, 1, 1), HALL, square(5, 5, 2, 1), square(30, 0, 1, 1)))
     assert foreign.dropped == ("1 shape outside of the boundary",)
     assert foreign.boundary is not None
@@ -50,7 +50,7 @@ def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:
     assert foreign.notes == ("3 closed outlines taken as solid (--outlines free: as free space)",)
 
 
-def test_a_name_is_the_boundary_whatever_its_size() -> None:
+def test_a_named_boundary_may_have_any_size() -> None:
     named = shapes((square(1, 1, 8, 8), "Boundary"), HALL, square(2, 2, 1, 1))
     assert taken(named).boundary.area == pytest.approx(64.0)  # type: ignore[union-attr]
     chosen = shapes((square(1, 1, 8, 8), "east wing"), (HALL, "frame"), boundary="East Wing", skip=("frame",))
@@ -61,7 +61,7 @@ def test_a_name_is_the_boundary_whatever_its_size() -> None:
     assert foreign.has_named_boundary
 
 
-def test_lines_of_that_name_are_the_boundary_where_they_close() -> None:
+def test_closed_lines_with_its_name_are_the_boundary() -> None:
     sides = [([a, b], "boundary") for a, b in pairwise(HALL)]
     foreign = taken(shapes(square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
@@ -71,7 +71,7 @@ def test_lines_of_that_name_are_the_boundary_where_they_close() -> None:
         taken(shapes(HALL, lines=[([[0, 0], [1, 1]], "open")], boundary="open"))
 
 
-def test_walls_that_close_are_the_boundary_by_their_outer_edge() -> None:
+def test_the_outer_edge_of_closed_walls_is_the_boundary() -> None:
     found = shapes(lines=[HALL, [[10, 0], [10, 4]], [[10, 6], [10, 10]]], thickness=0.2)
     foreign = taken(found)
     assert foreign.boundary.bounds == pytest.approx((-0.1, -0.1, 20.1, 10.1))  # type: ignore[union-attr]
@@ -79,7 +79,7 @@ def test_walls_that_close_are_the_boundary_by_their_outer_edge() -> None:
     assert len(foreign.free.geoms) == 1
 
 
-def test_without_a_boundary_there_is_room_around_everything() -> None:
+def test_a_missing_boundary_becomes_a_rectangle_around_everything() -> None:
     foreign = taken(shapes(square(0, 0, 2, 2), square(5, 5, 2, 2), around=3.0))
     assert foreign.boundary.equals(box(-3, -3, 10, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(13 * 13 - 8)
@@ -87,7 +87,7 @@ def test_without_a_boundary_there_is_room_around_everything() -> None:
     assert not foreign.has_named_boundary
 
 
-def test_geometries_are_free_unless_one_holds_the_others() -> None:
+def test_geometries_are_free_unless_one_contains_the_others() -> None:
     rooms = shapes(square(0, 0, 4, 4), square(3, 1, 6, 2), square(50, 0, 5, 5))
     free = taken(rooms, solid=False)
     assert free.boundary is None
@@ -118,7 +118,7 @@ def test_walls_drawn_as_one_shape_are_solid() -> None:
     assert foreign.free.area == pytest.approx(64 + 72 - 1)
 
 
-def test_what_outlines_are_can_be_said() -> None:
+def test_outlines_can_be_declared() -> None:
     areas = (HALL, square(2, 2, 1, 1))
     assert taken(shapes(*areas, outlines="free")).free.area == pytest.approx(200.0)
     assert taken(shapes(*areas, outlines="solid"), solid=False).free.area == pytest.approx(199.0)
@@ -130,7 +130,7 @@ def test_what_outlines_are_can_be_said() -> None:
         taken(shapes(lines=[HALL], outlines="free"))
 
 
-def test_points_are_pillars_if_they_are_asked_for() -> None:
+def test_points_become_pillars_on_request() -> None:
     assert taken(shapes(HALL, points=[[5, 5]])).dropped == (
         "1 point (--pillar RADIUS makes pillars of them)",
     )
@@ -139,7 +139,7 @@ def test_points_are_pillars_if_they_are_asked_for() -> None:
     assert foreign.notes[-1] == "2 points taken as pillars"
 
 
-def test_lines_that_meet_are_joined_to_whole_corners() -> None:
+def test_adjacent_lines_are_joined_to_whole_corners() -> None:
     corner = shapes(lines=[[[0, 0], [4, 0]], [[4, 0], [4, 3]], [[8, 0], [9, 0]]])
     corner.join_lines()
     assert len(corner.lines) == 2
@@ -150,7 +150,7 @@ def test_lines_that_meet_are_joined_to_whole_corners() -> None:
     assert len(apart.lines) == 2
 
 
-def test_only_what_was_asked_for() -> None:
+def test_shapes_are_selected_by_name() -> None:
     areas = ((HALL, "hall"), (square(2, 2, 1, 1), "desk"), (square(5, 5, 2, 1), "Plant"))
     assert taken(shapes(*areas, only=("HALL", "plant"))).free.area == pytest.approx(198.0)
     assert taken(shapes(*areas, skip=("plant", "desk"))).free.area == pytest.approx(200.0)
@@ -160,7 +160,7 @@ def test_only_what_was_asked_for() -> None:
         taken(shapes(HALL, boundary="hall"))
 
 
-def test_what_is_nothing_is_told() -> None:
+def test_omissions_and_repairs_are_reported() -> None:
     found = shapes(HALL, [[0, 0], [1, 0], [2, 0]], lines=[[[1, 1], [1, 1]]])
     found.omissions.add_heights(np.array([np.nan, 2.0, 3.5]))
     found.leave_out("text", count=2)
@@ -183,13 +183,13 @@ def test_what_is_nothing_is_told() -> None:
         taken(empty)
 
 
-def test_hairlines_are_made_walls() -> None:
+def test_hairlines_become_walls() -> None:
     foreign = taken(shapes(HALL, lines=[[[5, 0], [5, 5]]], thickness=1e-5))
     assert foreign.repaired == ("1 line thinner than 1 mm, made as wide",)
     assert foreign.free.area == pytest.approx(200 - 0.005)
 
 
-def test_outlines_that_meet_themselves_are_counted() -> None:
+def test_self_crossing_outlines_are_counted() -> None:
     bow = [[0, 0], [4, 4], [4, 0], [0, 4]]
     one = taken(shapes(bow), solid=False)
     assert one.repaired == ("the outline met itself: Self-intersection[2 2]",)
@@ -199,7 +199,7 @@ def test_outlines_that_meet_themselves_are_counted() -> None:
 
 
 @pytest.mark.parametrize("far", [1e300, np.nan, np.inf, 2e7])
-def test_coordinates_beyond_the_world_are_refused(far: float) -> None:
+def test_coordinates_out_of_range_are_refused(far: float) -> None:
     for drawn in ({"lines": [[[0, 0], [far, 0]]]}, {"points": [[far, 0]]}):
         with pytest.raises(MapError, match=r"plan: expected coordinates from -10000000 to"):
             shapes(**drawn)
@@ -209,13 +209,13 @@ def test_coordinates_beyond_the_world_are_refused(far: float) -> None:
         Shapes("plan", ReadOptions()).add_circle(np.zeros(2), far)
 
 
-def test_what_is_larger_than_any_map_is_refused() -> None:
+def test_drawings_larger_than_any_map_are_refused() -> None:
     far = shapes(square(0, 0, 1e6, 9))
     with pytest.raises(MapError, match=r"plan: expected at most 10 km, got 1e.06 x 9 m: is the scale right."):
         taken(far)
 
 
-def test_shapes_thinner_than_the_grid_are_no_walls() -> None:
+def test_shapes_thinner_than_the_grid_are_omitted() -> None:
     slivers = shapes(*([[0, y], [3, y], [6, y + 1e-7]] for y in (0, 5)))
     assert taken(slivers).free.area == pytest.approx(8 * 7)
 
@@ -237,7 +237,7 @@ _ROOM = st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(1, 12), st
 
 @settings(max_examples=100)
 @given(st.lists(_ROOM, min_size=1, max_size=6), st.sampled_from(["free", "solid"]))
-def test_free_and_solid_are_each_others_complement(rooms: list[tuple[int, int, int, int]], what: str) -> None:
+def test_free_and_solid_are_complements(rooms: list[tuple[int, int, int, int]], what: str) -> None:
     frame = (square(-1, -1, 60, 60), "boundary")
     foreign = taken(shapes(frame, *(square(*room) for room in rooms), outlines=what))
     together = shapely.union_all([box(x, y, x + w, y + h) for x, y, w, h in rooms])

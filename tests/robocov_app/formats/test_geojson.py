@@ -33,7 +33,7 @@ HALL = polygon(square(0, 0, 20, 10), square(1, 1, 2, 2))
     "document",
     [HALL, feature(HALL), collection(feature(HALL)), {"type": "GeometryCollection", "geometries": [HALL]}],
 )
-def test_every_way_to_hold_a_polygon(tmp_path: Path, document: Any) -> None:
+def test_polygons_are_found_in_every_container(tmp_path: Path, document: Any) -> None:
     foreign = read(tmp_path, "geojson", document)
     assert foreign.free.equals(shapely.from_geojson(json.dumps(HALL)))
     assert detect_format(tmp_path / "plan.geojson").name == "geojson"
@@ -64,7 +64,7 @@ def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
     assert with_pillar.free.area == pytest.approx(200 - 12 - 0.5 - 0.2827, abs=0.01)
 
 
-def test_a_name_is_no_boundary_where_the_kind_says_otherwise(tmp_path: Path) -> None:
+def test_a_line_with_the_name_of_the_boundary_is_a_wall(tmp_path: Path) -> None:
     document = collection(
         feature(polygon(square(0, 0, 20, 10)), kind="boundary"),
         feature(polygon(square(1, 1, 2, 2)), kind="obstacle", name="boundary"),
@@ -84,7 +84,7 @@ def test_degrees_are_projected(tmp_path: Path) -> None:
     assert across.repaired == ("1 ring closed: the last point was not the first",)
 
 
-def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
+def test_coordinate_systems_in_the_file_are_used(tmp_path: Path) -> None:
     utm = polygon(square(456000, 5430000, 100, 50))
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
     assert read(tmp_path, "geojson", {**utm, "crs": crs}).free.area == pytest.approx(5000, rel=2e-3)
@@ -133,7 +133,9 @@ def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
         ("{", "not JSON"),
     ],
 )
-def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, expected: str | None) -> None:
+def test_invalid_geojson_is_reported_with_its_path(
+    tmp_path: Path, document: Any, expected: str | None
+) -> None:
     path = tmp_path / "plan.geojson"
     path.write_text(document if isinstance(document, str) else json.dumps(document))
     with pytest.raises(MapError) as caught:
@@ -144,7 +146,7 @@ def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, e
     assert expected is None or expected in message
 
 
-def test_two_systems_in_a_file(tmp_path: Path) -> None:
+def test_two_reference_systems_are_refused(tmp_path: Path) -> None:
     first = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25832"}}}
     second = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25833"}}}
     with pytest.raises(MapError, match=r"features\[1\]\.crs: expected the same system as before, EPSG:25832"):
@@ -212,7 +214,7 @@ def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text:
     ],
     ids=["value", "cut", "number", "separated"],
 )
-def test_what_is_wrong_in_a_sequence_is_told_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
+def test_mistakes_in_a_sequence_are_reported_with_the_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "plan.geojsonl"
     path.write_text(text)
     with pytest.raises(MapError, match=expected):

@@ -47,7 +47,7 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     assert (np.abs(lean[long]) < 0.06 / narrow).all()
 
 
-def test_what_is_wide_is_meters() -> None:
+def test_wide_coordinates_are_meters() -> None:
     meters, (note,) = moved([[0, 0], [20, 10]], may_be_degrees=True)
     assert meters.tolist() == [[0, 0], [20, 10]]
     assert "as degrees the map would be larger than 10 km" in note
@@ -59,7 +59,7 @@ def test_what_is_wide_is_meters() -> None:
     assert "degrees projected" in moved([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
 
 
-def test_a_system_is_obeyed() -> None:
+def test_a_given_reference_system_is_used() -> None:
     degrees = np.array([[8.4, 49.0], [8.41, 49.005]])
     to_utm = pyproj.Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
     utm = np.column_stack(to_utm.transform(*degrees.T))
@@ -95,20 +95,20 @@ def test_a_system_is_obeyed() -> None:
         ("EPSG:4326", [[0, 0], [np.nan, 1]], r"expected longitude and latitude"),
     ],
 )
-def test_what_no_place_is_is_refused(crs: str, points: Any, expected: str) -> None:
+def test_impossible_coordinates_are_refused(crs: str, points: Any, expected: str) -> None:
     with pytest.raises(MapError, match=rf"^plan: {expected}.*--units meters") as caught:
         moved(points, crs=crs)
     assert "\n" not in str(caught.value)
 
 
-def test_without_pyproj_there_is_one_line_with_the_way_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_pyproj_is_reported_with_the_command_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(MapError, match=r'^plan: coordinates in degrees: .*pip install "robocov\[geo\]"'):
         moved([[8, 49], [8.001, 49.001]], may_be_degrees=True)
     assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="meters"), may_be_degrees=True)[0][0, 0] == 8.0
 
 
-def test_figures_keep_their_rings() -> None:
+def test_projected_geometries_keep_their_rings() -> None:
     figures = [
         SourceGeometry("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
         SourceGeometry("point", (np.full((1, 2), 5.0),)),

@@ -135,7 +135,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured as Linux tells it")
-def test_they_are_refused(tmp_path: Path) -> None:
+def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
     files: list[tuple[Path, float | None]] = []
     for name, (file, content, options, _) in HOSTILE.items():
         folder = tmp_path / name.replace("^", "")
@@ -157,7 +157,7 @@ def test_they_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_good_one_is_not(tmp_path: Path) -> None:
+def test_a_valid_raster_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "a.pgm"
     path.write_bytes(pgm(draw_pixels(PLAN)))
     ((said, _, memory),) = measure_import([(path, 1.0)])

@@ -57,7 +57,7 @@ def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
     )
 
 
-def test_cut_corners_become_whole(tmp_path: Path) -> None:
+def test_cut_corners_are_completed(tmp_path: Path) -> None:
     environment, report = import_plan(write(tmp_path, plan(PLAN)))
     assert report.vertices_kept == 12
     assert set(environment.boundary) == {
@@ -69,7 +69,7 @@ def test_cut_corners_become_whole(tmp_path: Path) -> None:
     assert set(untouched.boundary) == {(float(x), float(y)) for x, y in PLAN}
 
 
-def test_a_closed_ring_with_repeats(tmp_path: Path) -> None:
+def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
     verts = [[0, 0], [5, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
     environment, report = import_plan(write(tmp_path, plan(verts)))
     assert len(environment.boundary) == 4
@@ -77,7 +77,7 @@ def test_a_closed_ring_with_repeats(tmp_path: Path) -> None:
     assert report.repaired == ("2 repeated vertices taken out",)
 
 
-def test_a_ring_that_crosses_itself(tmp_path: Path) -> None:
+def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
     # a bow tie of 8 m² and 2 m²
     verts = [[0, 0], [0, 4], [6, -2], [6, 0]]
     environment, report = import_plan(write(tmp_path, plan(verts)))
@@ -88,7 +88,7 @@ def test_a_ring_that_crosses_itself(tmp_path: Path) -> None:
     assert report.dropped == ("1 separate part of the free space, 2 m²",)
 
 
-def test_a_ring_round_a_block_gives_an_obstacle(tmp_path: Path) -> None:
+def test_a_ring_around_a_block_gives_an_obstacle(tmp_path: Path) -> None:
     # the outline runs in to a block, round it, and out again the same way
     verts = [[0, 0], [6, 0], [6, 6], [0, 6], [0, 3], [2, 3], [2, 4], [4, 4], [4, 2], [2, 2], [2, 3], [0, 3]]
     environment, report = import_plan(write(tmp_path, plan(verts)))
@@ -97,7 +97,7 @@ def test_a_ring_round_a_block_gives_an_obstacle(tmp_path: Path) -> None:
     assert report.repaired
 
 
-def test_the_starts(tmp_path: Path) -> None:
+def test_starts_are_added(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
     environment, _ = import_plan(path)
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
@@ -126,7 +126,7 @@ def test_the_starts(tmp_path: Path) -> None:
         (plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
     ],
 )
-def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
+def test_invalid_plans_are_refused_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
     path = write(tmp_path, document)
     with pytest.raises(MapError) as caught:
         import_plan(path)
@@ -136,7 +136,7 @@ def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, e
     assert "\n" not in message
 
 
-def test_corners_are_made_whole_and_nothing_else() -> None:
+def test_only_cut_corners_are_completed() -> None:
     cut = Polygon([(0, 0.02), (0.02, 0), (6, 0), (6, 3), (0, 3)])
     assert sharpen_corners(cut, 0.02).symmetric_difference(box(0, 0, 6, 3)).area < 1e-12
     assert sharpen_corners(cut, 0.0).equals(cut)
@@ -149,7 +149,7 @@ def test_corners_are_made_whole_and_nothing_else() -> None:
     assert sharpen_corners(holed, 0.02).area == pytest.approx(17.0)
 
 
-def test_options_out_of_range(tmp_path: Path) -> None:
+def test_options_out_of_range_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
     for tolerance in (-1.0, math.nan, 11.0):
         with pytest.raises(ParameterError, match="simplify"):

@@ -35,7 +35,7 @@ def shade(picture: Brightness) -> np.ndarray:
     return picture.level / picture.full
 
 
-def test_pgm_plain_and_raw_of_8_and_16_bits(tmp_path: Path) -> None:
+def test_pgm_of_8_and_16_bits_is_read(tmp_path: Path) -> None:
     plain = "P2\n# a comment\n4 # and here\n3\n#another\n255\n" + "\n".join(
         " ".join(map(str, row)) for row in GRAY
     )
@@ -63,7 +63,7 @@ def test_pgm_plain_and_raw_of_8_and_16_bits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path, b"P5 3 1 255\n" + first.tobytes()).level, first)
 
 
-def test_png_of_every_depth_and_color(tmp_path: Path) -> None:
+def test_png_of_every_depth_and_color_is_read(tmp_path: Path) -> None:
     base = Image.fromarray(GRAY)
     packed = b"".join(
         b"\0" + bytes((row[0] // 17 << 4 | row[1] // 17, row[2] // 17 << 4 | row[3] // 17)) for row in GRAY
@@ -89,7 +89,7 @@ def test_png_of_every_depth_and_color(tmp_path: Path) -> None:
         np.testing.assert_array_equal(shade(picture)[0], levels * step / 255)
 
 
-def test_colors_are_added_up_and_alpha_is_kept_apart(tmp_path: Path) -> None:
+def test_colors_are_averaged_and_alpha_is_separate(tmp_path: Path) -> None:
     colors = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
     picture = read(tmp_path, png(Image.fromarray(colors)))
     assert picture.full == 765
@@ -105,7 +105,7 @@ def test_colors_are_added_up_and_alpha_is_kept_apart(tmp_path: Path) -> None:
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0]]
 
 
-def test_a_transparent_color_of_a_palette_or_a_grey(tmp_path: Path) -> None:
+def test_transparent_colors_are_recognized(tmp_path: Path) -> None:
     image = Image.fromarray(np.array([[0, 1, 2]], dtype=np.uint8), mode=None).convert("L")
     palette = Image.new("P", (3, 1))
     palette.putpalette([0, 0, 0, 255, 255, 255, 100, 100, 100])
@@ -117,7 +117,7 @@ def test_a_transparent_color_of_a_palette_or_a_grey(tmp_path: Path) -> None:
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0, 255]]
 
 
-def test_texts(tmp_path: Path) -> None:
+def test_texts_in_png_are_read(tmp_path: Path) -> None:
     texts = PngImagePlugin.PngInfo()
     texts.add_text("Title", "a plan")
     texts.add_itxt("robocov", "α", zip=True)
@@ -166,7 +166,7 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
 
 
 @pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
-def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
+def test_compressed_tiff_is_read(tmp_path: Path, compression: str) -> None:
     image = Image.fromarray(np.array(GRAY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
     picture = read(tmp_path, save_picture(image, "TIFF", compression=compression))
     np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
@@ -174,7 +174,7 @@ def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
 
 @pytest.mark.parametrize("kind", [">u2", "<u2"])
 @pytest.mark.parametrize("white_is_zero", [False, True])
-def test_tiff_of_16_bits(tmp_path: Path, kind: str, white_is_zero: bool) -> None:
+def test_tiff_of_16_bits_is_read(tmp_path: Path, kind: str, white_is_zero: bool) -> None:
     order = kind[0]
     pixels = np.array([[0, 65535], [1000, 2000]]).astype(kind).tobytes()
     tags = [
@@ -225,7 +225,7 @@ def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
     ],
     ids=["heights", "bytes", "nan", "whole"],
 )
-def test_a_tiff_of_other_samples_is_named(tmp_path: Path, image: bytes, found: str) -> None:
+def test_a_tiff_of_unclear_samples_is_refused(tmp_path: Path, image: bytes, found: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, image)
     message = str(caught.value)
@@ -235,7 +235,7 @@ def test_a_tiff_of_other_samples_is_named(tmp_path: Path, image: bytes, found: s
 
 @pytest.mark.parametrize("kind", ["JPEG", "TIFF", "PNG"])
 @pytest.mark.parametrize("turn", range(1, 9))
-def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int) -> None:
+def test_pictures_are_oriented_by_their_exif_data(tmp_path: Path, kind: str, turn: int) -> None:
     image = Image.new("L", (16, 8), 255)
     image.paste(0, (0, 0, 8, 8))
     upright = {1: image, 2: image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)}
@@ -249,7 +249,7 @@ def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int)
 
 
 @pytest.mark.parametrize("mode", ["L", "RGB", "CMYK"])
-def test_jpeg(tmp_path: Path, mode: str) -> None:
+def test_jpeg_is_read(tmp_path: Path, mode: str) -> None:
     image = Image.new("RGB", (32, 16), (250, 240, 230))
     image.paste((20, 0, 10), (8, 0, 24, 16))
     picture = read(tmp_path, save_picture(image.convert(mode), "JPEG", quality=95))
@@ -257,7 +257,7 @@ def test_jpeg(tmp_path: Path, mode: str) -> None:
     np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
 
 
-def test_ppm_of_16_bits_and_in_words(tmp_path: Path) -> None:
+def test_ppm_of_16_bits_and_in_ascii_is_read(tmp_path: Path) -> None:
     deep = (COLORS * 257).astype(">u2")
     words = " ".join(map(str, COLORS.ravel().tolist()))
     for data in (b"P6 2 3 65535\n" + deep.tobytes(), f"P3 2 3 255 {words}".encode()):
@@ -310,7 +310,7 @@ WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), 
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_what_is_refused(tmp_path: Path, data: bytes, expected: str) -> None:
+def test_invalid_pictures_are_refused(tmp_path: Path, data: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, data)
     message = str(caught.value)
@@ -321,7 +321,7 @@ def test_what_is_refused(tmp_path: Path, data: bytes, expected: str) -> None:
 
 @settings(deadline=None, max_examples=150)
 @given(st.integers(8, len(WHOLE) - 1), st.integers(0, 255), st.booleans())
-def test_a_changed_byte_is_no_disaster(
+def test_a_changed_byte_gives_a_picture_or_a_map_error(
     tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
 ) -> None:
     data = WHOLE[:at] if cut else WHOLE[:at] + bytes((byte,)) + WHOLE[at + 1 :]

@@ -142,12 +142,12 @@ def test_a_level_is_chosen_by_number_or_name(tmp_path: Path, asked: str) -> None
     assert foreign.free.area == pytest.approx(600, rel=1e-4)
 
 
-def test_a_level_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_level_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got '7'"):
         read(as_folder(tmp_path / "mill", venue()), level="7")
 
 
-def test_without_openings_units_are_open_to_each_other(tmp_path: Path) -> None:
+def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:
     given = venue()
     del given["opening"]
     foreign = read(as_folder(tmp_path / "mill", given))
@@ -182,7 +182,7 @@ def many() -> bytes:
     ],
     ids=["bomb", "many", "cut", "mixed"],
 )
-def test_archives_that_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_invalid_archives_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "mill.zip"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:
@@ -191,7 +191,7 @@ def test_archives_that_are_refused(tmp_path: Path, content: bytes, expected: str
     assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
 
 
-def test_content_that_is_refused(tmp_path: Path) -> None:
+def test_invalid_content_is_refused(tmp_path: Path) -> None:
     cases: list[tuple[str, Any, str]] = [
         ("level", [], "expected units on its levels, got none"),
         ("unit", [], "expected units on its levels, got none"),
@@ -212,7 +212,7 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
         assert expected in str(caught.value)
 
 
-def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:
+def test_other_folders_and_archives_are_not_imdf(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(MapError, match="expected a file, got a folder"):
         detect_format(tmp_path / "empty")

@@ -11,7 +11,7 @@ from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, get_importer, import_map
 
 
-def test_every_format_says_what_it_is() -> None:
+def test_every_format_has_a_name_and_a_title() -> None:
     known = {field.name for field in fields(ReadOptions)}
     for name, one in IMPORTERS.items():
         assert one.name == name
@@ -24,7 +24,7 @@ def test_every_format_says_what_it_is() -> None:
     assert {"ros", "movingai", "picture"} <= IMPORTERS.keys()
 
 
-def test_no_format_takes_noise_for_its_own(tmp_path: Path) -> None:
+def test_no_format_accepts_noise(tmp_path: Path) -> None:
     rng_free = [
         b"",
         b"\0" * 5000,
@@ -51,7 +51,7 @@ def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
         import_map(tmp_path / "half.yaml")
 
 
-def test_what_is_not_known(tmp_path: Path) -> None:
+def test_unknown_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "plan.xyz"
     path.write_text("nothing")
     expected = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
@@ -93,7 +93,7 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
         ({"trees": "green"}, "trees: expected one of obstacle, free"),
     ],
 )
-def test_options_out_of_range(options: dict[str, object], expected: str) -> None:
+def test_options_out_of_range_are_refused(options: dict[str, object], expected: str) -> None:
     with pytest.raises(ParameterError, match=expected):
         ReadOptions(**options)  # type: ignore[arg-type]
 

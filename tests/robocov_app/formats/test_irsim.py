@@ -263,9 +263,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
     assert compute_obstacles(read(tmp_path, BUNDLED)).is_empty
 
 
-def test_without_irsim_a_bundled_map_is_said_to_need_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)
@@ -274,7 +272,7 @@ def test_without_irsim_a_bundled_map_is_said_to_need_it(
     assert str(caught.value) == place + expected + "IR-SIM is not installed (pip install ir-sim)."
 
 
-def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
+def test_transparency_is_reported_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
     cause = "no cell is free: 100 % of the pixels are transparent, and count by the color that is hidden"
     with pytest.raises(MapError, match=cause):

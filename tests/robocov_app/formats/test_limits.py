@@ -9,7 +9,7 @@ from robocov.errors import MapError
 from robocov_app.formats import files
 
 
-def test_the_beginning_and_the_whole_of_a_file(tmp_path: Path) -> None:
+def test_heads_and_contents_are_read(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(b"x" * (files.HEAD_BYTES + 10))
     assert len(files.read_head(path)) == files.HEAD_BYTES
@@ -19,7 +19,7 @@ def test_the_beginning_and_the_whole_of_a_file(tmp_path: Path) -> None:
         files.read_content(path, 1_000_000)
 
 
-def test_what_is_no_file(tmp_path: Path) -> None:
+def test_other_paths_are_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path, expected in (
         (tmp_path / "none", "no such file"),
@@ -36,7 +36,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
             assert "\n" not in str(caught.value)
 
 
-def test_a_size_on_the_disk_is_looked_at_before_the_content(tmp_path: Path) -> None:
+def test_the_size_is_checked_before_the_content(tmp_path: Path) -> None:
     path = tmp_path / "sparse"
     with path.open("wb") as file:
         file.truncate(10**12)
@@ -44,7 +44,7 @@ def test_a_size_on_the_disk_is_looked_at_before_the_content(tmp_path: Path) -> N
         files.read_content(path)
 
 
-def test_sizes_counts_lengths_and_places() -> None:
+def test_limits_are_checked() -> None:
     files.require_cells(8000, 8000, "grid")
     for width, height in ((0, 5), (5, -1)):
         with pytest.raises(MapError, match="expected at least 1 x 1, got"):

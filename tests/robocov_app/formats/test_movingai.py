@@ -27,7 +27,7 @@ def read(folder: Path, text: str | bytes, **options: object) -> ForeignMap:
     return IMPORTER.read(write(folder, text), ReadOptions(**options))  # type: ignore[arg-type]
 
 
-def test_letters(tmp_path: Path) -> None:
+def test_characters_have_their_meaning(tmp_path: Path) -> None:
     foreign = read(tmp_path, GRID)
     expected = shapely.box(1, 1, 5, 2) | shapely.box(1, 2, 3, 3) | shapely.box(1, 3, 4, 4)
     assert shapely.equals(foreign.free, expected)
@@ -43,14 +43,14 @@ def test_letters(tmp_path: Path) -> None:
     assert read(tmp_path, GRID, trees="obstacle").free.area == 9
 
 
-def test_it_is_known_by_its_content_and_its_suffix(tmp_path: Path) -> None:
+def test_the_format_is_detected_by_content_and_suffix(tmp_path: Path) -> None:
     assert detect_format(write(tmp_path, GRID, "grid.txt")) is IMPORTER
     assert detect_format(write(tmp_path, "nothing of the kind", "b.map")) is IMPORTER
     with pytest.raises(MapError, match=r"b\.map: line 1: expected type octile"):
         import_map(tmp_path / "b.map")
 
 
-def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> None:
+def test_variants_of_the_header_are_accepted(tmp_path: Path) -> None:
     same = read(tmp_path, GRID).free
     for text in (
         GRID.replace("\n", "\r\n"),
@@ -99,7 +99,7 @@ def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> N
     ],
     ids=map(str, range(99)),
 )
-def test_what_is_refused(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_files_are_refused(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
     assert expected in str(caught.value)

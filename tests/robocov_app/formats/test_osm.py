@@ -78,7 +78,7 @@ def solid(folder: Path, extract: Extract, **options: Any) -> Any:
     return box(*free.bounds) - free
 
 
-def test_buildings_stand_where_they_are_north_up(tmp_path: Path) -> None:
+def test_buildings_are_projected_with_north_up(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(10, 5, 8), building="yes")
     extract.way(square(-30, -20, 5), building="church", name="St. Anna")
@@ -118,7 +118,7 @@ def test_barriers_are_walls_and_posts_are_points(tmp_path: Path) -> None:
     assert "1 gate taken as closed" in report.notes
 
 
-def test_water_and_what_is_no_obstacle(tmp_path: Path) -> None:
+def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(0, 0, 10), natural="water")
     extract.way(square(20, 0, 10), building="roof")
@@ -136,7 +136,7 @@ def test_water_and_what_is_no_obstacle(tmp_path: Path) -> None:
     )
 
 
-def test_without_bounds_a_rectangle_is_around(tmp_path: Path) -> None:
+def test_data_without_bounds_gets_a_rectangle(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(-10, -10, 5), building="yes")
     extract.way(square(5, 5, 5), building="yes")
@@ -174,7 +174,7 @@ def crowd() -> str:
     ],
     ids=map(str, range(13)),
 )  # fmt: skip
-def test_what_is_refused(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_data_is_refused(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "town.osm"
     path.write_text(text)
     with pytest.raises(MapError) as caught:
@@ -187,7 +187,7 @@ def test_what_is_refused(tmp_path: Path, text: str, expected: str) -> None:
 
 
 @pytest.mark.parametrize("tags", [{"building": "yes"}, {"barrier": "wall"}, {"natural": "water"}])
-def test_a_way_of_one_repeated_node_is_no_outline(tmp_path: Path, tags: dict[str, str]) -> None:
+def test_a_way_of_one_repeated_node_is_omitted(tmp_path: Path, tags: dict[str, str]) -> None:
     extract = Extract()
     node = extract.node(0, 0)
     extract.way_of([node] * 4, **tags)
@@ -197,7 +197,7 @@ def test_a_way_of_one_repeated_node_is_no_outline(tmp_path: Path, tags: dict[str
         IMPORTERS["osm"].read(path, ReadOptions())
 
 
-def test_a_degenerate_way_beside_others_is_left_out(tmp_path: Path) -> None:
+def test_a_degenerate_way_is_omitted(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(0, 0, 5), building="yes")
     extract.way_of([1, 1, 1], building="yes")
@@ -239,7 +239,7 @@ DESK = square(0, 0, 10)
 
 
 @pytest.mark.parametrize("style", ["out", "out geom", "out ids geom"])
-def test_overpass_json_is_as_xml(tmp_path: Path, style: str) -> None:
+def test_overpass_json_agrees_with_xml(tmp_path: Path, style: str) -> None:
     ring = [*DESK, DESK[0]]
     way: dict[str, Any] = {"type": "way", "id": 10, "tags": {"building": "yes"}}
     post = {**nodes([(-10, -10)], 50)[0], "tags": {"barrier": "bollard"}}
@@ -258,7 +258,7 @@ def test_overpass_json_is_as_xml(tmp_path: Path, style: str) -> None:
     assert "Overpass says: runtime error: Query timed out" in foreign.notes
 
 
-def test_overpass_relations_hold_their_ways(tmp_path: Path) -> None:
+def test_overpass_relations_contain_their_ways(tmp_path: Path) -> None:
     members = [
         {"type": "way", "ref": 7, "role": "outer", "geometry": geometry([*ROOM, ROOM[0]])},
         {"type": "way", "ref": 8, "role": "inner", "geometry": geometry([*DESK, DESK[0]])},
@@ -290,7 +290,7 @@ def test_overpass_relations_hold_their_ways(tmp_path: Path) -> None:
         ('[{"type": "area", "id": 1}]', "no closed outline and no line"),
     ],
 )
-def test_overpass_json_that_is_refused(tmp_path: Path, elements: str, expected: str) -> None:
+def test_invalid_overpass_json_is_refused(tmp_path: Path, elements: str, expected: str) -> None:
     path = tmp_path / "town.json"
     path.write_text('{"osm3s": {}, "elements": ' + elements + "}")
     with pytest.raises(MapError) as caught:
@@ -352,7 +352,7 @@ def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
     assert "stairs and lifts taken as solid: 1" in foreign.notes
 
 
-def test_without_doors_rooms_are_open_to_what_adjoins(tmp_path: Path) -> None:
+def test_rooms_without_doors_are_open_to_adjacent_spaces(tmp_path: Path) -> None:
     foreign = indoors(tmp_path, floor_plan(doors=False))
     assert len(foreign.free.geoms) == 1
     assert foreign.free.area == pytest.approx(20 * 10 + 10 * 6 - 4, rel=1e-3)
@@ -379,7 +379,7 @@ def test_a_town_with_one_house_from_inside_is_read_outdoors(tmp_path: Path) -> N
     assert indoors(tmp_path, extract, level="2").free.area == pytest.approx(80, rel=1e-3)
 
 
-def test_walls_columns_and_levels_as_they_are_written(tmp_path: Path) -> None:
+def test_spellings_of_walls_columns_and_levels_are_accepted(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(0, 0, 10), indoor="area", level="-1-1")
     extract.way([(5, 0), (5, 6)], closed=False, indoor="wall", level="1", width="0.5")

@@ -65,7 +65,7 @@ def test_single_cells_of_a_jpeg_are_noise(tmp_path: Path) -> None:
     assert len(exact.obstacles) == 2
 
 
-def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
+def test_transparent_pixels_are_unknown(tmp_path: Path) -> None:
     pixels = np.full((4, 4, 4), 255, dtype=np.uint8)
     pixels[:, 2, 3] = 127
     pixels[:, 3] = (0, 0, 0, 128)
@@ -80,7 +80,7 @@ def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
         read(save_picture(tmp_path, pixels), cell=1.0)
 
 
-def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
+def test_position_and_scale_in_the_file_are_used(tmp_path: Path) -> None:
     path = save_picture(tmp_path, LEVELS, json.dumps({"cell_m": 0.5, "origin_m": [3, -2]}), title="an office")
     foreign = IMPORTER.read(path, ReadOptions())
     assert foreign.free.bounds == (3.0, -2.0, 5.0, -1.0)
@@ -97,7 +97,7 @@ def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
         '{"cell_m": 1e999, "origin_m": [0, 0]}', '{"cell_m": 1, "origin_m": {"a": 0, "b": 1}}',
     ],
 )  # fmt: skip
-def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) -> None:
+def test_a_picture_without_a_scale_requires_one(tmp_path: Path, chunk: str | None) -> None:
     path = save_picture(tmp_path, LEVELS, chunk)
     with pytest.raises(
         MapError, match=r"plan.png: a picture has no scale, expected --cell, the meters per pixel"
@@ -106,7 +106,7 @@ def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) ->
     assert read(path, cell=1.0).bounds == (0.0, 0.0, 4.0, 2.0)
 
 
-def test_the_yaml_beside_it_is_pointed_at(tmp_path: Path) -> None:
+def test_a_yaml_file_next_to_it_is_suggested(tmp_path: Path) -> None:
     path = save_picture(tmp_path, LEVELS)
     (tmp_path / "plan.yaml").write_text("image: plan.png")
     with pytest.raises(MapError, match=r"\(or import plan\.yaml next to it\)"):

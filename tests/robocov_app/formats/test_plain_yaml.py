@@ -43,7 +43,7 @@ def test_aliases_repeat_values() -> None:
     assert parse(text, "m") == {"a": box, "b": [box, box], "c": "x", "d": "x", "e": "y", "f": "y"}
 
 
-def test_merge_keys_give_what_is_not_given() -> None:
+def test_merge_keys_add_missing_values() -> None:
     text = b"a: &a {x: 1, y: 2}\nb: &b {y: 3, z: 4}\nc: {<<: *a, y: 5}\nd: {z: 6, <<: [*a, *b]}\ne: {'<<': 7}"
     found = parse(text, "m")
     assert found["c"] == {"x": "1", "y": "5"}
@@ -83,7 +83,7 @@ def test_merge_keys_give_what_is_not_given() -> None:
     ],
     ids=map(str, range(99)),
 )
-def test_what_is_refused(text: bytes, expected: str) -> None:
+def test_unsupported_yaml_is_refused(text: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         parse(text, "m")
     assert expected in str(caught.value)
@@ -92,7 +92,7 @@ def test_what_is_refused(text: bytes, expected: str) -> None:
 
 @settings(deadline=None, max_examples=300)
 @given(st.one_of(st.binary(max_size=80), st.text(alphabet="ab:-[]{},&*!|>'\"#%@ \n\t01.?", max_size=60)))
-def test_anything_is_a_mapping_or_refused(text: bytes | str) -> None:
+def test_any_text_is_a_mapping_or_refused(text: bytes | str) -> None:
     try:
         result = parse(text if isinstance(text, bytes) else text.encode(), "m")
     except MapError as error:

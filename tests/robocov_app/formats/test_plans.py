@@ -46,7 +46,7 @@ def test_a_plan_on_paper_is_taken_without_the_paper(tmp_path: Path) -> None:
     assert import_picture(tmp_path, flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
 
 
-def test_the_inside_of_a_small_obstacle_is_no_plan(tmp_path: Path) -> None:
+def test_the_inside_of_a_small_obstacle_is_not_a_plan(tmp_path: Path) -> None:
     picture, draw = paper()
     draw.rectangle((60, 40, 84, 64), outline="black", width=3)
     area, report, _ = import_picture(tmp_path, picture)
@@ -64,7 +64,7 @@ def test_free_space_within_walls_at_the_edge_stays(tmp_path: Path) -> None:
     assert not any("paper" in note for note in report.notes)
 
 
-def test_an_open_outer_door_is_named_as_a_cause(tmp_path: Path) -> None:
+def test_an_open_outer_door_is_reported_as_the_cause(tmp_path: Path) -> None:
     picture = flat()
     ImageDraw.Draw(picture).rectangle((110, 76, 119, 82), fill="white")
     area, report, _ = import_picture(tmp_path, picture)
@@ -91,7 +91,7 @@ def test_thin_strokes_are_dropped_and_walls_keep_their_corners(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("text", ["", "x", "-1", "1e9", "3 pixels", "nan", "px", "99999m"])
-def test_what_is_no_width_of_a_stroke_is_refused(text: str) -> None:
+def test_invalid_stroke_widths_are_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="min_stroke: "):
         ReadOptions(min_stroke=text)
 
@@ -102,7 +102,7 @@ def test_a_stroke_as_wide_as_a_hall_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("width", range(1, 10))
-def test_an_opening_tells_widths_apart_to_a_cell(width: int) -> None:
+def test_an_opening_distinguishes_widths_by_a_cell(width: int) -> None:
     solid = np.zeros((60, 70), dtype=bool)
     solid[20 : 20 + width, 10:50] = True
     solid[30:60, 40 : 40 + width] = True  # on to the edge
@@ -129,7 +129,7 @@ def colored() -> Image.Image:
 
 
 @pytest.mark.parametrize("name", ["plan.png", "plan.ppm", "plan.jpg"])
-def test_colors_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) -> None:
+def test_colors_of_a_picture_have_their_declared_roles(tmp_path: Path, name: str) -> None:
     room, bench, rug = 19.4 * 11.4, 8.0, 8.0
     above = 9.7 * 19.4
     area, _, _ = import_picture(tmp_path, colored(), name)
@@ -142,7 +142,7 @@ def test_colors_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) -> 
 
 
 @pytest.mark.parametrize("role", ["free", "ignore"])
-def test_soft_edges_of_a_dark_color_are_no_walls(tmp_path: Path, role: str) -> None:
+def test_soft_edges_of_a_dark_color_are_not_walls(tmp_path: Path, role: str) -> None:
     large = Image.new("RGB", (800, 480), "white")
     draw = ImageDraw.Draw(large)
     draw.rectangle((0, 0, 799, 479), outline="black", width=16)
@@ -181,7 +181,7 @@ def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
         ({"free_color": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colors, got 33"),
     ],
 )
-def test_what_is_no_color_is_refused(options: dict[str, object], message: str) -> None:
+def test_invalid_colors_are_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         ReadOptions(**options)  # type: ignore[arg-type]
 
@@ -200,7 +200,7 @@ def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: 
         import_picture(tmp_path, drawn_on_nothing(), unknown="obstacle")
 
 
-def test_transparency_is_named_where_it_leaves_nothing_solid(tmp_path: Path) -> None:
+def test_transparency_is_reported_if_nothing_is_solid(tmp_path: Path) -> None:
     picture = Image.new("RGBA", (40, 40), (255, 255, 255, 255))
     ImageDraw.Draw(picture).rectangle((10, 10, 19, 19), fill=(0, 0, 0, 100))
     _, report, _ = import_picture(tmp_path, picture, unknown="free")
@@ -208,7 +208,7 @@ def test_transparency_is_named_where_it_leaves_nothing_solid(tmp_path: Path) -> 
     assert "6.25 % of the pixels are transparent (less than half opaque)" in note
 
 
-def test_brightness_is_named_where_all_is_solid_or_free(tmp_path: Path) -> None:
+def test_brightness_is_reported_if_everything_is_solid_or_free(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"its brightness is from 0.2 to 0.4 .*--threshold"):
         picture = Image.new("L", (30, 30), 51)
         ImageDraw.Draw(picture).rectangle((5, 5, 20, 20), fill=102)
@@ -217,7 +217,7 @@ def test_brightness_is_named_where_all_is_solid_or_free(tmp_path: Path) -> None:
     assert any("the darkest pixel has a brightness of 0.8" in note for note in report.notes)
 
 
-def test_light_lines_on_a_dark_ground_are_named(tmp_path: Path) -> None:
+def test_light_lines_on_a_dark_ground_are_reported(tmp_path: Path) -> None:
     blueprint = ImageOps.invert(flat())
     ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
     _, report, _ = import_picture(tmp_path, blueprint)
@@ -229,7 +229,7 @@ def test_light_lines_on_a_dark_ground_are_named(tmp_path: Path) -> None:
     assert not any("--invert" in note for note in report.notes)
 
 
-def test_a_thin_frame_at_the_edge_is_dropped_as_other_strokes(tmp_path: Path) -> None:
+def test_a_thin_frame_at_the_edge_is_dropped(tmp_path: Path) -> None:
     picture = flat()
     ImageDraw.Draw(picture).rectangle((0, 0, 199, 119), outline="black")
     assert import_picture(tmp_path, picture)[0] > 200.0

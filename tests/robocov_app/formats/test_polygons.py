@@ -31,7 +31,7 @@ def windings(ring: np.ndarray, x: float, y: float) -> float:
 
 @settings(max_examples=150)
 @given(st.lists(_RING, min_size=1, max_size=3), st.sampled_from(["evenodd", "nonzero"]))
-def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str) -> None:
+def test_fills_agree_with_winding_angles(rings: list[list[tuple[int, int]]], rule: str) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
     enclosed = find_enclosed_area(arrays, rule)  # type: ignore[arg-type]
     area = enclosed.area
@@ -49,7 +49,7 @@ def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str
 
 @settings(max_examples=150)
 @given(st.lists(_RING, min_size=1, max_size=3))
-def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) -> None:
+def test_holes_are_subtracted_from_the_outline(rings: list[list[tuple[int, int]]]) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
     enclosed = find_enclosed_area(arrays)
     area = enclosed.area
@@ -67,7 +67,7 @@ def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) 
         assert area.geoms[0].equals(plain)
 
 
-def test_a_bow_tie_is_both_of_its_halves() -> None:
+def test_a_bow_tie_consists_of_both_halves() -> None:
     enclosed = find_enclosed_area([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
     area = enclosed.area
     reason = enclosed.invalidity
@@ -75,13 +75,13 @@ def test_a_bow_tie_is_both_of_its_halves() -> None:
     assert area.area == 8.0
 
 
-def test_halves_that_share_an_edge_are_one() -> None:
+def test_halves_with_a_common_edge_are_joined() -> None:
     ring = np.array([[1, 0], [2, 2], [2, 0], [1, 0], [2, 2], [0, 0]], dtype=float)
     area = find_enclosed_area([ring]).area
     assert area.is_valid and len(area.geoms) == 1
 
 
-def test_what_has_no_area_is_empty() -> None:
+def test_rings_without_area_are_empty() -> None:
     line = np.array([[0, 0], [4, 0], [0, 0]], dtype=float)
     for rule in ("holes", "evenodd", "nonzero"):
         assert find_enclosed_area([line], rule).area.is_empty
@@ -90,7 +90,7 @@ def test_what_has_no_area_is_empty() -> None:
 
 
 @pytest.mark.slow
-def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
+def test_a_ring_may_touch_itself_many_times() -> None:
     count = 2000
     angle = np.arange(count) * math.tau / count
     star = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(count) % 2, 1.0, 3.0)[:, None]
@@ -102,7 +102,7 @@ def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [800, 3000, 20_000])
-def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
+def test_a_tangle_is_refused_early(count: int) -> None:
     ring = np.random.default_rng(1).random((count, 2))
     with pytest.raises(MapError, match=f"knot: expected at most {MAX_CROSSINGS} crossings of lines"):
         CrossingCounter("knot").add([shapely.LinearRing(ring)])
@@ -110,7 +110,7 @@ def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
 
 
 @pytest.mark.slow
-def test_crossings_are_those_of_all_shapes_together() -> None:
+def test_crossings_of_all_shapes_are_counted_together() -> None:
     angle = np.arange(151) * 75 * math.tau / 151
     star = np.column_stack([np.cos(angle), np.sin(angle)])
     crossings = CrossingCounter("stars")
@@ -121,7 +121,7 @@ def test_crossings_are_those_of_all_shapes_together() -> None:
         find_enclosed_area([star + 9], "holes", crossings)
 
 
-def test_holes_that_take_nothing_out_are_counted() -> None:
+def test_ineffective_holes_are_counted() -> None:
     outer, hole = box(0, 0, 9, 9).exterior, box(1, 1, 2, 2).exterior
     nothing = [
         [(3, 3), (4, 4)],
@@ -138,7 +138,7 @@ def test_holes_that_take_nothing_out_are_counted() -> None:
     assert find_enclosed_area(rings[:4]).lost_holes == {"of fewer than three points": 2}
 
 
-def test_edges_and_parts() -> None:
+def test_edges_and_parts_are_extracted() -> None:
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
     assert extract_edges([shapely.LinearRing(ring)] * 2).shape == (6, 2, 2)
     assert extract_edges([shapely.LineString(ring)]).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
@@ -150,7 +150,7 @@ def test_edges_and_parts() -> None:
     assert [part.area for part in to_multipolygon(nested).geoms] == [16.0, 1.0]
 
 
-def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
+def test_no_part_is_lost_at_almost_coincident_edges() -> None:
     # without a grid GEOS 3.14 loses the triangle on the right
     slim = Polygon([(0, 0), (1, 0), (-40, 764)])
     enclosed = find_enclosed_area([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
@@ -165,7 +165,7 @@ def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(_RING, min_size=1, max_size=5))
-def test_a_union_covers_what_it_is_of(rings: list[list[tuple[int, int]]]) -> None:
+def test_a_union_covers_its_parts(rings: list[list[tuple[int, int]]]) -> None:
     areas = [find_enclosed_area([np.array(ring, dtype=float)], "nonzero").area for ring in rings]
     both = unite(areas)
     assert both.area >= max(area.area for area in areas) - 1e-6

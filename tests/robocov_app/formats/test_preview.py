@@ -45,7 +45,7 @@ def find_marks(axes: Any, color: tuple[int, int, int]) -> list[Any]:
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
-def test_what_was_lost_is_on_the_left_and_what_was_opened_on_the_right(theme: Any) -> None:
+def test_lost_areas_are_on_the_left_and_opened_ones_on_the_right(theme: Any) -> None:
     figure = plot_converted_map((HALL - PILLARS).union(CLOSET), theme=theme.name)
     before, after = figure.axes
     assert before.get_xlim() == after.get_xlim()
@@ -61,7 +61,7 @@ def test_what_was_lost_is_on_the_left_and_what_was_opened_on_the_right(theme: An
     all_clear(figure)
 
 
-def test_the_words() -> None:
+def test_the_preview_has_title_and_report() -> None:
     figure = plot_converted_map((HALL - PILLARS).union(CLOSET), repaired=("2 rings closed",))
     words = [text.get_text() for text in figure.texts]
     assert {"plan", "as read", "as imported", "repaired: 2 rings closed"} <= set(words)
@@ -80,7 +80,7 @@ def test_nothing_is_marked_where_nothing_differs() -> None:
     assert sum(len(found.get_segments()) for found in edges) == 1
 
 
-def test_walls_that_moved_by_the_tolerance_are_nothing_lost() -> None:
+def test_walls_moved_within_the_tolerance_are_not_marked() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     wavy = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * (4 + 0.03 * np.cos(40 * angle))[:, None])
     figure = plot_converted_map(wavy, Shaping(simplify=0.1))
@@ -103,7 +103,7 @@ def test_all_lines_of_a_long_note_but_the_first_are_indented() -> None:
     ids=["hall", "corridor", "shaft", "far away", "small"],
 )  # fmt: skip
 @pytest.mark.parametrize("lines", [0, 1, 30])
-def test_nothing_covers_or_cuts_anything(free: Any, lines: int) -> None:
+def test_texts_and_maps_do_not_overlap(free: Any, lines: int) -> None:
     notes = tuple(f"note {k}: " + "what was taken as something else " * 9 for k in range(lines))
     figure = plot_converted_map(free, notes=notes)
     all_clear(figure)
@@ -111,7 +111,7 @@ def test_nothing_covers_or_cuts_anything(free: Any, lines: int) -> None:
     assert any(word.startswith("and ") and word.endswith(" more lines") for word in words) == (lines > 9)
 
 
-def test_free_space_that_is_not_valid_is_drawn_all_the_same() -> None:
+def test_invalid_free_space_is_drawn() -> None:
     bow = Polygon([(0, 0), (8, 8), (8, 0), (0, 8)])
     assert not bow.is_valid
     figure = plot_converted_map(bow)

@@ -50,7 +50,7 @@ def build_map(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Enviro
     st.lists(_BLOCK, max_size=3),
     st.sampled_from([0.0, 0.02, 0.2]),
 )
-def test_free_space_stays(
+def test_primitives_preserve_the_free_space(
     circles: list[CircleObstacle], walls: list[WallObstacle], blocks: list[Polygon], tolerance: float
 ) -> None:
     foreign = read_shapes([*circles, *walls], blocks)
@@ -72,7 +72,7 @@ def test_free_space_stays(
             assert any(abs(o.radius - circle.radius) < 1e-3 for o in near)
 
 
-def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
+def test_primitives_keep_their_names_and_others_are_polygons() -> None:
     pillar = CircleObstacle((4.0, 4.0), 0.5, "pillar")
     wall = WallObstacle(((10.0, -1.0), (10.0, 6.0), (12.0, 6.0)), 0.2, "wall")
     environment = build_map([pillar, wall], box(15, 10, 17, 12))
@@ -96,20 +96,18 @@ def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
         ),
     ],
 )
-def test_what_is_more_than_primitives_stays_a_polygon(
-    primitives: list[Obstacle], blocks: list[Polygon]
-) -> None:
+def test_combined_shapes_stay_polygons(primitives: list[Obstacle], blocks: list[Polygon]) -> None:
     environment = build_map(primitives, *blocks)
     assert all(isinstance(one, PolygonObstacle) for one in environment.obstacles)
 
 
-def test_a_circle_whose_rounded_twin_has_more_sides() -> None:
+def test_a_circle_is_kept_if_its_rounded_polygon_has_more_sides() -> None:
     circle = CircleObstacle((4.0, 4.0), 0.50676)
     assert len(circle.polygon.exterior.coords) != len(CircleObstacle((4, 4), 0.5068).polygon.exterior.coords)
     assert build_map([circle], simplify=0.0).obstacles == (CircleObstacle((4.0, 4.0), 0.5068),)
 
 
-def test_what_was_filled_among_several_stays_filled() -> None:
+def test_filled_gaps_stay_filled() -> None:
     # below the wall a wedge is cut off, so flat that both are as good within the tolerance
     circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
     environment = build_map([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
@@ -156,7 +154,7 @@ WKT = "POLYGON ((0 0, 9 0, 9 6, 0 6, 0 0))\nPOINT (3 3)\nLINESTRING (5 0, 5 2.5)
     ],
     ids=["dxf", "svg", "geojson", "wkt"],
 )
-def test_what_a_file_draws_stays(
+def test_primitives_of_a_file_are_kept(
     tmp_path: Path, name: str, text: str, options: dict[str, Any], named: bool, others: int
 ) -> None:
     path = tmp_path / name

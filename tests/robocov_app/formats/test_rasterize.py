@@ -70,7 +70,7 @@ def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
     assert build_grid(room(), 0.7).columns == 8 + 2
 
 
-def test_cells_that_are_too_small_or_too_large() -> None:
+def test_cells_that_are_too_small_or_too_large_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"cell: expected at most 64 million"):
         build_grid(room(), 1e-4)
     blocks = tuple(
@@ -130,7 +130,7 @@ def test_a_wall_thinner_than_a_cell_keeps_rooms_apart(tmp_path: Path) -> None:
             assert back.free_area == pytest.approx(environment.free_area, rel=0.04)
 
 
-def test_gaps_that_cells_close_are_told_with_cells_that_keep_them() -> None:
+def test_closed_gaps_are_reported_with_a_cell_that_keeps_them() -> None:
     wall = PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.93), (3.0, 4.93)), name="wall")
     environment = room(obstacles=(wall,), starts={"all": UniformStart()})
 
@@ -147,7 +147,7 @@ def test_gaps_that_cells_close_are_told_with_cells_that_keep_them() -> None:
     assert describe_unsupported(room()) == ()
 
 
-def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lost_rooms_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     walls = (WallObstacle(((1.0, 2.2), (6.0, 2.2)), 0.01), WallObstacle(((1.0, 2.35), (6.0, 2.35)), 0.01))
     environment = room(obstacles=walls)
     grid = build_grid(environment, 0.4)

@@ -45,7 +45,7 @@ def test_the_first_ring_is_the_outline(tmp_path: Path, document: Any) -> None:
     assert detect_format(tmp_path / "plan.json").name == "rings"
 
 
-def test_one_ring_alone(tmp_path: Path) -> None:
+def test_a_single_ring_is_free_space(tmp_path: Path) -> None:
     for document in (HALL[0], [n for point in HALL[0] for n in point]):
         foreign = read(tmp_path, "rings", document, scale=0.1)
         assert foreign.free.equals(box(0, 0, 2, 1))
@@ -56,7 +56,7 @@ def test_several_polygons_are_free_together(tmp_path: Path) -> None:
     assert read(tmp_path, "rings", [HALL, [square(20, 0, 5, 5)]]).free.area == pytest.approx(195 + 25)
 
 
-def test_a_hole_that_sticks_out_and_meets_itself(tmp_path: Path) -> None:
+def test_a_self_crossing_hole_beyond_the_outline_is_repaired(tmp_path: Path) -> None:
     bad = [square(0, 0, 20, 10), [[15, 2], [25, 4], [25, 2], [15, 4]]]
     foreign = read(tmp_path, "rings", bad)
     # of the bow tie of two triangles of 5 m² the left one is in the outline
@@ -87,7 +87,7 @@ def test_a_hole_that_sticks_out_and_meets_itself(tmp_path: Path) -> None:
         ([[[0, 0], [1, 1], [2, 2]]], "1 outline without an area"),
     ],
 )
-def test_what_is_none_is_refused(tmp_path: Path, document: Any, expected: str) -> None:
+def test_invalid_rings_are_refused(tmp_path: Path, document: Any, expected: str) -> None:
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(document))
     with pytest.raises(MapError) as caught:

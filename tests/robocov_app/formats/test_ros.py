@@ -28,7 +28,7 @@ def read(path: Path, **options: object) -> MultiPolygon:
     return IMPORTER.read(path, ReadOptions(**options)).free  # type: ignore[arg-type]
 
 
-def test_a_map_is_read_where_it_lies(tmp_path: Path) -> None:
+def test_a_map_is_read_at_its_origin(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN), origin=[-1.5, 2.0, 0.0])
     assert detect_format(path) is IMPORTER
     foreign = IMPORTER.read(path, ReadOptions())
@@ -76,7 +76,7 @@ def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: list[str]) -> None:
+def test_a_rotated_map_has_a_note(tmp_path: Path, yaw: str, notes: list[str]) -> None:
     path = write_ros_map(tmp_path, np.full((3, 3), FREE, np.uint8), origin=f"[0, 0, {yaw}]")
     foreign = IMPORTER.read(path, ReadOptions())
     assert [note for note in foreign.notes if note.startswith("origin")] == notes
@@ -92,7 +92,7 @@ def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: lis
         ("raw", "100 % of the pixels are transparent, and count by the color that is hidden in them"),
     ],
 )
-def test_transparency_is_named_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
+def test_transparency_is_reported_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
     Image.new("LA", (4, 4), (200, 0)).save(tmp_path / "plan.png")
     path = write_ros_map(tmp_path, b"", image="plan.png", mode=mode)
     with pytest.raises(MapError, match=f"no cell is free: {cause}"):
@@ -106,7 +106,7 @@ def test_a_map_of_floats_is_read_in_every_mode(tmp_path: Path) -> None:
     assert read(path).area == 3
 
 
-def test_unknown_cells(tmp_path: Path) -> None:
+def test_unknown_cells_follow_the_option(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN), resolution=1.0)
     assert read(path).area == 68
     assert read(path, unknown="free").area == 68 + 48
@@ -117,7 +117,7 @@ def test_unknown_cells(tmp_path: Path) -> None:
     assert shapely.equals(foreign.boundary, shapely.box(-1, -1, 17, 11))
 
 
-def test_of_a_cut_map_the_island_with_most_free_space_stays(tmp_path: Path) -> None:
+def test_a_cut_map_keeps_the_island_with_most_free_space(tmp_path: Path) -> None:
     pixels = draw_pixels("...????\n...????\n???????\n?????..")
     foreign = IMPORTER.read(write_ros_map(tmp_path, pixels, resolution=1.0), ReadOptions(unknown="cut"))
     assert shapely.equals(foreign.free, shapely.box(0, 2, 3, 4))
@@ -144,7 +144,7 @@ def occupancy(level: int, mode: str, negate: bool, low: float, high: float, alph
     st.sampled_from(["trinary", "scale", "raw"]), st.booleans(), st.booleans(),
     st.floats(0, 1), st.floats(0, 1), st.integers(0, 255),
 )  # fmt: skip
-def test_every_pixel_means_what_map_server_says(
+def test_every_pixel_agrees_with_map_server(
     mode: str, negate: bool, with_alpha: bool, one: float, other: float, opacity: int
 ) -> None:
     low, high = sorted((one, other))
@@ -179,7 +179,7 @@ def test_colors_count_as_their_mean(tmp_path: Path) -> None:
     assert shapely.equals(read(path, unknown="free"), shapely.box(0, 0, 2, 4) | shapely.box(3, 0, 4, 4))
 
 
-def test_the_threshold_of_scale_and_raw(tmp_path: Path) -> None:
+def test_scale_and_raw_use_the_threshold(tmp_path: Path) -> None:
     levels = np.array([[0, 30, 49, 50, 100, 101, 255]], dtype=np.uint8)
     path = write_ros_map(tmp_path, levels, mode="raw", resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 3, 1))
@@ -192,14 +192,14 @@ def test_the_threshold_of_scale_and_raw(tmp_path: Path) -> None:
     assert shapely.equals(read(path, threshold=0.0), shapely.box(0, 0, 1, 1))
 
 
-def test_16_bits(tmp_path: Path) -> None:
+def test_pictures_of_16_bits_are_read(tmp_path: Path) -> None:
     deep = np.array([[65535, 65535, 52685, 0]])
     path = write_ros_map(tmp_path, pgm(deep, 65535), resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 1))
     assert "25 % unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
 
 
-def test_what_is_worth_a_word(tmp_path: Path) -> None:
+def test_remarkable_metadata_has_notes(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN), free_thresh=0.25, occupied_thresh=None, frame="map")
     environment, report, _ = import_map(path, shaping=Shaping(radius=0.1))
     assert report.repaired == ("occupied_thresh is missing, 0.65 taken",)
@@ -210,7 +210,7 @@ def test_what_is_worth_a_word(tmp_path: Path) -> None:
     assert environment.free_area > 0
 
 
-def test_single_cells_are_noise_unless_somebody_says_no(tmp_path: Path) -> None:
+def test_single_cells_are_noise_by_default(tmp_path: Path) -> None:
     pixels = np.full((60, 60), FREE, np.uint8)
     pixels[10, 10] = OCCUPIED
     pixels[20, 30] = UNKNOWN
@@ -225,7 +225,7 @@ def test_single_cells_are_noise_unless_somebody_says_no(tmp_path: Path) -> None:
     assert len(import_map(path, shaping=Shaping(specks=0.01))[0].obstacles) == 0
 
 
-def test_line_ends_marks_and_comments_do_no_harm(tmp_path: Path) -> None:
+def test_line_ends_byte_order_marks_and_comments_are_accepted(tmp_path: Path) -> None:
     (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n"))
     text = (
         "# saved\r\nimage: plan.pgm\r\nresolution: 2.5e-1\r\norigin: [-1.0, -2.0, 0.0]\r\nnegate: 0\r\n\r\n"
@@ -236,7 +236,7 @@ def test_line_ends_marks_and_comments_do_no_harm(tmp_path: Path) -> None:
     assert read(path).bounds == (-0.5, -1.5, 2.5, 0.0)
 
 
-def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Path) -> None:
+def test_the_picture_must_be_next_to_the_file(tmp_path: Path) -> None:
     maps = tmp_path / "maps"
     (maps / "pictures").mkdir(parents=True)
     (maps / "pictures" / "a.pgm").write_bytes(pgm(draw_pixels(PLAN)))
@@ -266,7 +266,7 @@ def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Pa
         r"..\plan.pgm",
     ],
 )
-def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Path, name: str) -> None:
+def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, name: str) -> None:
     (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
     foreign = IMPORTER.read(write_ros_map(tmp_path, b"", "a", image=name), ReadOptions())
     assert foreign.free.area > 0
@@ -308,7 +308,7 @@ def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Pat
         ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),
     ],
 )
-def test_what_is_refused(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
+def test_invalid_maps_are_refused(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
     (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
     os.mkfifo(tmp_path / "pipe")
     keys = {"image": "plan.pgm"} | keys
@@ -321,14 +321,14 @@ def test_what_is_refused(tmp_path: Path, keys: dict[str, object], expected: str)
     assert "\n" not in str(caught.value)
 
 
-def test_nothing_free(tmp_path: Path) -> None:
+def test_maps_without_free_cells_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"no cell is free \(--unknown free takes unknown"):
         read(write_ros_map(tmp_path, draw_pixels("##\n??")))
     with pytest.raises(MapError, match=r"no cell is free$"):
         read(write_ros_map(tmp_path, draw_pixels("##\n##")))
 
 
-def test_options_of_other_formats(tmp_path: Path) -> None:
+def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     with pytest.raises(
         ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"

@@ -64,7 +64,7 @@ def test_straight_walls_stay_where_they_are() -> None:
     assert shapely.equals_exact(result.free.normalize(), MultiPolygon([room]).normalize(), 1e-9)
 
 
-def test_a_bump_of_a_cell_in_a_wall_goes() -> None:
+def test_a_bump_of_a_cell_is_removed() -> None:
     free = np.ones((40, 60), dtype=bool)
     free[0, 20:23] = free[39, 10] = free[7, 0] = False
     result = simplify_free_space(
@@ -76,7 +76,7 @@ def test_a_bump_of_a_cell_in_a_wall_goes() -> None:
     )
 
 
-def test_round_things_keep_their_size() -> None:
+def test_round_obstacles_keep_their_size() -> None:
     for radius in (0.16, 0.2, 0.35, 1.0):
         pillar = shapely.Point(2.013, 1.987).buffer(radius, quad_segs=64)
         stairs = build_cells(shapely.box(0, 0, 4, 4) - pillar)
@@ -138,7 +138,7 @@ def test_a_door_as_wide_as_a_robot_stays_open() -> None:
     assert len(find_rooms(outline, 0.126)) == 2
 
 
-def test_what_is_done_less_is_said() -> None:
+def test_reduced_simplification_is_noted() -> None:
     # between two halls a winding corridor of 0.3 m
     free = np.zeros((60, 200), dtype=bool)
     free[4:56, :40] = free[4:56, 160:] = True
@@ -201,7 +201,7 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
 
 @settings(deadline=None, max_examples=30)
 @given(ragged)
-def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) -> None:
+def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave
     cells = trace_outline(blobs(seed, share, smooth), "grid")
     outline = OriginalOutline(list(cells.geoms), 1.0)
@@ -213,7 +213,7 @@ def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) 
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
 
-def test_what_must_stay_does() -> None:
+def test_required_vertices_are_kept() -> None:
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     outline = OriginalOutline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
     fixed = np.zeros(100, dtype=bool)

@@ -51,7 +51,7 @@ def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
     assert turned.cell == 4.0
 
 
-def test_what_macros_say_is_inherited_and_overridden(tmp_path: Path) -> None:
+def test_macros_are_inherited_and_overridden(tmp_path: Path) -> None:
     foreign = read(
         tmp_path,
         ROOM
@@ -90,7 +90,7 @@ def test_blocks_fill_the_size_of_their_model_and_turn_about_its_origin(tmp_path:
     assert (hull - foreign.free).symmetric_difference(table.buffer(0)).area == pytest.approx(0, abs=1e-9)
 
 
-def test_units_and_the_forms_of_older_versions(tmp_path: Path) -> None:
+def test_units_and_older_syntax_are_accepted(tmp_path: Path) -> None:
     foreign = read(
         tmp_path,
         ROOM.replace("20 10 1", "2000 1000")
@@ -106,7 +106,7 @@ def test_units_and_the_forms_of_older_versions(tmp_path: Path) -> None:
     assert not foreign.free.intersects(triangle.buffer(-1e-6))
 
 
-def test_robots_are_places_to_start_and_sensors_are_nothing(tmp_path: Path) -> None:
+def test_robots_are_starts_and_sensors_are_omitted(tmp_path: Path) -> None:
     text = (
         ROOM
         + """
@@ -138,7 +138,7 @@ def test_robots_are_places_to_start_and_sensors_are_nothing(tmp_path: Path) -> N
     assert len(read(tmp_path, ROOM + "room ( )" + "x" * 5000 + " ( )").dropped[0]) < 50
 
 
-def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
+def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
     folder = tmp_path / "worlds"
     folder.mkdir()
     (tmp_path / "far.inc").write_text(ROOM)
@@ -182,7 +182,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
     ],
     ids=range(17),
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
+def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "hall.world"
     path.write_text(text)
     with pytest.raises(
@@ -204,7 +204,7 @@ def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp
 # Files that include each other
 
 
-def test_files_that_include_each_other_tenfold_are_refused(tmp_path: Path) -> None:
+def test_exponentially_nested_includes_are_refused(tmp_path: Path) -> None:
     names = [f"part{k}.inc" for k in range(10)]
     body = "".join(f'include "{name}"\n' for name in names)
     for name in names:
@@ -213,7 +213,7 @@ def test_files_that_include_each_other_tenfold_are_refused(tmp_path: Path) -> No
         read(tmp_path, body + "model ( )")
 
 
-def test_files_that_are_included_are_limited_together(tmp_path: Path) -> None:
+def test_included_files_are_limited_together(tmp_path: Path) -> None:
     for k in range(9):
         (tmp_path / f"part{k}.inc").write_text(f'include "part{k + 1}.inc"\n' * 10)
     (tmp_path / "part9.inc").write_text("# nothing\n")
@@ -226,7 +226,7 @@ def test_files_that_are_included_are_limited_together(tmp_path: Path) -> None:
     assert read(tmp_path, 'include "long.inc"\n' * 2 + "model ( )").free.area > 0
 
 
-def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
+def test_transparency_is_reported_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
     cause = "all is dark, .*: 100 % of the pixels are transparent, and count by the color that is hidden"
     with pytest.raises(MapError, match=cause):

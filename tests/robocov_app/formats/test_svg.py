@@ -90,7 +90,7 @@ def test_shapes_are_where_they_are_drawn(tmp_path: Path, body: str, expected: An
     assert compute_obstacles(tmp_path, body).symmetric_difference(expected).area < 1e-6
 
 
-def test_round_things(tmp_path: Path) -> None:
+def test_circles_and_ellipses_are_read(tmp_path: Path) -> None:
     pillar = compute_obstacles(tmp_path, '<circle cx="500" cy="300" r="50"/>')
     exact = CircleObstacle((5.0, 3.0), 0.5).polygon
     assert pillar.symmetric_difference(exact).area < 1e-5
@@ -123,7 +123,7 @@ def test_round_things(tmp_path: Path) -> None:
         ('<use href="other.svg#a"/>', "1 use of an element that is not in the file"),
     ],
 )
-def test_what_is_not_there_is_told(tmp_path: Path, body: str, dropped: str) -> None:
+def test_omitted_elements_are_counted(tmp_path: Path, body: str, dropped: str) -> None:
     foreign = read_shapes(tmp_path, PAGE + body)
     assert foreign.free.equals(box(0, 0, 10, 6))
     assert foreign.dropped == (dropped,)
@@ -140,13 +140,13 @@ def test_what_is_not_there_is_told(tmp_path: Path, body: str, dropped: str) -> N
         "<title>Plan</title><metadata/><script>alert(1)</script>",
     ],
 )
-def test_what_is_never_drawn_is_not_told(tmp_path: Path, body: str) -> None:
+def test_elements_that_are_never_drawn_are_not_counted(tmp_path: Path, body: str) -> None:
     foreign = read_shapes(tmp_path, PAGE + body)
     assert foreign.free.equals(box(0, 0, 10, 6))
     assert foreign.dropped == ()
 
 
-def test_what_is_taken_otherwise_is_told(tmp_path: Path) -> None:
+def test_approximations_are_noted(tmp_path: Path) -> None:
     body = (
         '<g fill="none" stroke="red"><path d="M100 100h50" stroke-dasharray="4"/><path d="M100 200h50" '
         'transform="scale(1 3)"/></g><g clip-path="url(#a)"><rect width="9" height="9"/></g>'
@@ -163,7 +163,7 @@ def test_what_is_taken_otherwise_is_told(tmp_path: Path) -> None:
         assert words in notes
 
 
-def test_widths_of_strokes(tmp_path: Path) -> None:
+def test_strokes_become_walls_of_their_width(tmp_path: Path) -> None:
     line = '<path d="M0 300H1000" fill="none" stroke="red" stroke-width="5" transform="scale(1 2)"/>'
     lower = line.replace("M0 300", "M0 150")
     assert read_shapes(tmp_path, PAGE + lower).free.area == pytest.approx(60 - 10 * 0.1)
@@ -177,7 +177,7 @@ def test_widths_of_strokes(tmp_path: Path) -> None:
     assert read_shapes(tmp_path, PAGE + percent).free.area == pytest.approx(60 - 10 * width)
 
 
-def test_names_are_ids_classes_and_labels_of_all_groups_around(tmp_path: Path) -> None:
+def test_labels_include_those_of_all_groups(tmp_path: Path) -> None:
     body = (
         '<g id="layer1" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" inkscape:label="Walls">'
         '<rect class="load-bearing brick" width="100" height="100"/></g>'
@@ -210,7 +210,9 @@ def test_rooms_can_be_free(tmp_path: Path) -> None:
         ("", {"scale": 0.01}, (10, 6)),
     ],
 )
-def test_scales(tmp_path: Path, head: str, options: dict[str, Any], size: tuple[float, float]) -> None:
+def test_units_give_the_scale(
+    tmp_path: Path, head: str, options: dict[str, Any], size: tuple[float, float]
+) -> None:
     corner = 'x="5" y="7"' if "5 7" in head else ""
     free = read_shapes(tmp_path, f'<rect {corner} width="1000" height="600"/>', head, **options).free
     x, y, right, top = free.bounds
@@ -219,7 +221,7 @@ def test_scales(tmp_path: Path, head: str, options: dict[str, Any], size: tuple[
         assert (x, y) == pytest.approx((0, 0), abs=1e-6), "the lower left corner of the picture"
 
 
-def test_an_origin_that_the_file_gives(tmp_path: Path) -> None:
+def test_an_origin_in_the_file_is_used(tmp_path: Path) -> None:
     foreign = read_shapes(tmp_path, PAGE, 'width="1000" height="600" data-origin="-3 2.5"')
     assert foreign.free.bounds == pytest.approx((-3, 2.5, 7, 8.5))
 
@@ -236,7 +238,7 @@ def test_the_title_names_the_map(tmp_path: Path) -> None:
     assert read_shapes(tmp_path, PAGE).name == "plan"
 
 
-def test_what_editors_write_before_it(tmp_path: Path) -> None:
+def test_prologues_of_editors_are_accepted(tmp_path: Path) -> None:
     text = svg(PAGE).replace('xmlns="http://www.w3.org/2000/svg"', "")
     for content in (
         b"\xef\xbb\xbf<?xml version='1.0'?>\r\n<!-- Created with Inkscape -->\r\n" + text.encode(),
@@ -271,7 +273,7 @@ def test_what_editors_write_before_it(tmp_path: Path) -> None:
         ("<g><text>Hall</text></g>", "expected a drawing"),
     ],
 )
-def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, expected: str) -> None:
+def test_invalid_attributes_are_refused(tmp_path: Path, body: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read_shapes(tmp_path, body)
     assert str(caught.value).startswith(str(tmp_path / "plan.svg"))
@@ -342,7 +344,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_other_xml_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "plan.svg"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:

@@ -37,12 +37,12 @@ def test_paint_that_is_declared_free_is_no_obstacle(tmp_path: Path) -> None:
     assert any("of a color that is left out" in line for line in ignored.dropped)
 
 
-def test_a_color_that_does_not_occur_is_named_with_those_that_do(tmp_path: Path) -> None:
+def test_an_absent_color_is_reported_with_the_present_ones(tmp_path: Path) -> None:
     notes = read_shapes(tmp_path, FLOOR + WALLS, free_color=("red",)).notes
     assert any("nothing is painted #ff0000 (--free-color); there are #" in note for note in notes)
 
 
-def test_what_is_painted_later_counts(tmp_path: Path) -> None:
+def test_later_paint_covers_earlier_paint(tmp_path: Path) -> None:
     door = '<rect x="4.8" y="2" width="0.4" height="1" fill="white"/>'
     assert read_free_space(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
     below = FLOOR + door + WALLS
@@ -87,12 +87,12 @@ def test_rooms_on_a_dark_ground_are_free(tmp_path: Path) -> None:
     ) == pytest.approx(51)
 
 
-def test_only_what_is_painted_free_is_free_where_nothing_encloses(tmp_path: Path) -> None:
+def test_only_free_paint_is_free_without_a_boundary(tmp_path: Path) -> None:
     rooms = "".join(f'<rect x="{x}" y="1" width="3" height="4" fill="#eef"/>' for x in (1, 4))
     assert read_free_space(tmp_path, rooms, free_color=("#eef",)) == pytest.approx(24)
 
 
-def test_nested_outlines_are_free_and_solid_by_turns(tmp_path: Path) -> None:
+def test_nested_outlines_alternate_between_free_and_solid(tmp_path: Path) -> None:
     boxes = "".join(
         f'<rect x="{k}" y="{k}" width="{10 - 2 * k}" height="{6 - 2 * k}" fill="#555"/>' for k in range(3)
     )

@@ -38,11 +38,11 @@ def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
         ("M0 0A0 5 0 0 1 4 4", [[0, 0], [4, 4]]),
     ],
 )
-def test_commands(text: str, expected: list[list[float]]) -> None:
+def test_path_commands_are_parsed(text: str, expected: list[list[float]]) -> None:
     assert points(text) == expected
 
 
-def test_subpaths_begin_where_the_last_one_did() -> None:
+def test_subpaths_start_where_the_previous_one_started() -> None:
     found, draws = parse_path("M1 1h2v2z l1 0 M5 5zh1m1 1", 1e-3, 100)
     assert draws == 7
     assert [(part.tolist(), closed) for part, closed in found] == [
@@ -54,7 +54,7 @@ def test_subpaths_begin_where_the_last_one_did() -> None:
     assert parse_path("M1 1", 1e-3, 10) == ([], 1)
 
 
-def test_smooth_curves_mirror_the_handle_before_them() -> None:
+def test_smooth_curves_mirror_the_previous_handle() -> None:
     smooth = points("M0 0C0 3 2 3 3 0S6-3 6 0", 1e-2)
     assert smooth == points("M0 0C0 3 2 3 3 0C4-3 6-3 6 0", 1e-2)
     assert points("M0 0Q2 4 4 0T8 0", 1e-2) == points("M0 0Q2 4 4 0Q6-4 8 0", 1e-2)
@@ -68,7 +68,7 @@ _COORDINATE = st.integers(-100, 100).map(lambda n: n / 4)
 
 
 @given(*[_COORDINATE] * 4, *[st.integers(1, 60).map(float)] * 2, st.integers(-180, 360), *[st.booleans()] * 2)
-def test_arcs_obey_the_equation_of_their_ellipse(
+def test_arcs_satisfy_the_equation_of_their_ellipse(
     x1: float, y1: float, x2: float, y2: float, rx: float, ry: float, turn: int, large: bool, clockwise: bool
 ) -> None:
     assume((x1, y1) != (x2, y2))
@@ -112,13 +112,13 @@ def test_arcs_obey_the_equation_of_their_ellipse(
         ("M0 0 A 1e20 1e20 0 1 1 5 5", "expected at most 100 points, got more"),
     ],
 )
-def test_what_is_no_path_is_refused_with_its_place(text: str, expected: str) -> None:
+def test_invalid_paths_are_reported_with_the_position(text: str, expected: str) -> None:
     with pytest.raises(ValueError, match="expected") as caught:
         parse_path(text, 1e-3, 100)
     assert expected in str(caught.value)
 
 
-def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
+def test_arcs_without_extent_are_omitted_and_tiny_radii_are_lines() -> None:
     assert parse_path("M1 1A5 5 0 1 1 1 1", 1e-3, 100) == ([], 2)
     assert points("M0 0A1e-40 1e-40 0 1 1 3 0") == [[0, 0], [3, 0]]
     huge = points("M0 0A1e25 1e25 0 0 1 3 0")
@@ -143,7 +143,7 @@ def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
         ("", (1, 2), (1, 2)),
     ],
 )
-def test_transforms(text: str, point: tuple[float, float], expected: tuple[float, float]) -> None:
+def test_transforms_are_parsed(text: str, point: tuple[float, float], expected: tuple[float, float]) -> None:
     assert transform_points(parse_transform(text), np.array([point], dtype=float))[0] == pytest.approx(
         expected
     )
@@ -152,19 +152,19 @@ def test_transforms(text: str, point: tuple[float, float], expected: tuple[float
 @pytest.mark.parametrize(
     "text", ["spin(3)", "rotate(1 2)", "matrix(1 2 3)", "scale(x)", "translate(1) oops", "scale(1e99)"]
 )
-def test_what_is_no_transform_is_refused(text: str) -> None:
+def test_invalid_transforms_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_transform(text)
 
 
-def test_transforms_that_grow_without_end_are_refused() -> None:
+def test_huge_transforms_are_refused() -> None:
     with pytest.raises(ValueError, match="beyond 1e"):
         parse_transform("scale(1e20) scale(1e20)")
     with pytest.raises(ValueError, match="beyond"):
         compose(build_affine(a=1e29, d=1e29), build_affine(a=1e29, d=1e29))
 
 
-def test_stretch_is_what_happens_to_a_circle() -> None:
+def test_stretch_is_the_largest_scale_of_a_circle() -> None:
     matrix = parse_transform("rotate(30) scale(2 5) skewX(20)")
     angle = np.linspace(0, math.tau, 100_000)
     lengths = np.hypot(*transform_points(matrix, np.column_stack([np.cos(angle), np.sin(angle)])).T)
@@ -185,19 +185,19 @@ def test_stretch_is_what_happens_to_a_circle() -> None:
         (" 1e1 ", 10),
     ],
 )
-def test_lengths(text: str, expected: float) -> None:
+def test_lengths_are_parsed(text: str, expected: float) -> None:
     assert parse_length(text, 80.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("text", ["", "x", "10em", "10 px x", "%", "1e99px", "nan"])
-def test_what_is_no_length_is_refused(text: str) -> None:
+def test_invalid_lengths_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_length(text, 80.0)
     with pytest.raises(ValueError, match="expected"):
         parse_length("50%")
 
 
-def test_lists_of_numbers() -> None:
+def test_lists_of_numbers_are_parsed() -> None:
     assert parse_numbers("1,2 3-4.5.5e1,") == [1, 2, 3, -4.5, 5]
     assert parse_numbers("") == []
     with pytest.raises(ValueError, match="expected a number"):
@@ -214,9 +214,7 @@ def test_lists_of_numbers() -> None:
         ("xMidYMid slice", (-50, 0), (50, 100)),
     ],
 )
-def test_view_boxes_fit_as_they_are_told(
-    how: str, corner: tuple[float, float], center: tuple[float, float]
-) -> None:
+def test_view_boxes_are_fitted(how: str, corner: tuple[float, float], center: tuple[float, float]) -> None:
     matrix = fit_view_box((10.0, 10.0, 20.0, 20.0), 100.0, 200.0, how)
     places = transform_points(matrix, np.array([[10.0, 10.0], [20.0, 20.0]]))
     assert places.tolist() == [list(map(float, corner)), list(map(float, center))]

@@ -32,7 +32,7 @@ def sheet(*texts: str) -> StyleSheet:
     return found
 
 
-def test_the_more_particular_rule_wins_wherever_it_stands() -> None:
+def test_the_more_specific_rule_wins() -> None:
     rules = sheet("#a{fill:red} .b{fill:green} rect{fill:blue} *{fill:white}")
     assert rules.get_properties(element(id="a", class_="b"))["fill"] == "red"
     assert rules.get_properties(element(class_="x b"))["fill"] == "green"
@@ -47,7 +47,7 @@ def test_the_more_particular_rule_wins_wherever_it_stands() -> None:
     )
 
 
-def test_style_sheets_of_drawing_programs() -> None:
+def test_style_sheets_of_drawing_programs_are_parsed() -> None:
     text = "<!-- .cls-1,\n.cls-2{fill:none;stroke:#000;} /* a; {comment} */ .cls-2{stroke-width:2px} -->"
     assert sheet(text).get_properties(element(class_="cls-2")) == {
         "fill": "none",
@@ -56,7 +56,7 @@ def test_style_sheets_of_drawing_programs() -> None:
     }
 
 
-def test_what_is_beyond_is_counted() -> None:
+def test_unsupported_rules_are_counted() -> None:
     rules = sheet(
         "@import url(http://example.org/x.css); @media print { rect { fill: none } }"
         "@supports (x:y) {rect{fill:none}} g > rect {fill:none} rect:hover{fill:none} rect{fill:red}"
@@ -74,7 +74,7 @@ def test_unfinished_rules_are_left_out() -> None:
     )
 
 
-def test_inheritance() -> None:
+def test_properties_are_inherited() -> None:
     group = inherit_style(INHERITED, {"fill": "none", "stroke": "red", "stroke-width": "3"})
     inner = inherit_style(group, {"fill": "inherit", "stroke": "unset", "stroke-width": "1"})
     assert (inner["fill"], inner["stroke"], inner["stroke-width"]) == ("none", "red", "1")
@@ -82,7 +82,7 @@ def test_inheritance() -> None:
 
 
 @pytest.mark.parametrize("paint", ["none", "transparent", "NONE"])
-def test_what_is_not_painted(paint: str) -> None:
+def test_invisible_paint_is_detected(paint: str) -> None:
     assert not is_painted(inherit_style(INHERITED, {"fill": paint}), "fill")
     assert not is_painted(inherit_style(INHERITED, {"fill-opacity": "0"}), "fill")
     assert not is_painted(inherit_style(INHERITED, {"fill-opacity": "0%"}), "fill")
@@ -90,18 +90,18 @@ def test_what_is_not_painted(paint: str) -> None:
     assert not is_painted(INHERITED, "stroke")
 
 
-def test_what_is_hidden() -> None:
+def test_hidden_elements_are_detected() -> None:
     assert is_hidden({"display": "None"})
     assert is_hidden({"opacity": "0.0"})
     assert not is_hidden({"display": "inline", "opacity": ".5"})
 
 
-def test_declarations() -> None:
+def test_declarations_are_parsed() -> None:
     assert parse_declarations(" Fill : url(a:b) ;; x ; stroke:red") == {"fill": "url(a:b)", "stroke": "red"}
 
 
 @pytest.mark.slow
-def test_sheets_that_take_for_ever_are_refused() -> None:
+def test_expensive_style_sheets_are_refused() -> None:
     with pytest.raises(
         MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
     ):

@@ -63,14 +63,14 @@ def are_equal(one: shapely.Geometry, other: shapely.Geometry) -> bool:
     return bool(one.symmetric_difference(other).area < 0.01)
 
 
-def test_tiles_are_solid_that_say_so(tmp_path: Path) -> None:
+def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
     foreign = read(tmp_path, TILES.format(""), tiles("Ground"))
     assert are_equal(compute_obstacles(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
     assert foreign.notes == ("no size of a tile was given: 1 m wide taken (--cell)",)
 
 
-def test_layers_are_solid_by_name_property_or_if_they_are_asked_for(tmp_path: Path) -> None:
+def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:
     plain = '<tileset firstgid="1" tilewidth="16" tileheight="16"/>'
     floor, upper = tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1"), ROWS.replace("1", "0")
     for name in ("Walls", "collision", "Collision Layer 2", "is_solid"):
@@ -155,7 +155,7 @@ def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None
     assert compute_obstacles(foreign).equals(box(1.25, 1, 1.75, 2.5))
 
 
-def test_objects_of_every_shape(tmp_path: Path) -> None:
+def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
     given = (
         '<object x="8" y="8" width="16" height="8"/>',
         '<object x="32" y="8" width="16" height="8" rotation="90"/>',
@@ -181,7 +181,7 @@ def test_objects_of_every_shape(tmp_path: Path) -> None:
     assert foreign.cell is None
 
 
-def test_objects_beside_tiles_are_solid_only_if_they_say_so(tmp_path: Path) -> None:
+def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> None:
     square = '<object name="{}" x="0" y="0" width="16" height="16"/>'
     things = objects("triggers", square.format("door"), square.format("wall").replace('x="0"', 'x="48"'))
     ground = tiles("Ground", ROWS.replace("2", "1"))
@@ -240,7 +240,7 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
     ],
     ids=range(18),
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, parts: str, expected: str) -> None:
+def test_mistakes_are_reported_with_the_line(tmp_path: Path, parts: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, parts)
     assert expected in str(caught.value) and "\n" not in str(caught.value)

@@ -93,7 +93,7 @@ def array() -> bytes:
     ],
     ids=lambda value: value if isinstance(value, str) else "-",
 )  # fmt: skip
-def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, expected: str) -> None:
+def test_unsupported_formats_are_recognized(tmp_path: Path, name: str, content: bytes, expected: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(MapError, match=expected) as caught:
@@ -103,13 +103,13 @@ def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, expected: str
 
 
 @pytest.mark.parametrize("target", [name for name in SEEDS if name not in ("map", "check", "study")])
-def test_what_is_read_is_none_of_them(target: str) -> None:
+def test_supported_formats_are_not_reported_as_unsupported(target: str) -> None:
     for case in SEEDS[target]:
         assert describe_unsupported_file(Path(case.main), case.files[case.main]) is None
 
 
 @pytest.mark.parametrize("piece", [b"<!a>", b"<!--", b"<?", b" ", b"#\n", b'{"format"', b"solid ", b"v 1 "])
-def test_a_long_beginning_is_what_a_short_one_is(piece: bytes) -> None:
+def test_the_length_of_the_head_does_not_matter(piece: bytes) -> None:
     path = Path("a.txt")
     assert describe_unsupported_file(path, piece * (2**20 // len(piece))) == describe_unsupported_file(
         path, piece * 8

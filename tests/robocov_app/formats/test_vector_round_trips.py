@@ -47,7 +47,9 @@ def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignM
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "options"), FORMATS)
 @pytest.mark.parametrize("name", list_bundled_maps())
-def test_bundled_maps(tmp_path: Path, name: str, kind: str, options: dict[str, Any]) -> None:
+def test_bundled_maps_survive_every_format(
+    tmp_path: Path, name: str, kind: str, options: dict[str, Any]
+) -> None:
     environment = load_map(name)
     foreign = out_and_in(environment, tmp_path / f"{name}.{kind}", **options)
     again, _ = build_environment(foreign, AS_IT_IS, name)
@@ -87,7 +89,7 @@ _OUTLINE = st.sampled_from(
 
 @settings(max_examples=40)
 @given(_OUTLINE, st.lists(_OBSTACLE, max_size=6), st.sampled_from(FORMATS))
-def test_any_map(
+def test_any_map_survives_every_format(
     tmp_path_factory: pytest.TempPathFactory, outline: Any, obstacles: Any, how: tuple[str, dict[str, Any]]
 ) -> None:
     environment = Environment("drawn", outline, tuple(obstacles))
@@ -97,7 +99,7 @@ def test_any_map(
     out_and_in(environment, tmp_path_factory.getbasetemp() / f"drawn.{kind}", **options)
 
 
-def test_few_digits_round_and_say_so(tmp_path: Path, cluttered: Environment) -> None:
+def test_few_digits_round_with_a_note(tmp_path: Path, cluttered: Environment) -> None:
     for kind, digits in (("wkt", 1), ("geojson", 1), ("svg", 0)):
         path = tmp_path / f"plan.{kind}"
         report = export_map(cluttered, path, options=WriteOptions(digits=digits))
@@ -143,7 +145,7 @@ def test_geojson_has_features_with_names(tmp_path: Path) -> None:
             assert part.exterior.is_ccw  # RFC 7946, section 3.1.6
 
 
-def test_geojson_in_degrees_is_where_it_was_put(tmp_path: Path, empty: Environment) -> None:
+def test_geojson_in_degrees_keeps_its_origin(tmp_path: Path, empty: Environment) -> None:
     path = tmp_path / "plan.geojson"
     export_map(empty, path, options=WriteOptions(origin=(8.4, 49.0)))
     ring = json.loads(path.read_text())["features"][0]["geometry"]["coordinates"][0]
@@ -173,7 +175,7 @@ def test_svg_is_xml_at_true_scale(tmp_path: Path) -> None:
     assert titles == [obstacle.name for obstacle in environment.obstacles if obstacle.name]
 
 
-def test_svg_at_a_smaller_scale(tmp_path: Path, cluttered: Environment) -> None:
+def test_svg_is_written_at_a_smaller_scale(tmp_path: Path, cluttered: Environment) -> None:
     path = tmp_path / "plan.svg"
     report = export_map(cluttered, path, options=WriteOptions(scale=0.05))
     assert report.notes == ("1 mm is 0.05 m: 212 x 212 mm", "to import it again: --scale 0.05")
@@ -183,7 +185,7 @@ def test_svg_at_a_smaller_scale(tmp_path: Path, cluttered: Environment) -> None:
         import_map(path)
 
 
-def test_what_cannot_be_written_is_refused(
+def test_impossible_exports_are_refused(
     tmp_path: Path, empty: Environment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
@@ -199,7 +201,7 @@ def test_what_cannot_be_written_is_refused(
 
 
 @given(st.floats(-1e6, 1e6), st.integers(0, 9))
-def test_decimals_are_as_few_as_say_it(value: float, digits: int) -> None:
+def test_numbers_have_no_needless_decimals(value: float, digits: int) -> None:
     text = format_decimal(value, digits)
     assert float(text) == pytest.approx(round(value, digits), abs=1e-12 + abs(value) * 1e-15)
     assert "e" not in text
@@ -209,7 +211,7 @@ def test_decimals_are_as_few_as_say_it(value: float, digits: int) -> None:
         assert len(text.split(".")[1]) <= digits
 
 
-def test_areas_on_a_grid() -> None:
+def test_areas_are_written_on_the_grid() -> None:
     area = shapely.union_all(
         [shapely.box(0, 0, 4, 4) - shapely.box(1, 1, 2, 2), shapely.box(9, 9, 9.01, 9.01)]
     )

@@ -39,7 +39,7 @@ def expected(free: np.ndarray) -> shapely.Geometry:
 
 @settings(deadline=None, max_examples=200)
 @given(grids, st.integers(1, 10))
-def test_it_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
+def test_the_outline_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
     with mock.patch("robocov_app.formats.geometry.cells.vectorize._STRIP", strip):
         outline = trace_outline(free, "grid")
     assert outline.is_valid
@@ -62,7 +62,7 @@ def test_rings_are_apart_and_every_vertex_is_a_corner(free: np.ndarray) -> None:
         assert (ahead[:, 0] * behind[:, 1] != ahead[:, 1] * behind[:, 0]).all()
 
 
-def test_free_cells_that_touch_at_a_corner_are_apart_and_obstacles_hang_together() -> None:
+def test_diagonal_free_cells_are_separate_and_obstacles_connected() -> None:
     assert len(trace_outline(np.array([[True, False], [False, True]]), "grid").geoms) == 2
     walls = np.ones((6, 6), dtype=bool)
     walls[[1, 2, 3, 4], [1, 2, 3, 4]] = False
@@ -71,7 +71,7 @@ def test_free_cells_that_touch_at_a_corner_are_apart_and_obstacles_hang_together
     assert Polygon(part.interiors[0]).area == pytest.approx(4 + 3 * NECK**2)
 
 
-def test_nothing_and_all() -> None:
+def test_empty_and_full_grids_are_outlined() -> None:
     assert trace_outline(np.zeros((3, 4), dtype=bool), "grid") == MultiPolygon()
     assert shapely.equals(trace_outline(np.ones((3, 4), dtype=bool), "grid"), shapely.box(0, 0, 4, 3))
 

@@ -32,17 +32,17 @@ def test_a_walkable_area_is_free_space_with_obstacles(tmp_path: Path) -> None:
     ["\ufeff", "# JuPedSim\r\n\r\n", "-- made by hand\n  ", "SRID=0;", "srid = 0 ;\n"],
     ids=["BOM", "comment", "SQL comment", "SRID", "loose SRID"],
 )
-def test_what_programs_write_before_it(tmp_path: Path, before: str) -> None:
+def test_prefixes_of_programs_are_accepted(tmp_path: Path, before: str) -> None:
     assert read(tmp_path, "wkt", before + HALL.replace(", ", " ,\r\n")).free.area == pytest.approx(49.0)
 
 
-def test_utf_16(tmp_path: Path) -> None:
+def test_utf_16_is_read(tmp_path: Path) -> None:
     (tmp_path / "plan.wkt").write_bytes(HALL.encode("utf-16"))
     assert IMPORTERS["wkt"].read(tmp_path / "plan.wkt", ReadOptions()).free.area == pytest.approx(49.0)
 
 
 @pytest.mark.parametrize("separator", ["\n", ";", ",\n", " "])
-def test_several_geometries_in_a_file(tmp_path: Path, separator: str) -> None:
+def test_several_geometries_are_read(tmp_path: Path, separator: str) -> None:
     parts = [
         HALL,
         "POLYGON((10 1, 14 1, 14 2, 10 2, 10 1))",
@@ -58,7 +58,7 @@ def test_several_geometries_in_a_file(tmp_path: Path, separator: str) -> None:
     )
 
 
-def test_of_points_that_are_all_empty_nothing_comes(tmp_path: Path) -> None:
+def test_empty_points_are_omitted(tmp_path: Path) -> None:
     foreign = read(tmp_path, "wkt", f"{HALL} MULTIPOINT(EMPTY, EMPTY)", pillar=0.2)
     assert foreign.free.area == pytest.approx(49.0)
 
@@ -119,7 +119,7 @@ def test_many_holes_under_many_polygons_are_refused(tmp_path: Path) -> None:
         read(tmp_path, "wkt", shapely.GeometryCollection(areas).wkt)
 
 
-def test_collections_of_everything(tmp_path: Path) -> None:
+def test_collections_are_read(tmp_path: Path) -> None:
     text = (
         "GEOMETRYCOLLECTION(POLYGON((0 0,20 0,20 10,0 10,0 0)),MULTIPOLYGON(((1 1,2 1,2 2,1 2,1 1)),"
         "((3 3,4 3,4 4,3 4,3 3),(3.2 3.2,3.4 3.2,3.4 3.4,3.2 3.4,3.2 3.2)), EMPTY),"
@@ -137,13 +137,13 @@ def test_collections_of_everything(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["POLYGON Z ((0 0 1, 4 0 1, 4 3 2, 0 3 2, 0 0 1))", "polygonz((0 0 1,4 0 1,4 3 2,0 3 2,0 0 1))"]
 )
-def test_heights_are_told(tmp_path: Path, text: str) -> None:
+def test_heights_are_reported(tmp_path: Path, text: str) -> None:
     foreign = read(tmp_path, "wkt", text)
     assert foreign.free.equals(box(0, 0, 4, 3))
     assert foreign.dropped == ("5 third coordinates, z from 1 to 2",)
 
 
-def test_measures_are_no_heights(tmp_path: Path) -> None:
+def test_measures_are_not_heights(tmp_path: Path) -> None:
     assert read(tmp_path, "wkt", "POLYGON M ((0 0 9, 4 0 9, 4 3 9, 0 0 9))").dropped == ()
     assert (
         read(tmp_path, "wkt", "POLYGON ZM ((0 0 1 9, 4 0 1 9, 4 3 1 9, 0 0 1 9))")
@@ -158,7 +158,7 @@ def test_rings_that_do_not_close_are_closed(tmp_path: Path) -> None:
     assert foreign.repaired == ("1 ring closed: the last point was not the first",)
 
 
-def test_a_system_is_projected(tmp_path: Path) -> None:
+def test_a_reference_system_is_projected(tmp_path: Path) -> None:
     foreign = read(tmp_path, "wkt", "SRID=4326;POLYGON((8.4 49, 8.401 49, 8.401 49.001, 8.4 49.001, 8.4 49))")
     assert foreign.free.area == pytest.approx(73.17 * 111.2, rel=1e-3)
     text = "SRID=25832;POLYGON((456000 5430000,456100 5430000,456100 5430050,456000 5430050,456000 5430000))"
@@ -167,7 +167,7 @@ def test_a_system_is_projected(tmp_path: Path) -> None:
     assert plain.free.bounds == (456000, 5430000, 456100, 5430050)
 
 
-def test_obstacles_are_asked_for(tmp_path: Path) -> None:
+def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
     text = "POLYGON((0 0,1 0,1 1,0 1,0 0))\nPOLYGON((5 0,6 0,6 1,5 1,5 0))"
     assert read(tmp_path, "wkt", text).free.area == pytest.approx(2.0)
     assert read(tmp_path, "wkt", text, outlines="solid").free.area == pytest.approx(8 * 3 - 2)
@@ -202,7 +202,7 @@ def test_obstacles_are_asked_for(tmp_path: Path) -> None:
         ("POLYGON((٠ 0, 1 1, 2 2, 0 0))", ":1:10: expected a point"),
     ],
 )
-def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_text_is_reported_with_its_position(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "plan.wkt"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MapError) as caught:
@@ -212,7 +212,7 @@ def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, ex
     assert "\n" not in str(caught.value)
 
 
-def test_bytes_that_are_no_text(tmp_path: Path) -> None:
+def test_invalid_bytes_are_refused(tmp_path: Path) -> None:
     (tmp_path / "plan.wkt").write_bytes(b"POLYGON((0 0, 1\xff 0))")
     with pytest.raises(MapError, match="byte 15: not UTF-8, expected text"):
         IMPORTERS["wkt"].read(tmp_path / "plan.wkt", ReadOptions())
@@ -237,7 +237,7 @@ _GEOMETRY = st.recursive(
 
 @settings(max_examples=150)
 @given(_GEOMETRY, st.booleans())
-def test_coordinates_are_those_that_shapely_reads(geometry: Any, flat: bool) -> None:
+def test_coordinates_agree_with_shapely(geometry: Any, flat: bool) -> None:
     text = shapely.to_wkt(geometry, rounding_precision=-1)
     shapes = Shapes("plan", ReadOptions())
     figures = WktParser(text, "plan", shapes).parse()

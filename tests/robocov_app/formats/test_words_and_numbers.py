@@ -25,7 +25,7 @@ from robocov_app.formats.vector.svg.path_data import parse_path
 from robocov_app.formats.vector.svg.style import parse_declarations
 
 
-def test_numbers_are_written_so_that_they_are_read_easily() -> None:
+def test_numbers_are_formatted_readably() -> None:
     assert (format_area(30083.2), format_area(0.123456)) == ("30083 m²", "0.1235 m²")
     assert (format_decimal(1.5, 3), format_decimal(-0.0001, 3), format_decimal(1200.0, 0)) == (
         "1.5",
@@ -37,11 +37,11 @@ def test_numbers_are_written_so_that_they_are_read_easily() -> None:
     assert (format_plural(2, "empty geometry"), format_plural(2, "box")) == ("2 empty geometries", "2 boxes")
 
 
-def test_finer_cells_are_of_round_sizes() -> None:
+def test_smaller_cells_have_round_sizes() -> None:
     assert list(islice(_iterate_smaller_sizes(0.15), 4)) == [0.1, 0.05, 0.02, 0.01]
 
 
-def test_what_is_in_texts() -> None:
+def test_texts_are_cleaned() -> None:
     assert parse_yaml(b"image: a.pgm\norigin: [0, 1.5, 0]", "map.yaml") == {
         "image": "a.pgm",
         "origin": ["0", "1.5", "0"],
@@ -52,7 +52,7 @@ def test_what_is_in_texts() -> None:
     assert closed
 
 
-def test_a_file_that_is_not_read_is_named_with_a_way() -> None:
+def test_an_unsupported_file_is_reported_with_a_way_out() -> None:
     assert describe_unsupported_file(Path("plan.pdf"), b"%PDF-1.7") == (
         "a PDF, which cannot be imported: pdftocairo -svg plan.pdf out.svg, or pdftoppm -png for a scan"
     )
@@ -64,7 +64,7 @@ def test_few_points_are_enough_for_a_flat_curve() -> None:
 
 
 @pytest.mark.parametrize(("rule", "area"), [("holes", 12.0), ("evenodd", 12.0), ("nonzero", 16.0)])
-def test_a_square_in_a_square(rule: Rule, area: float) -> None:
+def test_a_square_in_a_square_becomes_an_obstacle(rule: Rule, area: float) -> None:
     square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
     assert find_enclosed_area([square, 1 + square / 2], rule).area.area == area
 
@@ -80,5 +80,5 @@ def test_three_cells_have_six_corners() -> None:
     assert free.wkt == "MULTIPOLYGON (((0 0, 2 0, 2 1, 1 1, 1 2, 0 2, 0 0)))"
 
 
-def test_a_cut_corner_is_made_whole() -> None:
+def test_a_cut_corner_is_completed() -> None:
     assert sharpen_corners(Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)]), 0.02).area == 12.0

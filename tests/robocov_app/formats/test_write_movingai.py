@@ -14,7 +14,7 @@ ROOM = Environment(
 )  # fmt: skip
 
 
-def test_letters(tmp_path: Path) -> None:
+def test_cells_are_written_as_characters(tmp_path: Path) -> None:
     path = tmp_path / "room.map"
     report = export_map(ROOM, path, options=WriteOptions(cell=0.5))
     assert path.read_text() == (
@@ -24,7 +24,7 @@ def test_letters(tmp_path: Path) -> None:
     assert (report.area, report.area_written) == (2.75, 2.75)
 
 
-def test_it_comes_back_beside_its_place(tmp_path: Path) -> None:
+def test_a_written_map_keeps_its_shape_without_its_origin(tmp_path: Path) -> None:
     path = tmp_path / "museum.map"
     museum = load_map("museum")
     report = export_map(museum, path)

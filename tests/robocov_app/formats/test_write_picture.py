@@ -12,7 +12,7 @@ from robocov.mapfile import load_map
 from robocov_app.formats import Shaping, WriteOptions, export_map, import_map
 
 
-def test_black_and_white_and_what_it_says_of_itself(tmp_path: Path) -> None:
+def test_the_picture_is_black_and_white_and_has_its_position(tmp_path: Path) -> None:
     room = Environment("Zimmer α", ((3.0, -2.0), (5.0, -2.0), (5.0, -1.0), (3.0, -1.0)))
     report = export_map(room, tmp_path / "room.png", options=WriteOptions(cell=0.5))
     assert report.area_written == report.area == 2
@@ -26,7 +26,7 @@ def test_black_and_white_and_what_it_says_of_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["museum", "city", "cave"])
-def test_it_comes_back_in_place(tmp_path: Path, name: str) -> None:
+def test_a_written_picture_keeps_its_position(tmp_path: Path, name: str) -> None:
     given = load_map(name)
     export_map(given, tmp_path / "a.png")
     back, _, _ = import_map(tmp_path / "a.png", shaping=Shaping(keep="all"))

@@ -57,7 +57,7 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
 @pytest.mark.parametrize("image", ["pgm", "png"])
-def test_it_comes_back(tmp_path: Path, mode: str, image: str) -> None:
+def test_a_written_map_can_be_read(tmp_path: Path, mode: str, image: str) -> None:
     report = export_map(CORNER, tmp_path / "c.yaml", options=WriteOptions(cell=0.25, mode=mode, image=image))  # type: ignore[arg-type]
     environment, told, _ = import_map(tmp_path / "c.yaml", shaping=Shaping(simplify=0.0))
     assert environment.free.equals(CORNER.free)
@@ -73,7 +73,7 @@ def test_it_comes_back(tmp_path: Path, mode: str, image: str) -> None:
         assert cut.area == CORNER.area
 
 
-def test_scale_and_raw_say_how_much_of_a_cell_is_solid(tmp_path: Path) -> None:
+def test_scale_and_raw_give_the_solid_fraction_of_a_cell(tmp_path: Path) -> None:
     half = Environment("half", ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)), (
         PolygonObstacle(((0.875, 0.0), (1.375, 0.0), (1.375, 1.0), (0.875, 1.0))),
     ))  # fmt: skip
@@ -117,7 +117,7 @@ def test_the_same_map_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
-def test_what_a_folder_does_not_take_is_one_line(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         export_map(CORNER, tmp_path / "none" / "a.yaml")
     round_room = Environment("round", CORNER.boundary, (CircleObstacle((1.0, 1.0), 0.3, "pillar"),))
