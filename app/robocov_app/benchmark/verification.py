@@ -428,7 +428,7 @@ class _RunChecker:
         return sorted(rng.permutation(task.robots)[: self._robots].tolist())
 
     def _create_generator(self, task: Task) -> np.random.Generator:
-        return _create_generator(self._seed, _ROBOT_STREAM, int(task.digest[:12], 16))
+        return _create_generator(self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16))
 
     def _isolate(self, task: Task, run: ObservedRun, robot: int | None) -> list[str]:
         """Repeat the decisions of a robot, and list the differences."""

@@ -72,27 +72,29 @@ def draw_episode(
     if conditions is not None:
         conditions_seed = options.get("conditions_seed", random_values.conditions_seed)
         conditions = replace(conditions, seed=conditions_seed)
-    start = options.get("start", task.start)
-    if start == "*":
-        start = random_values.start
-    start_name: str | None = environment.start(start).name
-    start_seed = options.get("start_seed", random_values.start_seed)
-    positions = None
-    if "positions" in options:
-        positions = _parse_positions(options["positions"])
-        start_name = None
-        start_seed = None
     scenario = Scenario(
         environment,
         team=task.whole_team,
-        start=start_name,
-        seed=start_seed,
-        starts=positions,
         duration=task.duration,
         dt=task.dt,
         conditions=conditions,
+        **_choose_start(task, environment, random_values, options),
     )
     return Episode(task, scenario, sampler.get_cost(environment), shared_run)
+
+
+def _choose_start(
+    task: CoverageTask, environment: Environment, random_values: _RandomValues, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the arguments of a `Scenario` about the start: a name with a seed, or positions."""
+    name = options.get("start", task.start)
+    if name == "*":
+        name = random_values.start
+    # The name is checked in any case.
+    start = environment.start(name)
+    if "positions" in options:
+        return {"start": None, "seed": None, "starts": _parse_positions(options["positions"])}
+    return {"start": start.name, "seed": options.get("start_seed", random_values.start_seed)}
 
 
 class _RandomValues(NamedTuple):

@@ -27,7 +27,7 @@ from robocov_app.learning.task import CoverageTask
 
 @dataclass(frozen=True)
 class ExternalController:
-    """Takes the place of a controller in a simulation whose forces are given from outside.
+    """Placeholder for the controller of a simulation whose forces are given from outside.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class ExternalController:
 
     name: ClassVar[str] = "learner"
     label: ClassVar[str] = "learner"
-    summary: ClassVar[str] = "whoever acts in a learning environment"
+    summary: ClassVar[str] = "the learner that acts in a learning environment"
 
     scanning: Scanning | None = None
 

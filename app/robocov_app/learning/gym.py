@@ -168,7 +168,7 @@ class CoverageVectorEnv(SyncVectorEnv):
     task : CoverageTask, optional
         By default the task with all defaults.
     autoreset_mode : str or gymnasium.vector.AutoresetMode
-        When the next episode follows one that is over.
+        When the next episode starts after one has ended.
     render_mode : str, optional
         Render mode of each environment.
     **changes

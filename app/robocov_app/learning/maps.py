@@ -1,4 +1,4 @@
-"""Maps to learn on: given ones, and generated ones that are drawn for each episode."""
+"""Training maps: given ones, and generated ones that are drawn for each episode."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -103,7 +103,9 @@ class MapSampler:
     def only_map(self) -> Environment | None:
         """The map, if there is a single one."""
         source = self._sources[0]
-        return source if len(self._sources) == 1 and isinstance(source, Environment) else None
+        if len(self._sources) == 1 and isinstance(source, Environment):
+            return source
+        return None
 
     def draw(self, rng: np.random.Generator) -> Environment:
         """Draw a map."""

@@ -41,8 +41,8 @@ class ObservationLayout:
     ``position``   2                   from the center of the region's bounding box, D
     ``velocity``   2                   relative to the robot's maximum speed
     ``obstacle``   3                   offset of the nearest sensed obstacle point, S; then 1; all 0 for none
-    ``neighbor``   3 x `neighbors`     the nearest robots that are heard, nearest first: offset, D; then 1;
-                                       all 0 if there is none
+    ``neighbor``   3 x `neighbors`     the nearest robots within communication range, nearest first: offset,
+                                       D; then 1; all 0 if there is none
     ``rays``       `rays`              distance along each ray, evenly spaced from +x, S; 1 if it is free
     ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
     =============  ==================  =====================================================================
@@ -102,7 +102,7 @@ class ObservationLayout:
 
     @property
     def size(self) -> int:
-        """Number of numbers in a row."""
+        """Length of a row."""
         return _FIXED_SIZE + 3 * self.neighbors + self.rays + 2 * self.centroid
 
     @property
@@ -163,7 +163,7 @@ class ObservationLayout:
         robot, _, offset, distance = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
         nearest = np.zeros((n, self.neighbors, 3))
         distances = np.full((n, self.neighbors), np.inf)
-        # The offsets point from the neighbor to the robot, those of the layout the other way.
+        # These offsets point from the neighbor to the robot, those of the layout in the opposite direction.
         _insert_nearest(robot, -offset / unit, distance, distances, nearest)
         return nearest
 
