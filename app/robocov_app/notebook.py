@@ -198,9 +198,10 @@ def plot_history(
         If the axes or the theme cannot be used, or the history has no finite value.
     """
     from robocov_app.figures import runs
+    from robocov_app.figures.curves import TimeCurve
 
     _check_axes(axes)
-    curve = (label, controller, history.time, history.mean_distance)
+    curve = TimeCurve(label, controller, history.time, history.mean_distance)
     return _get_axes(runs.plot_cost([curve], axes, theme=theme, size=size, title=title), axes)
 
 

@@ -203,7 +203,7 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
 
 
 def _print_interruption(options: Arguments) -> int:
-    """Print how to resume an interrupted study, and return the exit status."""
+    """Print the command that resumes an interrupted study, and return the exit status."""
     words = ["robocov", "paper", "--out", str(options.out)]
     if options.quick:
         words.append("--quick")

@@ -110,7 +110,7 @@ def draw_map(
 
 
 def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Draw the density as an image. Unlike `imshow`, this leaves the limits of the axes as they are."""
+    """Draw the density as an image. Unlike `imshow`, this does not change the limits of the axes."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     image = AxesImage(
         axes,

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.arrays import Array
-from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves, format_end_label
+from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import FigurePage
 from robocov_app.look.curve_styles import CurveStyle
@@ -50,7 +50,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         Several runs have their median and a band between the quartiles, a single run has its line.
     size : (width, height), px
     label : str
-        Of the axis of values.
+        Of the value axis.
     unit : str
         Of the final values at the ends of the curves.
 
@@ -84,15 +84,15 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     return page.figure
 
 
-def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> Curve:
+def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> TimeCurve:
     """Return the median of a band, with a name that fits with its final value into half of the page."""
 
     def measure_end_label(name: str) -> float:
-        return page.measure_text(format_end_label((name, "", band.time, median), unit), bold=True)
+        return page.measure_text(format_end_label(TimeCurve(name, "", band.time, median), unit), bold=True)
 
     max_width = _MAX_NAME_FRACTION * page.size[0] - _MARGINS.right
     name = shorten_text(band.label, measure_end_label, max_width, min_chars=1)
-    return name, band.style.name, band.time, median
+    return TimeCurve(name, band.style.name, band.time, median)
 
 
 def compute_quartiles(values: Array) -> Array:

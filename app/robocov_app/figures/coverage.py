@@ -20,8 +20,8 @@ from robocov_app.figures.curves import (
     DISTANCE,
     TIME,
     WEIGHTED_DISTANCE,
-    Curve,
     CurveMargins,
+    TimeCurve,
     add_curve_axes,
     draw_curves,
 )
@@ -153,26 +153,26 @@ class _Arrangement:
 
 @plain_style()
 def plot_coverage(
-    curves: Sequence[Curve],
+    curves: Sequence[TimeCurve],
     snapshots: Sequence[DistanceSnapshot],
     *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost",
-    times: Sequence[Curve] = (),
+    times: Sequence[TimeCurve] = (),
 ) -> Figure:
     """Plot cost curves, and maps of the distance to the nearest robot with a common color scale.
 
     Parameters
     ----------
-    curves : sequence of Curve
+    curves : sequence of TimeCurve
         Mean distances, m; may be empty.
     snapshots : sequence of DistanceSnapshot
     theme : Theme or str
     size : (width, height), px, optional
         Size of the page. If it is smaller than `MIN_SIZE_PX`, the page has the curves alone.
     title : str
-    times : sequence of Curve
+    times : sequence of TimeCurve
         Mean times, s, if robots are not equally fast.
 
     Returns
@@ -359,7 +359,11 @@ def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[
 
 
 def _draw_curves(
-    page: FigurePage, curves: Sequence[Curve], times: Sequence[Curve], box: PageBox, distance_label: str
+    page: FigurePage,
+    curves: Sequence[TimeCurve],
+    times: Sequence[TimeCurve],
+    box: PageBox,
+    distance_label: str,
 ) -> None:
     """Draw the mean distances, and mean times if there are any: below, or to the right in a wide box."""
     left, top, width, height = box
@@ -373,7 +377,9 @@ def _draw_curves(
         _draw_curve_panel(page, times, (left, top + height / 2, width, height / 2), TIME, "s")
 
 
-def _draw_curve_panel(page: FigurePage, curves: Sequence[Curve], box: PageBox, label: str, unit: str) -> None:
+def _draw_curve_panel(
+    page: FigurePage, curves: Sequence[TimeCurve], box: PageBox, label: str, unit: str
+) -> None:
     """Draw curves in a box with space for their labels."""
     axes = add_curve_axes(page, curves, _CURVE_MARGINS, box=box, unit=unit)
     draw_curves(axes, curves, page.theme, label=label, unit=unit)

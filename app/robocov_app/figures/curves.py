@@ -1,7 +1,7 @@
 """Curves over time, each with its name and its final value at its end."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,9 +23,6 @@ from robocov_app.look.axes import MAX_TIME_INTERVALS
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
 from robocov_app.look.labels import spread_labels
 from robocov_app.look.theme import Theme
-
-Curve: TypeAlias = tuple[str, str, Array, Array]
-"""Label, name of the controller, times, (T,) s, and values, (T,)."""
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
@@ -52,6 +49,25 @@ _CONNECTION_END_PT = 10
 _LABEL_START_PT = 12
 
 
+class TimeCurve(NamedTuple):
+    """A curve over time.
+
+    Attributes
+    ----------
+    label : str
+    controller : str
+        Name of the controller, which decides the color.
+    times : (T,) array, s
+    values : (T,) array
+        nan if a value is missing.
+    """
+
+    label: str
+    controller: str
+    times: Array
+    values: Array
+
+
 class CurveMargins(NamedTuple):
     """Space between the edges of a box and the axes of curves in it, px at scale 1.
 
@@ -60,9 +76,9 @@ class CurveMargins(NamedTuple):
     left : float
         For the labels of the ticks.
     top : float
-        For the label of the axis of values, and titles above it.
+        For the label of the value axis, and titles above it.
     bottom : float
-        For the labels of the ticks and of the axis of time.
+        For the labels of the ticks and of the time axis.
     right : float
         In addition to the width of the labels at the ends of the curves.
     max_right_fraction : float
@@ -93,12 +109,12 @@ class _CurveEnd(NamedTuple):
     text: str
 
 
-def format_end_label(curve: Curve, unit: str = "m") -> str:
+def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     """Return the label of a curve with its last finite value.
 
     Parameters
     ----------
-    curve : Curve
+    curve : TimeCurve
     unit : str
         Meters have three decimals, other units four digits if the value is large.
 
@@ -106,9 +122,8 @@ def format_end_label(curve: Curve, unit: str = "m") -> str:
     -------
     str
     """
-    label, _, _, values = curve
-    last = float(values[np.isfinite(values)][-1])
-    return f"{label}  {_format_end_value(last, unit)} {unit}".rstrip()
+    last = float(curve.values[np.isfinite(curve.values)][-1])
+    return f"{curve.label}  {_format_end_value(last, unit)} {unit}".rstrip()
 
 
 def _format_end_value(value: float, unit: str) -> str:
@@ -124,7 +139,7 @@ def _format_end_value(value: float, unit: str) -> str:
 
 def add_curve_axes(
     page: FigurePage,
-    curves: Sequence[Curve],
+    curves: Sequence[TimeCurve],
     margins: CurveMargins,
     *,
     box: PageBox | None = None,
@@ -135,7 +150,7 @@ def add_curve_axes(
     Parameters
     ----------
     page : FigurePage
-    curves : sequence of Curve
+    curves : sequence of TimeCurve
         At least one.
     margins : CurveMargins
     box : PageBox, optional
@@ -164,7 +179,7 @@ def add_curve_axes(
 
 def draw_curves(
     axes: Axes,
-    curves: Sequence[Curve],
+    curves: Sequence[TimeCurve],
     theme: Theme,
     *,
     styles: Sequence[CurveStyle] | None = None,
@@ -178,30 +193,30 @@ def draw_curves(
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    curves : sequence of Curve
+    curves : sequence of TimeCurve
     theme : Theme
     styles : sequence of CurveStyle, optional
         By default those of the controllers.
     bands : sequence of ((T,) array, (T,) array) or None, optional
         Lower and upper edge of a band around each curve.
     label : str
-        Of the axis of values.
+        Of the value axis.
     unit : str
         Of the values at the ends.
     weight : float
         Factor of the widths of lines.
     """
     if styles is None:
-        styles = choose_curve_styles([controller for _, controller, _, _ in curves])
+        styles = choose_curve_styles([curve.controller for curve in curves])
     if bands is None:
         bands = [None] * len(curves)
     _set_axes(axes, curves, bands)
     style_axes(axes, theme, "time (s)", label, grid="y")
-    for (_, _, times, _), style, band in zip(curves, styles, bands, strict=True):
+    for curve, style, band in zip(curves, styles, bands, strict=True):
         if band is not None:
             low, high = band
             color = to_plot_color(style.get_color(theme))
-            axes.fill_between(times, low, high, color=color, alpha=0.16, linewidth=0.0)
+            axes.fill_between(curve.times, low, high, color=color, alpha=0.16, linewidth=0.0)
     ends = []
     for number, (curve, style) in enumerate(zip(curves, styles, strict=True)):
         lines_above = len(curves) - 1 - number
@@ -211,10 +226,10 @@ def draw_curves(
     _draw_end_labels(axes, ends)
 
 
-def _set_axes(axes: Axes, curves: Sequence[Curve], bands: Sequence[tuple[Array, Array] | None]) -> None:
+def _set_axes(axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[Array, Array] | None]) -> None:
     """Set the limits and ticks of axes for curves and bands."""
-    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    lines = [np.asarray(curve[3]) for curve in curves]
+    times = np.concatenate([curve.times for curve in curves])
+    lines = [curve.values for curve in curves]
     for band in bands:
         if band is not None:
             lines += band
@@ -225,10 +240,11 @@ def _set_axes(axes: Axes, curves: Sequence[Curve], bands: Sequence[tuple[Array, 
 
 
 def _draw_line(
-    axes: Axes, curve: Curve, style: CurveStyle, color: PlotColor, *, weight: float, lines_above: int
+    axes: Axes, curve: TimeCurve, style: CurveStyle, color: PlotColor, *, weight: float, lines_above: int
 ) -> tuple[float, float]:
     """Draw a curve with a mark at its end, and return the time and the value there."""
-    _, _, times, values = curve
+    times = curve.times
+    values = curve.values
     extra = min(lines_above, _MAX_WIDENED_LINES)
     width = weight * (_LINE_WIDTH_PT + _EXTRA_LINE_WIDTH_PT * extra)
     dashes = style.dashes

@@ -61,7 +61,7 @@ def plot_final_costs(
         Name of each group, which may be empty, and its samples. Values that are not finite are left out.
         Samples of less than `MIN_BOX_VALUES` values have no box.
     label : str
-        Of the axis of values.
+        Of the value axis.
     width : int, px
         Of the page, whose height depends on the number of samples.
     scale : float

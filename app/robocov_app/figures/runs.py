@@ -15,7 +15,7 @@ from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures import arena
-from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves
+from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.extent import enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
@@ -367,7 +367,7 @@ def _write_two_lines(page: FigurePage, captions: _Captions, number: int, panel: 
 
 @plain_style()
 def plot_cost(
-    curves: Sequence[Curve],
+    curves: Sequence[TimeCurve],
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
@@ -378,7 +378,7 @@ def plot_cost(
 
     Parameters
     ----------
-    curves : sequence of Curve
+    curves : sequence of TimeCurve
     axes : matplotlib.axes.Axes, optional
         By default, a page of its own.
     theme : Theme or str
@@ -406,18 +406,17 @@ def plot_cost(
     return get_figure(axes)
 
 
-def _check_curve(curve: Curve) -> None:
+def _check_curve(curve: TimeCurve) -> None:
     """Check that a curve has a value for each time and a finite one."""
-    label, _, times, values = curve
-    if len(times) != len(values) or not np.isfinite(values).any():
-        finite = int(np.isfinite(values).sum())
+    if len(curve.times) != len(curve.values) or not np.isfinite(curve.values).any():
+        finite = int(np.isfinite(curve.values).sum())
         raise ParameterError(
-            f"curve {quote(label)}: {len(times)} times, {finite} finite values, "
+            f"curve {quote(curve.label)}: {len(curve.times)} times, {finite} finite values, "
             f"expected a value for each time and a finite one"
         )
 
 
-def _create_cost_page(curves: Sequence[Curve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
+def _create_cost_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
     """Create a page for curves alone, whose texts can be large."""
     width, height = size
     page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
@@ -636,14 +635,15 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     page.write_title(title, 26)
     for number, panel in enumerate(METRIC_PANELS):
         curves = [
-            (run.label, run.controller, run.metrics.time, panel.get_values(run.metrics)) for run in runs
+            TimeCurve(run.label, run.controller, run.metrics.time, panel.get_values(run.metrics))
+            for run in runs
         ]
         axes = _create_metric_axes(page, number, curves, panel.unit)
         draw_curves(axes, curves, theme, label=panel.label, unit=panel.unit, weight=0.8)
     return page.figure
 
 
-def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[Curve], unit: str) -> Axes:
+def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[TimeCurve], unit: str) -> Axes:
     """Create the axes of one of four panels, with space for the labels of its curves."""
     scale = page.scale
     width = 600.0

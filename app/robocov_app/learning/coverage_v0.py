@@ -1,4 +1,4 @@
-"""The environment under PettingZoo's usual names: `parallel_env`, and `env` for robots that act in turn."""
+"""The environment under PettingZoo's usual names: `parallel_env`, and `env`, whose robots act one by one."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ parallel_env = CoverageParallelEnv
 
 
 def env(**options: Any) -> Any:
-    """Return the environment as PettingZoo's ``AECEnv``, in which the robots report their actions in turn.
+    """Return the environment as PettingZoo's ``AECEnv``, in which the robots act one after the other.
 
     Parameters
     ----------

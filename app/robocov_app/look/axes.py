@@ -1,6 +1,6 @@
 """Limits and ticks of the axes of curves.
 
-One rule holds in windows, figures and replays. An axis of values starts at zero if the curves then still use
+One rule holds in windows, figures and replays. An value axis starts at zero if the curves then still use
 60 % of its height: proportions can be read off, and little space is lost. Otherwise it starts just below the
 lowest value, since controllers often differ by only a few percent.
 """
@@ -22,15 +22,15 @@ GROWTH_FRACTION = 0.5
 TICK_FACTORS = (1, 2, 5, 10)
 """Steps between ticks are one of these times a power of ten."""
 MAX_VALUE_INTERVALS = 6
-"""Maximum number of intervals between the ticks of an axis of values."""
+"""Maximum number of intervals between the ticks of an value axis."""
 MAX_TIME_INTERVALS = 8
-"""Maximum number of intervals between the ticks of an axis of times."""
+"""Maximum number of intervals between the ticks of an time axis."""
 MIN_TIME_LIMIT_S = 10.0
-"""A growing axis of times shows at least this many seconds."""
+"""A growing time axis shows at least this many seconds."""
 _FREE_TIME_FRACTION = 0.03
-"""Free space behind the present on a growing axis of times, as a fraction of the time so far."""
+"""Free space behind the present on a growing time axis, as a fraction of the time so far."""
 _MIN_TIME_STEP_S = 5.0
-"""A growing axis of times ends at a multiple of at least this step."""
+"""A growing time axis ends at a multiple of at least this step."""
 _MIN_VALUE = 1e-3
 """If all values are equal and nearer to zero than this, the axis is that of this value."""
 
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
 def choose_value_limits(
     low: float, high: float, *, margin: float = VALUE_MARGIN, origin: float = 0.0
 ) -> tuple[float, float]:
-    """Choose the limits of an axis of values.
+    """Choose the limits of an value axis.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
 
 
 def choose_growing_time_limit(end_s: float) -> float:
-    """Choose the end of the axis of times while time passes.
+    """Choose the end of the time axis while time passes.
 
     It is a round time a little after the present, so that the axis seldom changes.
 

@@ -239,7 +239,7 @@ def collect_degradations(
 
 
 def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
-    """Return in sentences where a contender is worst, and how often its runs fail."""
+    """Return sentences about the worst cases of a contender and the fraction of its failed runs."""
     key = summary.contender.key
     medians = outcomes.compute_medians_by_map(key)
     worst_maps = sorted(medians.items(), key=lambda item: -item[1])[:_MAX_WORST_MAPS]

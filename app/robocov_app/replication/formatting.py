@@ -60,5 +60,5 @@ def format_median(values: Array, unit: str = "") -> str:
 
 
 def capitalize(text: str) -> str:
-    """Return a text with a capital first letter. Unlike `str.capitalize`, it leaves the rest as it is."""
+    """Return a text with a capital first letter. Unlike `str.capitalize`, it does not change the rest."""
     return text[:1].upper() + text[1:]

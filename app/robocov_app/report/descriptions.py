@@ -11,7 +11,7 @@ from robocov_app.runs.saved_runs import build_roster
 
 
 def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
-    """List when each robot joins and fails.
+    """List the times at which each robot joins and fails.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def describe_map(environment: Environment) -> str:
 
 
 def _describe_obstacles(environment: Environment) -> str:
-    """Return how many obstacles a map has, and how many of them move."""
+    """Return the number of obstacles of a map, and of those that move, as text."""
     count = len(environment.obstacles)
     moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     text = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
@@ -81,7 +81,7 @@ def describe_run(record: Record, history: CostHistory | None) -> str:
 
 
 def _list_events(record: Record) -> list[tuple[float, str]]:
-    """Return when robots join and fail, with a text for each."""
+    """Return the times at which robots join and fail, with a text for each."""
     if record.conditions is None:
         return []
     duration = record.time[-1] - record.time[0]

@@ -25,7 +25,7 @@ def format_title(result: ReportedResult) -> str:
 
 
 def _list_names(names: Sequence[str]) -> str:
-    """Return the first names as text, and how many more there are."""
+    """Return the first names as text, and the number of others."""
     text = ", ".join(names[:_MAX_LISTED_NAMES])
     if len(names) > _MAX_LISTED_NAMES:
         text += f" and {len(names) - _MAX_LISTED_NAMES} more"
@@ -72,7 +72,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
 
 
 def _format_run_counts(result: ReportedResult) -> str:
-    """Return how many runs are done, failed, unreadable and missing."""
+    """Return the numbers of done, failed, unreadable and missing runs as text."""
     done = len(result.completed_runs)
     if done == result.expected_count:
         return str(done)
@@ -141,7 +141,7 @@ def _format_team_parameter(key: str, value: Any) -> str:
 
 
 def list_gain_meanings(result: ReportedResult) -> list[tuple[str, str]]:
-    """List the gains of the runs with their meanings, as far as these are known."""
+    """List the gains of the runs with their meanings, without those whose meaning is not known."""
     used_names = {name for run in result.runs for name, _ in run.gains}
     meanings = result.gain_meanings.items()
     return [(name, meaning) for name, meaning in meanings if name in used_names and meaning]

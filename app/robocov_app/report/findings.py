@@ -79,7 +79,7 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
 
 
 def list_missing_runs(result: ReportedResult) -> list[str]:
-    """List how many runs failed, cannot be read, or are missing, one sentence each."""
+    """List the numbers of runs that failed, cannot be read, or are missing, one sentence each."""
     sentences = []
     if result.failed_runs:
         sentences.append(_describe_failed_runs(result))
@@ -122,7 +122,7 @@ def _list_reasons(reasons: Sequence[str]) -> str:
 
 
 def list_problems(result: ReportedResult) -> list[str]:
-    """List in how many runs robots had contacts or were stuck, or the team had not settled."""
+    """List the numbers of runs with contacts, with stuck robots, and with a team that had not settled."""
     runs = result.completed_runs
     counts = {
         "a robot touched a wall or another one": sum((run.figures.get("contacts") or 0) > 0 for run in runs),

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from robocov_app.figures.coverage import DistanceSnapshot
-    from robocov_app.figures.curves import Curve
+    from robocov_app.figures.curves import TimeCurve
 
 _COMPARISON_HEADER = {"format": "robocov-comparison", "version": 1}
 _SUMMARY_COLUMNS = (
@@ -288,14 +288,14 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
     )
 
 
-def _build_curves(runs: Sequence[Run], quantity: str) -> list[Curve]:
+def _build_curves(runs: Sequence[Run], quantity: str) -> list[TimeCurve]:
     """Return the curves of ``mean_distance``, or of ``mean_time``, which not every run has."""
     curves = []
     for run in runs:
         values = getattr(run.history, quantity)
         is_known = values is not None and (quantity == "mean_distance" or np.isfinite(values).any())
         if is_known:
-            curves.append((run.record.label, run.record.controller, run.history.time, values))
+            curves.append(TimeCurve(run.record.label, run.record.controller, run.history.time, values))
     return curves
 
 

@@ -16,7 +16,7 @@ from robocov_app.sweep.worker import Outcome, build_failure
 _MAX_ENDS_PER_TASK = 2
 """Number of workers that a task may end before it counts as failed."""
 _MAX_CONSECUTIVE_ENDS = 20
-"""Number of workers that may end one after the other without a finished task in between."""
+"""Number of workers that may end consecutively, without a finished task between them."""
 _MAX_CONSECUTIVE_ENDS_PER_TASK = 4
 """The same for each task that is executed at the same time."""
 
@@ -145,7 +145,7 @@ class Executor(ABC):
         return future.result()  # type: ignore[no-any-return]
 
     def _start_tasks(self) -> None:
-        """Start waiting tasks as far as there is capacity; an isolated one only when no other is running."""
+        """Start waiting tasks while there is capacity; an isolated one only if no other is running."""
         must_isolate = self._is_isolated or bool(self._waiting_for_isolation)
         while self._waiting and not must_isolate and self._running < self.capacity:
             self._start(self._waiting.popleft())

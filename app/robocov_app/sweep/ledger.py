@@ -91,7 +91,7 @@ class Survey:
 
     @property
     def reused(self) -> int:
-        """Number of runs that are used as they are."""
+        """Number of runs that are used without repeating them."""
         return len(self.is_left) - self.remaining
 
     def describe(self, *, keep_versions: bool) -> list[str]:

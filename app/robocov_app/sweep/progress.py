@@ -26,7 +26,7 @@ _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
 
 @dataclass
 class SweepProgress:
-    """Number of runs of a sweep, and how many of them are finished.
+    """Number of runs of a sweep, and of those that are finished.
 
     Attributes
     ----------

@@ -127,7 +127,7 @@ class Study:
     folder : Path
         Folder to which relative paths of controllers refer.
     sources : mapping of str to ControllerSource
-        Texts of the controllers in files of the user, as they are when the study is built.
+        Texts of the controllers in files of the user, read when the study is built.
     teams : tuple of dict of str to float, str or None
         All combinations of the parameters of the robots and the conditions.
 

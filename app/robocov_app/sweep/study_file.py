@@ -32,7 +32,7 @@ _Converter: TypeAlias = Callable[[Any], Any]
 
 
 class _ValueSchema(NamedTuple):
-    """A key that accepts a single value, a list of items or a table, as far as they are given."""
+    """A key that accepts a single value, a list of items, or a table; each may be None."""
 
     expected: str
     """Description of the accepted values."""

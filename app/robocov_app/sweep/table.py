@@ -142,7 +142,7 @@ class Table:
 
     The files are written under temporary names. They replace earlier ones, together with ``study.json``, when
     the context ends without an exception; if the table is not complete, only if it has no fewer rows. A first
-    ``results.csv`` appears as soon as it is no shorter than the earlier one, and grows from then on. It never
+    ``results.csv`` appears once it is at least as long as the earlier one, and then grows. It never
     ends in an incomplete row.
 
     Parameters

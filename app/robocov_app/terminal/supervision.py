@@ -42,7 +42,7 @@ def find_own_controllers(words: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        ``file.py:ClassName``, each once.
+        ``file.py:ClassName``, without duplicates.
     """
     controllers: list[str] = []
     for word in words:

@@ -13,11 +13,12 @@ import pytest
 from drawn_run import HALL, ROOMS, run_of
 
 from robocov.errors import OutputError, ParameterError
+from robocov_app.figures.curves import TimeCurve
 from robocov_app.figures.files import check_figure_path, save_figure
 from robocov_app.figures.runs import plot_cost, plot_environment, plot_trajectories
 
 T = np.linspace(0.0, 60.0, 121)
-CURVES = [("RAPF", "rapf", T, 1 + np.exp(-T / 10)), ("RPF", "rpf", T, 2 + np.exp(-T / 10))]
+CURVES = [TimeCurve("RAPF", "rapf", T, 1 + np.exp(-T / 10)), TimeCurve("RPF", "rpf", T, 2 + np.exp(-T / 10))]
 
 
 def objects_of(pdf: bytes) -> dict[int, bytes]:

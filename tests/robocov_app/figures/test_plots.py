@@ -19,7 +19,7 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov.voronoi import partition
-from robocov_app.figures.curves import format_end_label
+from robocov_app.figures.curves import TimeCurve, format_end_label
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import to_plot_color
 from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
@@ -33,7 +33,7 @@ T = np.linspace(0.0, 60.0, 121)
 def curves(*finals):
     names = ["rapf", "rpf", "lloyd", "other"]
     return [
-        (name.upper(), name, T, final + 2 * np.exp(-T / 10))
+        TimeCurve(name.upper(), name, T, final + 2 * np.exp(-T / 10))
         for name, final in zip(names, finals, strict=False)
     ]
 
@@ -266,19 +266,21 @@ class TestCost:
 
     def test_a_controller_looks_alike_in_every_company(self):
         time, values = T, 1.0 + np.exp(-T)
-        alone = plot_cost([("LA", "lloyd", time, values)]).axes[0].lines
-        among = plot_cost([("mine", "mine", time, values), ("LA", "lloyd", time, values)]).axes[0].lines
+        lloyd = TimeCurve("LA", "lloyd", time, values)
+        alone = plot_cost([lloyd]).axes[0].lines
+        among = plot_cost([TimeCurve("mine", "mine", time, values), lloyd]).axes[0].lines
         assert alone[0].get_color() == among[2].get_color()
         assert alone[0]._dash_pattern == among[2]._dash_pattern
         assert alone[1].get_marker() == among[3].get_marker()
 
     def test_two_controllers_of_ones_own_differ(self):
-        first, _, second, *_ = plot_cost([("a", "a", T, T + 1), ("b", "b", T, T + 2)]).axes[0].lines
+        figure = plot_cost([TimeCurve("a", "a", T, T + 1), TimeCurve("b", "b", T, T + 2)])
+        first, _, second, *_ = figure.axes[0].lines
         assert first.get_color() != second.get_color()
 
     @pytest.mark.parametrize("end", [1.0, 20.0, 60.0, 90.0])
     def test_times_are_round_numbers(self, end):
-        figure = plot_cost([("A", "rapf", np.linspace(0, end, 9), np.linspace(2, 1, 9))])
+        figure = plot_cost([TimeCurve("A", "rapf", np.linspace(0, end, 9), np.linspace(2, 1, 9))])
         figure.canvas.draw()
         words = [text.get_text() for text in figure.axes[0].get_xticklabels()]
         assert len(words) >= 3
@@ -319,13 +321,13 @@ class TestCost:
     def test_gaps_and_constant_curves(self):
         values = np.full(len(T), 2.0)
         values[-3:] = np.nan
-        figure = plot_cost([("A", "rapf", T, values)])
+        figure = plot_cost([TimeCurve("A", "rapf", T, values)])
         assert figure.axes[0].texts[0].get_text() == "A  2.000 m"
         low, high = figure.axes[0].get_ylim()
         assert low < 2.0 < high
 
     @pytest.mark.parametrize(
-        "bad", [[], [("A", "rapf", T, T[:-1])], [("A", "rapf", T, np.full(len(T), np.nan))]]
+        "bad", [[], [TimeCurve("A", "rapf", T, T[:-1])], [TimeCurve("A", "rapf", T, np.full(len(T), np.nan))]]
     )
     def test_what_cannot_be_plotted_is_named(self, bad):
         with pytest.raises(ParameterError, match="curve"):
@@ -364,7 +366,7 @@ def test_names_are_words_whatever_is_in_them(tmp_path):
     save_figure(figure, tmp_path / "a.png")
     assert any(name in text.get_text() for text in figure.texts)
     assert not any(text.get_parse_math() for text in figure.texts)
-    save_figure(plot_cost([(name, "mine", record.time, record.time)]), tmp_path / "b.svg")
+    save_figure(plot_cost([TimeCurve(name, "mine", record.time, record.time)]), tmp_path / "b.svg")
 
 
 @pytest.mark.parametrize(
@@ -379,7 +381,10 @@ def test_names_are_words_whatever_is_in_them(tmp_path):
     ],
 )
 def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
-    assert format_end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words
+    assert (
+        format_end_label(TimeCurve("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit)
+        == words
+    )
 
 
 def test_moving_obstacles_have_an_arrow_a_path_and_a_legend_entry():

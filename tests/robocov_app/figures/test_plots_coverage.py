@@ -10,7 +10,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
 from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage
-from robocov_app.figures.curves import DISTANCE, TIME
+from robocov_app.figures.curves import DISTANCE, TIME, TimeCurve
 from robocov_app.figures.files import save_figure
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_map.colors import MAX_LEVEL, build_palette, choose_color_limit
@@ -31,7 +31,7 @@ def build_snapshot(environment, n=5, seed=0):
 
 
 def curves(count):
-    return [(f"Law {k}", "rapf", T, 1.0 + k + np.exp(-T / 9)) for k in range(count)]
+    return [TimeCurve(f"Controller {k}", "rapf", T, 1.0 + k + np.exp(-T / 9)) for k in range(count)]
 
 
 def written(figure):

@@ -127,7 +127,7 @@ def compute_color_levels(
 
 
 def compute_line_opacities(borders: BorderPixels, zoom: float, width: float) -> Array:
-    """Compute how much of each pixel a line along borders covers.
+    """Compute the fraction of each pixel that a line along borders covers.
 
     Parameters
     ----------

@@ -219,7 +219,7 @@ class DistanceField:
         coarse : BorderPixels
             Pixels with the values at the middle of their block.
         fine : BorderPixels
-            Pixels with their own values: all that may be within the maximum distance, m, of a border.
+            Pixels with their own values: those that may be within the maximum distance, m, of a border.
         """
         block_rows, block_columns = self._find_blocks(x, y)
         middle_x = compute_block_middles(x, _BLOCK_PX)

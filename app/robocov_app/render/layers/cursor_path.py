@@ -80,7 +80,7 @@ def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) ->
 
 
 def _rate_hidden(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect) -> int:
-    """Return how much of the path, (w, 2) px, and the robots a box hides."""
+    """Rate a box by the sections of the path, (w, 2) px, and the robots that it hides; lower is better."""
     path = limit_pixels(corners).tolist()
     n_sections = sum(bool(box.clipline(start, end)) for start, end in pairwise(path))
     cost = _HIDDEN_PATH_COST * n_sections

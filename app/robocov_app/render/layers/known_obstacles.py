@@ -32,7 +32,7 @@ class KnownObstaclesLayer:
     def __init__(self) -> None:
         self._page = pygame.Surface((0, 0))
         self._key: object = None
-        # The objects themselves, not their ids, which others may get once these are gone.
+        # The objects themselves, not their ids, which may be reused after their deletion.
         self._sources: tuple[object, object] = (None, None)
         self._drawn_points = np.empty((0, 2))
 

@@ -44,7 +44,7 @@ class Layer:
     is_in_world: bool = True
 
     def can_draw(self, scene: Scene) -> bool:
-        """Return whether a scene has all that the layer needs."""
+        """Return whether a scene has all attributes that the layer needs."""
         return all(scene.has_content(name) for name in self.needs)
 
 

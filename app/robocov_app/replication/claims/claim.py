@@ -81,7 +81,7 @@ class Criterion:
         return format_interval(self.interval, self.unit)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the criterion as it is written to ``claims.json``."""
+        """Return the content of the criterion in ``claims.json``."""
         return {
             "measure": self.measure,
             "unit": "1" if self.unit in ("", "%") else self.unit,
@@ -183,7 +183,7 @@ class Claim:
         return "does not hold" if False in met else "undecided"
 
     def to_json(self) -> dict[str, Any]:
-        """Return the claim as it is written to ``claims.json``."""
+        """Return the content of the claim in ``claims.json``."""
         main = self.criteria[0].to_json() if self.criteria else {}
         return {
             "claim": self.text,
@@ -230,7 +230,7 @@ def judge_pairs(
     ----------
     claim : Claim
     pairs : PairedComparison or None
-        Without any pairs, the claim is returned as it is.
+        Without any pairs, the claim is returned unchanged.
     ratio_measure, wins_measure : str
         Names of the median ratio, and of the fraction of pairs in which the first value is lower.
     explain : callable

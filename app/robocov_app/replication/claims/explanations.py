@@ -14,7 +14,7 @@ def describe_middle_half(gaps: Array) -> str:
 
 
 def describe_losses(pairs: PairedComparison, name: str) -> str:
-    """Return in a sentence how often the first of a pair has the higher value."""
+    """Return a sentence about the fraction of pairs in which the first has the higher value."""
     worst = int(np.argmax(pairs.ratios))
     highest = format_amount(pairs.ratios[worst])
     losses = (pairs.ratios >= 1.0).sum()

@@ -285,7 +285,7 @@ def describe_goal(goal: Claim) -> str:
 
 
 def summarize_goals(goals: Sequence[Claim]) -> str:
-    """Return in a sentence how many goals are met, and list the others."""
+    """Return a sentence with the number of goals that are met, and the others."""
     if not goals:
         return "Nothing was measured."
     missed = [f"{goal.criteria[0].measure} {_describe_miss(goal)}" for goal in goals if not is_goal_met(goal)]

@@ -29,7 +29,7 @@ _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 
 def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
-    """Return how the plots beyond the paper are drawn, by their names."""
+    """Return the functions that draw the plots beyond the paper, by their names."""
     theme = get_theme(theme)
     samples = build_gap_samples(results)
     heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
@@ -91,7 +91,7 @@ def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
-    """Return how the runs with and without knowledge of the density are drawn, both over the density."""
+    """Return the function that draws runs with and without knowledge of the density, over the density."""
     known, ignored = results.density.figure_runs
     weighted = known.record.environment
     records = [replace(run.record, environment=weighted) for run in (known, ignored)]

@@ -20,7 +20,7 @@ from robocov_app.replication.results.study_results import PaperResults
 
 
 def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
-    """Return how the plots of the paper's claims are drawn, by their names."""
+    """Return the functions that draw the plots of the paper's claims, by their names."""
     theme = get_theme(theme)
     claims = results.claims
     by_start = []

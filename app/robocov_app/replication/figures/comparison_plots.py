@@ -55,7 +55,7 @@ def select_plots(plots: Mapping[str, Draw | None]) -> Plots:
 
 
 def get_style(controller: str) -> CurveStyle:
-    """Return the style of a controller among many: ours stands out, baselines look the same."""
+    """Return the style of a controller among many: ours is highlighted, baselines look the same."""
     style = choose_controller_styles([controller])[controller]
     if not style.name.startswith("other"):
         return style

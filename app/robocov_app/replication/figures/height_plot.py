@@ -64,7 +64,7 @@ def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
     Returns
     -------
     list of SensorOptimum
-        Optima at these heights, and in the limits 0 before and infinity after them.
+        Optima at these heights, preceded by the limit of height 0, and followed by that of infinity.
     """
     cell = _build_cell()
     return [

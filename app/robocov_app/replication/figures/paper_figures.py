@@ -19,7 +19,7 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.voronoi import partition
 from robocov_app.figures import arena
-from robocov_app.figures.curves import CurveMargins, add_curve_axes, draw_curves
+from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, FigurePage, to_plot_color
 from robocov_app.look.colors import mix
@@ -171,7 +171,7 @@ def _describe_other_starts(runs: Mapping[str, FigureRun]) -> str:
         distances.append(format_amount(compute_matched_distance(first, second), "m"))
     return (
         f"Between the ends of figure 6 and these, robots are {distances[0]} apart with RAPF "
-        f"and {distances[1]} with RPF (matched with the least sum of distances)."
+        f"and {distances[1]} with RPF (matched to minimize the sum of distances)."
     )
 
 
@@ -267,7 +267,8 @@ def draw_side_by_side(
 def draw_costs(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
     """Draw the costs of runs against time."""
     curves = [
-        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
+        TimeCurve(run.record.label, run.record.controller, run.history.time, run.history.mean_distance)
+        for run in runs
     ]
     page = FigurePage((WIDE_PX, _COST_HEIGHT_PX), theme, PAGE_SCALE)
     draw_curves(add_curve_axes(page, curves, _COST_MARGINS), curves, theme)

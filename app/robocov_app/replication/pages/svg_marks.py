@@ -90,7 +90,7 @@ class DotStrip(NamedTuple):
 
     label: str
     is_ours: bool
-    """Whether it is of our own controller, which stands out."""
+    """Whether it is of our own controller, which is highlighted."""
     medians_by_map: Mapping[str, float]
 
 

@@ -1,4 +1,4 @@
-"""Computing times of a step of every controller, measured in turn with RAPF's; stored in a file."""
+"""Computing times of a step of every controller, measured alternately with RAPF's; stored in a file."""
 
 import hashlib
 import json
@@ -35,7 +35,7 @@ _HEAD = {"format": "robocov-steps", "version": 1}
 
 @dataclass(frozen=True)
 class StepTimes:
-    """Computing times of steps of one team, measured in turn for all controllers.
+    """Computing times of steps of one team, measured alternately for all controllers.
 
     Parameters
     ----------

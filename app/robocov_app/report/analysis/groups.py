@@ -136,7 +136,7 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
 
 
 def list_settings(result: ReportedResult) -> list[Setting]:
-    """List the settings of completed runs, each once."""
+    """List the different settings of completed runs."""
     return list(dict.fromkeys(run.setting for run in result.completed_runs))
 
 

@@ -73,7 +73,7 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
     if len(variants_by_controller) == len(variants):
         return ComparedGroups(variants, "")
     if len(variants_by_controller) < 2:
-        return ComparedGroups(variants, "Every set of gains is compared by itself; none was chosen.")
+        return ComparedGroups(variants, "Every set of gains is compared on its own; none was chosen.")
     has_several_maps = len({run.map for run in result.completed_runs}) > 1
     get_fold = _get_map if has_several_maps else _get_start_and_seed
     folds = list(dict.fromkeys(get_fold(run) for run in result.completed_runs))
@@ -110,7 +110,7 @@ def _get_start_and_seed(run: ReportedRun) -> _Fold:
 
 
 def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]:
-    """Return the runs of a controller with tuned gains, and which gains were chosen how often."""
+    """Return the runs of a controller with tuned gains, and a text on the chosen gains."""
     runs: list[ReportedRun] = []
     labels = []
     for fold in tuning.folds:
@@ -138,7 +138,7 @@ def _rate_elsewhere(variant: RunGroup, fold: _Fold, tuning: _Tuning) -> tuple[fl
 
 
 def _describe_tuning(choices: Sequence[str], *, has_several_maps: bool) -> str:
-    """Return how gains were chosen."""
+    """Return a note on the choice of the gains."""
     if has_several_maps:
         fold = "map"
         other_folds = "on the other maps"

@@ -65,7 +65,7 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
 
 
 def list_figures(runs: Sequence[ReportedRun], name: str) -> list[float]:
-    """List the values of a figure of some runs, as far as they are known."""
+    """List the known values of a figure of some runs."""
     return [float(run.figures[name] or 0.0) for run in runs if run.has_figure(name)]
 
 
