@@ -30,8 +30,9 @@ class FrontierMedian(SharedMapController):
     1998 for several robots, which share their maps). Targets on the frontiers are assigned to robots by
     Burgard, Moors, Stachniss and Schneider (IEEE T-RO 21, 2005).
 
-    *Placement.* When no frontier is left, robots move to the k-median of the known free space: the greedy
-    solution, improved by Lloyd's iteration and interchange (`robocov.k_median`), then on a finer lattice.
+    *Placement.* When no frontier is left that a robot can reach, robots move to the k-median of the known
+    free space: the greedy solution, improved by Lloyd's iteration and interchange (`robocov.k_median`), then
+    on a finer lattice.
 
     Notes
     -----
@@ -63,8 +64,10 @@ class FrontierMedian(SharedMapController):
         """Compute targets on frontiers or, if there are none, the final goals."""
         inspected = self._list_inspected_targets(situation)
         targets = self._find_targets(situation, inspected)
-        if len(targets):
-            goals = self._assign_targets(situation, targets)
+        path_lengths = self._compute_path_lengths(situation, targets)
+        is_reachable = np.isfinite(path_lengths).any(axis=0)
+        if is_reachable.any():
+            goals = self._assign_targets(situation, targets[is_reachable], path_lengths[:, is_reachable])
             return Placement(goals=goals, is_final=False, inspected_targets=inspected)
         return Placement(goals=self._compute_median(situation), is_final=True, inspected_targets=inspected)
 
@@ -111,16 +114,22 @@ class FrontierMedian(SharedMapController):
         is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
         return np.asarray(np.where(is_long[labels], labels, 0))
 
-    def _assign_targets(self, situation: Situation, targets: Array) -> Array:
+    def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
+        """Return the path length from each robot to each target, (k, t) m; infinite if there is no path."""
+        planner = situation.planner
+        with_clearance = np.flatnonzero(planner.has_clearance)
+        if not len(targets) or not len(with_clearance):
+            return np.full((len(situation.positions), len(targets)), np.inf)
+        squared_distances = ((targets[:, None] - planner.nodes[with_clearance]) ** 2).sum(axis=2)
+        nodes = with_clearance[squared_distances.argmin(axis=1)]
+        return np.array(
+            [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+        )
+
+    def _assign_targets(self, situation: Situation, targets: Array, path_lengths: Array) -> Array:
         """Return the target of each robot, (k, 2) m, or its position if it has none."""
         planner = situation.planner
         goals = situation.positions.copy()
-        with_clearance = np.flatnonzero(planner.has_clearance)
-        squared_distances = ((targets[:, None] - planner.nodes[with_clearance]) ** 2).sum(axis=2)
-        nodes = with_clearance[squared_distances.argmin(axis=1)]
-        path_lengths = np.array(
-            [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
-        )
         utility = np.ones(len(targets))
         is_unassigned = np.ones(len(goals), dtype=bool)
         for _ in range(len(goals)):

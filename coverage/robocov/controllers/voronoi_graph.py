@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from scipy import ndimage
 
-from robocov.arrays import BoolArray
+from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import apply_best_swap
@@ -46,7 +47,8 @@ class VoronoiGraphCoverage(SharedMapController):
     space counts as free where a path may lead to, so the graph extends into it. When the map has
     changed, the plan starts from the previous vertices; the first exchange must then save the fraction
     `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
-    robots such that the sum of the squared path lengths is minimal.
+    robots such that the sum of the squared path lengths is minimal. While the graph has fewer vertices than
+    there are robots, as in a region in which no wall is known yet, the nearest robots move to all of them.
 
     The implementation is based on the abstract of Yun and Rus and on general knowledge, not on the full texts
     of the papers.
@@ -63,7 +65,7 @@ class VoronoiGraphCoverage(SharedMapController):
         candidates = self._build_candidates(situation)
         count = len(situation.positions)
         if len(candidates.positions) < count:
-            return Placement(goals=situation.positions, is_final=False)
+            return Placement(goals=_fill_vertices(situation, candidates.positions), is_final=False)
         goals = situation.previous_goals
         chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
         is_fixed = np.zeros(count, dtype=bool)
@@ -101,6 +103,21 @@ class VoronoiGraphCoverage(SharedMapController):
         # Row q, column p of the table: distance to vertex q from a robot at vertex p, times the weight of q.
         distances = np.minimum(roadmap.distances * block_size, UNREACHABLE_M)
         return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))
+
+
+def _fill_vertices(situation: Situation, vertices: Array) -> Array:
+    """Return goals for all robots, (k, 2) m, of which the nearest ones move to all vertices, (v < k, 2) m."""
+    goals = situation.positions.copy()
+    if not len(vertices):
+        return goals
+    planner = situation.planner
+    nodes = [planner.find_nearest_node(vertex) for vertex in vertices]
+    distances = np.array(
+        [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+    )
+    robots, chosen = scipy.optimize.linear_sum_assignment(np.minimum(distances, UNREACHABLE_M) ** 2)
+    goals[robots] = vertices[chosen]
+    return goals
 
 
 def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:

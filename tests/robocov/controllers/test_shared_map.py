@@ -11,6 +11,7 @@ from robocov.controllers import CONTROLLERS, Rapf, get_information, make_control
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
 from robocov.controllers.shared_map import Situation, assign_goals, list_hearing_groups, update_maps
+from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
@@ -225,6 +226,28 @@ def test_unknown_space_behind_a_wall_has_no_frontier() -> None:
     state[:, 20] = WALL
     state[:, 59] = WALL
     assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
+
+
+def test_frontiers_that_no_robot_can_reach_are_dropped() -> None:
+    """The frontier is on the other side of a wall, which the robots have looked over."""
+    state = np.full(RASTER.shape, FREE)
+    state[:, :20] = UNKNOWN
+    state[:, 30:32] = WALL
+    assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
+    state[40:48, 30:32] = FREE
+    assert not FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
+
+
+def test_robots_move_to_a_voronoi_graph_that_has_fewer_vertices_than_there_are_robots() -> None:
+    """Before a wall is seen, the graph of a convex region has only few vertices."""
+    empty = Environment("empty", SQUARE)
+    simulation = Simulation(empty, VoronoiGraphCoverage(), CORNER, Team.homogeneous(len(CORNER)))
+    simulation.step()
+    goals = simulation.memory.plans[0].placement.goals
+    distances = np.hypot(*(goals - CORNER).T)
+    is_moving = distances > 1.0
+    assert is_moving.any() and not is_moving.all()
+    assert (distances[~is_moving] < 0.1).all()
 
 
 @pytest.mark.parametrize("is_stuck", [False, True], ids=["inspected", "out of reach"])
