@@ -114,11 +114,10 @@ def compute_potential_forces(
         factor = _compute_attraction_factor(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
         attraction[i, 0] = factor * dx
         attraction[i, 1] = factor * dy
-    # If communication is not limited, there are no lists of neighbors.
-    if len(neighbors.indptr) > 0:
-        robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
-    else:
+    if neighbors.is_complete:
         robots = _sum_repulsion_of_all_robots(positions, gains)
+    else:
+        robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
     total = attraction + robots + obstacle
     return PotentialForces(total, attraction, robots, obstacle)
 
@@ -182,11 +181,10 @@ def _sum_repulsion_of_neighbors(
 ) -> Array:
     """Return the sums of (24) over the robots that each robot knows of, (n, 2) N."""
     sums = np.zeros((len(positions), 2))
-    has_reports = len(neighbors.positions) > 0
     for i in range(len(positions)):
         for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
             j = neighbors.indices[k]
-            if has_reports:
+            if neighbors.has_reports:
                 dx = positions[i, 0] - neighbors.positions[k, 0]
                 dy = positions[i, 1] - neighbors.positions[k, 1]
             else:

@@ -349,9 +349,10 @@ HearingGroup: TypeAlias = tuple[int, ...]
 def list_hearing_groups(neighbors: Neighbors) -> list[HearingGroup]:
     """Return the hearing group of each robot."""
     if neighbors.is_complete:
-        return [tuple(range(neighbors.count))] * neighbors.count
+        return [tuple(range(neighbors.robot_count))] * neighbors.robot_count
     return [
-        tuple(sorted({robot, *neighbors.list_neighbors(robot).tolist()})) for robot in range(neighbors.count)
+        tuple(sorted({robot, *neighbors.list_neighbors(robot).tolist()}))
+        for robot in range(neighbors.robot_count)
     ]
 
 

@@ -56,8 +56,10 @@ def count_starts(point_count: int) -> int:
     Returns
     -------
     int
-        Upper bound on the number of bins, which the area and the sides of the points' bounding box limit.
+        Two more than the largest possible number of bins, rounded up.
     """
+    # The bounding box of n points has w x h bins, apart from the last row and column, with w * h <= n and
+    # max(w, h) <= n (see `sort_into_bins`). Therefore w + h <= n + 1, and (w + 1) * (h + 1) <= 2 n + 2.
     return 2 * point_count + 8
 
 
@@ -76,7 +78,7 @@ def sort_into_bins(
         Only ``points[first:stop]`` are sorted.
     reach : float, m
         May be infinite.
-    starts : int array, `count_starts` of the number of sorted points long
+    starts : (``count_starts(stop - first)``,) int array
         Overwritten: bin b contains the points ``order[starts[b]:starts[b + 1]]``, ascending.
     order : (stop - first,) int array
         Overwritten.

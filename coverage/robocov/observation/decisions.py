@@ -58,15 +58,16 @@ class Decision:
     messages: Sequence[Sequence[Message]] = ()
 
 
-def check_decision(returned: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
+def check_decision(
+    returned: Any, robot_count: int, controller: str, time: float, source: str = ""
+) -> Decision:
     """Check that a decision can be executed and recorded, and return it with float arrays.
 
     Parameters
     ----------
     returned : object
         Value returned by the controller's ``decide``.
-    count : int
-        Number of robots.
+    robot_count : int
     controller : str
         Name of the controller, for messages.
     time : float, s
@@ -81,7 +82,7 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
     Raises
     ------
     ParameterError
-        If it is not a `Decision`, or its forces are not finite numbers of shape (count, 2).
+        If it is not a `Decision`, or its forces are not finite numbers of shape (robot_count, 2).
     """
     where = f"controller {controller!r}: decide(seen, memory)"
     suffix = f" at {time:.3f} s{source}"
@@ -89,10 +90,10 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
         hint = " (is a return statement missing?)" if returned is None else ""
         raise ParameterError(f"{where} returned {quote(returned)}{hint}{suffix}, expected a Decision")
     decision: Decision = returned
-    forces = _to_rows(decision.forces, count, f"{where} returned forces", suffix)
+    forces = _to_rows(decision.forces, robot_count, f"{where} returned forces", suffix)
     goals = decision.goals
     if goals is not None:
-        goals = _to_rows(goals, count, f"{where} returned goals", suffix)
+        goals = _to_rows(goals, robot_count, f"{where} returned goals", suffix)
     if forces is not decision.forces or goals is not decision.goals:
         decision = replace(decision, forces=forces, goals=goals)
     if not _is_finite(forces):
@@ -147,27 +148,26 @@ def _copy_message(message: Message) -> Message:
         return message
 
 
-def check_forces(values: Any, count: int, name: str) -> Array:
+def check_forces(values: Any, robot_count: int, name: str) -> Array:
     """Check forces that do not come from a controller, and return them as an array of floats.
 
     Parameters
     ----------
-    values : array-like of shape (count, 2), N
-    count : int
-        Number of robots.
+    values : array-like of shape (robot_count, 2), N
+    robot_count : int
     name : str
         Name of the forces in messages.
 
     Returns
     -------
-    (count, 2) array, N
+    (robot_count, 2) array, N
 
     Raises
     ------
     ParameterError
         If they are not finite numbers of that shape.
     """
-    forces = _to_rows(values, count, name)
+    forces = _to_rows(values, robot_count, name)
     if not _is_finite(forces):
         raise ParameterError(f"{name}: expected finite forces in newtons, got {quote(forces.tolist())}")
     return forces
@@ -201,14 +201,15 @@ def _is_finite(forces: Array) -> bool:
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 
-def _to_rows(values: Any, count: int, name: str, suffix: str = "") -> Array:
-    """Convert two numbers for each robot to a (count, 2) array; an array of floats is not copied.
+def _to_rows(values: Any, robot_count: int, name: str, suffix: str = "") -> Array:
+    """Convert two numbers for each robot to a (robot_count, 2) array; an array of floats is not copied.
 
     In messages, `suffix` follows the values.
     """
     array = to_numbers(values)
+    shape = (robot_count, 2)
     if array is None:
-        raise ParameterError(f"{name} {quote(values)}{suffix}, expected numbers of shape {(count, 2)}")
-    if array.shape != (count, 2):
-        raise ParameterError(f"{name} of shape {array.shape}{suffix}, expected {(count, 2)}")
+        raise ParameterError(f"{name} {quote(values)}{suffix}, expected numbers of shape {shape}")
+    if array.shape != shape:
+        raise ParameterError(f"{name} of shape {array.shape}{suffix}, expected {shape}")
     return array

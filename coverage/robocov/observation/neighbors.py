@@ -21,7 +21,7 @@ class Neighbors:
 
     Attributes
     ----------
-    count : int
+    robot_count : int
         Number of robots n.
     ranges : (n,) array or None, m
         Communication ranges; None if all robots communicate at any distance.
@@ -47,7 +47,7 @@ class Neighbors:
     array([0])
     """
 
-    count: int
+    robot_count: int
     ranges: Array | None = None
     indptr: IntArray | None = None
     indices: IntArray | None = None
@@ -79,14 +79,13 @@ class Neighbors:
 
     @classmethod
     def from_pairs(
-        cls, count: int, robot: IntArray, neighbor: IntArray, ranges: Array | None = None
+        cls, robot_count: int, robot: IntArray, neighbor: IntArray, ranges: Array | None = None
     ) -> Neighbors:
         """Build the graph from its directed pairs.
 
         Parameters
         ----------
-        count : int
-            Number of robots.
+        robot_count : int
         robot, neighbor : (m,) int arrays
             Sorted by robot, then neighbor.
         ranges : (n,) array or None, m
@@ -95,9 +94,9 @@ class Neighbors:
         -------
         Neighbors
         """
-        indptr = np.zeros(count + 1, dtype=np.intp)
-        np.cumsum(np.bincount(robot, minlength=count), out=indptr[1:])
-        return cls(count, ranges, indptr, neighbor)
+        indptr = np.zeros(robot_count + 1, dtype=np.intp)
+        np.cumsum(np.bincount(robot, minlength=robot_count), out=indptr[1:])
+        return cls(robot_count, ranges, indptr, neighbor)
 
     @classmethod
     def combine(cls, graphs: Sequence[Neighbors]) -> Neighbors:
@@ -114,15 +113,15 @@ class Neighbors:
         """
         if len(graphs) == 1:
             return graphs[0]
-        count = 0
+        robot_count = 0
         robots = []
         neighbors = []
         for graph in graphs:
             robot, neighbor = graph.list_pairs()
-            robots.append(robot + count)
-            neighbors.append(neighbor + count)
-            count += graph.count
-        return cls.from_pairs(count, np.concatenate(robots), np.concatenate(neighbors))
+            robots.append(robot + robot_count)
+            neighbors.append(neighbor + robot_count)
+            robot_count += graph.robot_count
+        return cls.from_pairs(robot_count, np.concatenate(robots), np.concatenate(neighbors))
 
     @property
     def is_complete(self) -> bool:
@@ -142,7 +141,7 @@ class Neighbors:
             Ascending.
         """
         if self.indptr is None or self.indices is None:
-            return np.delete(np.arange(self.count), robot)
+            return np.delete(np.arange(self.robot_count), robot)
         return self.indices[self.indptr[robot] : self.indptr[robot + 1]]
 
     def list_pairs(self) -> tuple[IntArray, IntArray]:
@@ -154,9 +153,9 @@ class Neighbors:
             Sorted by robot, then neighbor.
         """
         if self.indptr is None or self.indices is None:
-            robot, neighbor = np.nonzero(~np.eye(self.count, dtype=bool))
+            robot, neighbor = np.nonzero(~np.eye(self.robot_count, dtype=bool))
             return robot, neighbor
-        return np.repeat(np.arange(self.count), np.diff(self.indptr)), self.indices
+        return np.repeat(np.arange(self.robot_count), np.diff(self.indptr)), self.indices
 
     def restrict_to_working(self, working: BoolArray) -> Neighbors:
         """Return the graph without the links of robots that have failed or have not joined yet.
@@ -174,19 +173,22 @@ class Neighbors:
             return self
         robot, neighbor = self.list_pairs()
         both_work = working[robot] & working[neighbor]
-        return Neighbors.from_pairs(self.count, robot[both_work], neighbor[both_work], self.ranges)
+        return Neighbors.from_pairs(self.robot_count, robot[both_work], neighbor[both_work], self.ranges)
 
 
 class NeighborPositions(NamedTuple):
     """The neighbors of each robot and their positions as known to it, as plain arrays for kernels."""
 
+    is_complete: bool
+    """Whether each robot knows the current positions of all others. The arrays are then empty."""
+    has_reports: bool
+    """Whether robots know the reported positions of their neighbors, instead of the current ones."""
     indptr: IntArray
-    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i. Empty if all other
-    robots are its neighbors."""
+    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i."""
     indices: IntArray
     """(m,)"""
     positions: Array
-    """(m, 2) or (0, 2) m, in the order of `indices`. Empty if robots know their neighbors' own positions."""
+    """(m, 2) m, reported positions in the order of `indices`; empty without reports."""
 
     @classmethod
     def from_graph(cls, neighbors: Neighbors, reported_positions: Array | None) -> NeighborPositions:
@@ -203,11 +205,23 @@ class NeighborPositions(NamedTuple):
         NeighborPositions
         """
         if neighbors.indptr is None or neighbors.indices is None:
-            return cls(_NO_INDICES, _NO_INDICES, _NO_POSITIONS)
-        if reported_positions is None:
-            return cls(neighbors.indptr, neighbors.indices, _NO_POSITIONS)
-        positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
-        return cls(neighbors.indptr, neighbors.indices, positions)
+            return cls(
+                is_complete=True,
+                has_reports=False,
+                indptr=_NO_INDICES,
+                indices=_NO_INDICES,
+                positions=_NO_POSITIONS,
+            )
+        positions = _NO_POSITIONS
+        if reported_positions is not None:
+            positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
+        return cls(
+            is_complete=False,
+            has_reports=reported_positions is not None,
+            indptr=neighbors.indptr,
+            indices=neighbors.indices,
+            positions=positions,
+        )
 
     @classmethod
     def build_empty(cls, robot_count: int) -> NeighborPositions:
@@ -221,4 +235,10 @@ class NeighborPositions(NamedTuple):
         -------
         NeighborPositions
         """
-        return cls(np.zeros(robot_count + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)
+        return cls(
+            is_complete=False,
+            has_reports=False,
+            indptr=np.zeros(robot_count + 1, dtype=np.intp),
+            indices=_NO_INDICES,
+            positions=_NO_POSITIONS,
+        )

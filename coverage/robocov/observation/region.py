@@ -21,8 +21,8 @@ SIDE_NORMAL_Y = 3
 SIDE_OFFSET = 4
 """Column of a side: scalar product of its start and its normal, m."""
 
-_MIN_BEND = 1e-9
-"""Maximum change of direction, rad, at a vertex that counts as collinear with its neighbors."""
+_MAX_COLLINEAR_TURN_RAD = 1e-9
+"""Maximum change of direction at a vertex that counts as collinear with its neighbors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,4 +138,4 @@ def _remove_collinear_vertices(ring: Array) -> Array:
     after = np.roll(ring, -1, axis=0) - ring
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     lengths = compute_lengths(before) * compute_lengths(after)
-    return np.asarray(ring[cross > _MIN_BEND * lengths])
+    return np.asarray(ring[cross > _MAX_COLLINEAR_TURN_RAD * lengths])

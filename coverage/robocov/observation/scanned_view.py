@@ -152,7 +152,7 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
 def _predict_depth(view: View, reach: Array, side: int) -> Array:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
 
-    The two are those before it counter-clockwise if `side` is 1, clockwise if it is -1.
+    The rays are in counter-clockwise order if `side` is 1, and in clockwise order if it is -1.
     """
     inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.

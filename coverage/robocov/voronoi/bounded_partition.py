@@ -207,8 +207,8 @@ def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robo
     InputError
         If they do not match.
     """
-    if neighbors.count != robot_count:
-        raise InputError(f"neighbors: expected a graph of {robot_count} robots, got {neighbors.count}")
+    if neighbors.robot_count != robot_count:
+        raise InputError(f"neighbors: expected a graph of {robot_count} robots, got {neighbors.robot_count}")
     if reported_positions is None:
         return
     if neighbors.indices is None:

@@ -37,11 +37,10 @@ def compute_clipped_cells(
     workspace = create_workspace(len(points), len(sides))
     edge_count = 0
     for i in range(len(points)):
-        # If communication is not limited, there are no lists of neighbors.
-        if len(neighbors.indptr) > 0:
-            neighbor_count = _add_listed_neighbors(workspace, points, neighbors, i)
-        else:
+        if neighbors.is_complete:
             neighbor_count = _add_all_robots(workspace, points, i)
+        else:
+            neighbor_count = _add_listed_neighbors(workspace, points, neighbors, i)
         polygon = clip_cell(workspace, neighbor_count, points, sides, i)
         edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
     return edge_count
@@ -52,11 +51,10 @@ def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: Neighb
     """Add the listed neighbors of robot i at their positions as known to it; return their number."""
     neighbor_rows = workspace.neighbors
     reported_positions = neighbors.positions
-    has_reported_positions = len(reported_positions) > 0
     count = 0
     for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
         j = neighbors.indices[k]
-        if has_reported_positions:
+        if neighbors.has_reports:
             dx = reported_positions[k, 0] - points[i, 0]
             dy = reported_positions[k, 1] - points[i, 1]
         else:

@@ -138,7 +138,7 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
 
 def find_connected(neighbors: Neighbors, i: int) -> np.ndarray:
     """Return from which robots information may have reached robot i, directly or through others."""
-    is_connected = np.zeros(neighbors.count, dtype=bool)
+    is_connected = np.zeros(neighbors.robot_count, dtype=bool)
     pending = [i]
     while pending:
         k = pending.pop()

@@ -220,7 +220,7 @@ def test_a_failed_robot_sends_no_messages_and_is_sensed():
     session.fail_robot(2)
     seen = pane.simulation.observe_and_decide().seen
     assert pane.numbers == (1, 3)
-    assert seen.neighbors.count == 2
+    assert seen.neighbors.robot_count == 2
     assert seen.neighbors.list_neighbors(0).tolist() == [1]
     # The rim of the failed robot is the nearest point of an obstacle now.
     assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)

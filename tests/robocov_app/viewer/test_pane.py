@@ -232,6 +232,6 @@ def test_trail_and_starts_follow_the_robots():
 def test_failed_robots_are_sensed_like_obstacles():
     pane = build_pane(failed={8: (1.3, 1.5)})
     seen = pane.simulation.observe_and_decide().seen
-    assert len(seen.positions) == seen.neighbors.count == 3
+    assert len(seen.positions) == seen.neighbors.robot_count == 3
     distances = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)
     assert distances == pytest.approx(0.1, abs=2e-3)
