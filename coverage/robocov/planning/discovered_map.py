@@ -243,9 +243,9 @@ def _mark_passed_cells(
             elif cell_state > WALL:
                 state[row, column] = cell_state - 1
             elif cell_state == PRESUMED_WALL:
-                off_x = (x - grid.low_x) / grid.cell_size - column - 0.5
-                off_y = (y - grid.low_y) / grid.cell_size - row - 0.5
-                if max(abs(off_x), abs(off_y)) < _CORE_HALF_WIDTH_CELLS:
+                offset_x = (x - grid.low_x) / grid.cell_size - column - 0.5
+                offset_y = (y - grid.low_y) / grid.cell_size - row - 0.5
+                if max(abs(offset_x), abs(offset_y)) < _CORE_HALF_WIDTH_CELLS:
                     state[row, column] = FREE
             along += step
 
@@ -303,7 +303,8 @@ def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: Array, rad
         last_column = find_column(x + radius, grid, columns)
         for row in range(find_row(y - radius, grid, rows), find_row(y + radius, grid, rows) + 1):
             for column in range(first_column, last_column + 1):
-                off_x = grid.low_x + (column + 0.5) * grid.cell_size - x
-                off_y = grid.low_y + (row + 0.5) * grid.cell_size - y
-                if state[row, column] < WALL and off_x * off_x + off_y * off_y <= radius * radius:
+                offset_x = grid.low_x + (column + 0.5) * grid.cell_size - x
+                offset_y = grid.low_y + (row + 0.5) * grid.cell_size - y
+                is_within_radius = offset_x * offset_x + offset_y * offset_y <= radius * radius
+                if state[row, column] < WALL and is_within_radius:
                     state[row, column] = FREE

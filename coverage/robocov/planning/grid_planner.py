@@ -31,11 +31,13 @@ from robocov.planning.window import Window
 _MAX_ROUTE_ENDS = 12
 """Number of nodes that are tried as the first node of a route, and as the last."""
 _MAX_SOURCES = 180
-"""Maximum number of candidate goals of a team, unless one in `_NODES_PER_SOURCE` nodes is more."""
+"""Maximum number of candidate goals of a team in a small window."""
 _NODES_PER_SOURCE = 9
-"""Number of nodes per candidate goal in a large window."""
+"""Minimum number of nodes per candidate goal in a large window."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose visible nodes are cached."""
+NO_NODE = -1
+"""Stands for a node where there is none."""
 
 
 @dataclass(eq=False)
@@ -244,10 +246,10 @@ class GridPlanner(MapWindow):
         Returns
         -------
         int
-            -1 if there is none.
+            `NO_NODE` if no node has clearance.
         """
         if not self.has_clearance.any():
-            return -1
+            return NO_NODE
         squared_distances = ((self.nodes - position) ** 2).sum(axis=1)
         return int(np.where(self.has_clearance, squared_distances, np.inf).argmin())
 
@@ -261,10 +263,10 @@ class GridPlanner(MapWindow):
         Returns
         -------
         int
-            -1 if there is none.
+            `NO_NODE` if no node has clearance.
         """
         visible = self._find_visible_nodes(position)
-        return int(visible[0]) if len(visible) else -1
+        return int(visible[0]) if len(visible) else NO_NODE
 
     def _find_visible_nodes(self, position: Array) -> IntArray:
         """Return the close nodes with clearance in sight of a position, or the nearest if none is."""
@@ -321,15 +323,16 @@ class GridPlanner(MapWindow):
         if is_direct:
             return np.array(goal[None])
         first = self._find_first_node(position)
-        if first < 0:
+        if first == NO_NODE:
             return np.array(position[None])
         distance, predecessor = self._find_shortest_paths(first)
         close = self._find_close_nodes(goal, np.isfinite(distance) & self.has_clearance)
         if not len(close):
             return np.array(position[None])
         is_visible = self.find_clear_lines(goal, self.nodes[close], self.is_tight)
+        # From the node nearest to the goal, if possible in sight of it, back to the first node.
         path = [int(close[is_visible.argmax()])]
-        while predecessor[path[-1]] >= 0:
+        while path[-1] != first:
             path.append(int(predecessor[path[-1]]))
         points = self.nodes[path[::-1]]
         if is_visible.any():
@@ -342,12 +345,12 @@ class GridPlanner(MapWindow):
         return distances[0], predecessors[0]
 
     def _find_first_node(self, position: Array) -> int:
-        """Return the first node of a route, close, with clearance and in sight; -1 if there is none."""
+        """Return the first node of a route, close, with clearance and in sight, or `NO_NODE`."""
         close = self._find_close_nodes(position, self.has_clearance)
         is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
         if not is_visible.any():
             is_visible = self.find_clear_lines(position, self.nodes[close], self.is_blocked)
-        return int(close[is_visible.argmax()]) if is_visible.any() else -1
+        return int(close[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
         """Return the waypoints without those that can be skipped, because later ones are in sight."""

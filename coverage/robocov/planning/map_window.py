@@ -148,6 +148,7 @@ class MapWindow:
         rows, columns = self.patches.nonzero()
         stride = self.window.stride
         nodes = rows // stride * self.window.columns + columns // stride
+        # Each pair of a patch and a node is one number, so that the cells can be grouped by pair.
         node_count = len(self.nodes)
         pairs, index = np.unique(self.patches[rows, columns] * node_count + nodes, return_inverse=True)
         expected_free_counts = np.bincount(index, self.openness[rows, columns]).astype(np.float64)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.grid_planner import NO_NODE, GridPlanner
 from robocov.planning.map_window import SIDES
 from robocov.planning.team_placement import UNREACHABLE_M
 
@@ -19,6 +19,10 @@ _LIMIT_PER_CELL_RADIUS = 1.5
 """Limit of the distances of a search, divided by the radius of the robot's cell."""
 _LIMIT_MARGIN_STEPS = 4.0
 """Number of spacings of nodes that are added to this limit."""
+
+
+_MAX_SHIFT_STEPS = 0.5
+"""Maximum distance of a goal from the nearest node, in x and in y, in spacings of nodes."""
 
 
 class OwnGoal(NamedTuple):
@@ -71,7 +75,7 @@ def find_own_goal(
     node = first_node
     neighbors = search.evaluate_neighbors(node)
     for _ in range(_MAX_STEPS):
-        candidates = [neighbor for neighbor in neighbors if neighbor >= 0]
+        candidates = [neighbor for neighbor in neighbors if neighbor != NO_NODE]
         best = min(candidates, key=search.costs.__getitem__, default=node)
         if not search.costs[best] < search.costs[node]:
             break
@@ -107,7 +111,7 @@ class _NodeSearch:
     def evaluate_neighbors(self, node: int) -> list[int]:
         """Add the costs of a node and its neighbors to `costs`. Return the neighbors."""
         neighbors = _list_neighbors(self._planner, node)
-        new_nodes = [k for k in (node, *neighbors) if k >= 0 and k not in self._distances]
+        new_nodes = [k for k in (node, *neighbors) if k != NO_NODE and k not in self._distances]
         tables = self._planner.compute_distances_within(new_nodes, self._limit)
         for new_node, table in zip(new_nodes, tables, strict=True):
             distances = table[self.targets]
@@ -126,7 +130,7 @@ class _NodeSearch:
 
 
 def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
-    """Return the four nodes next to a node, in the order of `SIDES`; -1 where none has clearance."""
+    """Return the four nodes next to a node, in the order of `SIDES`; `NO_NODE` where none has clearance."""
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
@@ -134,7 +138,7 @@ def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
     for up, right in SIDES:
         is_inside = 0 <= row + up < rows and 0 <= column + right < columns
         neighbor = node + up * columns + right
-        neighbors.append(neighbor if is_inside and planner.has_clearance[neighbor] else -1)
+        neighbors.append(neighbor if is_inside and planner.has_clearance[neighbor] else NO_NODE)
     return neighbors
 
 
@@ -152,12 +156,12 @@ def _refine_goal(
         offset = (previous_goal[axis] - planner.nodes[node][axis]) / planner.spacing
         if abs(offset) > 1.0:
             excess = math.inf
-        if ahead < 0 or behind < 0:
+        if NO_NODE in (ahead, behind):
             continue
         slope = 0.5 * (costs[ahead] - costs[behind])
         curvature = costs[ahead] + costs[behind] - 2.0 * costs[node]
         if curvature > 0.0:
-            shift = min(max(-slope / curvature, -0.5), 0.5)
+            shift = min(max(-slope / curvature, -_MAX_SHIFT_STEPS), _MAX_SHIFT_STEPS)
             goal[axis] += shift * planner.spacing
             previous_cost = slope * offset + 0.5 * curvature * offset * offset
             min_cost = slope * shift + 0.5 * curvature * shift * shift

@@ -16,7 +16,7 @@ import scipy
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density import Density
 from robocov.k_median import improve_sources, move_first_source
-from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.grid_planner import NO_NODE, GridPlanner
 
 UNREACHABLE_M = 1e9
 """Finite stand-in for the distance to a node that no robot can reach."""
@@ -100,7 +100,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
     own_node = planner.find_own_node(team.positions[0])
-    if own_node < 0:
+    if own_node == NO_NODE:
         return team.previous_goals
     is_reachable = np.isfinite(planner.get_distances(own_node))
     is_usable = is_reachable[planner.sources]
@@ -117,10 +117,10 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     chosen = _choose_previous_sources(planner.nodes[sources], team)
     chosen = _improve_sources(table, chosen, team, min_savings.relocation)
     if team.is_fixed[1:].all():
+        # Distances from each source to the goal of each robot, and to the nearest robot outside the plan.
         from_team = np.column_stack([distances[:, sources[chosen]], other_distances[sources]])
-        is_in_own_cell = np.append(from_team.argmin(axis=1) == 0, False)
-        with_others = np.append(chosen, len(sources))
-        chosen = move_first_source(table, with_others, is_in_own_cell, min_savings.own_cell)[:-1]
+        is_in_own_cell = from_team.argmin(axis=1) == 0
+        chosen = _move_first_source(table, chosen, is_in_own_cell, min_savings.own_cell)
     return _assign_goals(
         planner.nodes[sources], distances[:, sources[chosen]], chosen, team, min_savings.swap
     )
@@ -128,11 +128,13 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
 
 def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> IntArray:
     """Return the source nearest to each previous goal, all different; fixed robots choose first."""
-    chosen = np.full(len(team.positions), -1, dtype=np.intp)
+    chosen = np.empty(len(team.positions), dtype=np.intp)
+    is_taken = np.zeros(len(source_positions), dtype=bool)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
         squared_distances = ((source_positions - team.previous_goals[robot]) ** 2).sum(axis=1)
-        squared_distances[chosen[chosen >= 0]] = np.inf
+        squared_distances[is_taken] = np.inf
         chosen[robot] = squared_distances.argmin()
+        is_taken[chosen[robot]] = True
     return chosen
 
 
@@ -151,6 +153,20 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
     result = chosen.copy()
     result[order] = improved_sources[:-1]
     return result
+
+
+def _move_first_source(
+    table: Array, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
+) -> IntArray:
+    """Return sources, (k,), with the first one moved to the best position in its own cell.
+
+    The last column of the table represents all other robots; it is not in the cell.
+    """
+    others_source = table.shape[1] - 1
+    moved_sources = move_first_source(
+        table, np.append(chosen, others_source), np.append(is_in_own_cell, False), min_saving
+    )
+    return moved_sources[:-1]
 
 
 def _assign_goals(

@@ -58,11 +58,12 @@ def find_viewpoint(
     is_worth_visiting = frontier_stakes > min_stake
     if not is_worth_visiting.any():
         return None
-    # The cells on the four sides of each unknown one; `frontier.is_side_free` tells which of them are free.
+    # The cells on the four sides of each unknown one. Those marked in `frontier.is_side_free` are free.
     rows_up, columns_right = np.array(SIDES).T
     row = frontier.rows[is_worth_visiting, None] + rows_up
     column = frontier.columns[is_worth_visiting, None] + columns_right
     node = row // window.stride * window.columns + column // window.stride
+    # A cell beyond the window is not free: its node does not matter, but must exist.
     node = np.clip(node, 0, len(path_lengths) - 1)
     stake_per_length = frontier_stakes[is_worth_visiting, None] / (_ADDED_LENGTH_M + path_lengths[node])
     value = frontier.is_side_free[is_worth_visiting] * stake_per_length

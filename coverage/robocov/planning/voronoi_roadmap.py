@@ -24,6 +24,12 @@ _NEIGHBOR_STEPS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), 
 
 Neighbors with an even index share a side with the cell.
 """
+_SIDE_STEPS = _NEIGHBOR_STEPS[::2]
+"""Rows and columns from a cell to the four neighbors that share a side with it."""
+_FORWARD_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Rows and columns from a cell to half of its neighbors, so that each pair of neighbors is visited once."""
+NO_VERTEX = -1
+"""Vertex, or group, of a cell that does not belong to any."""
 _UP = 0
 """Column of `_NEIGHBOR_STEPS`: number of rows up."""
 _RIGHT = 1
@@ -38,7 +44,7 @@ class VoronoiRoadmap(NamedTuple):
     distances: Array
     """(v, v) Distances along the graph, in cells; infinite between vertices that it does not connect."""
     vertex_of_cell: IntArray
-    """(rows, columns) The vertex that each cell belongs to, or -1 if there is none."""
+    """(rows, columns) The vertex that each cell belongs to, or `NO_VERTEX`."""
 
     @classmethod
     def build(
@@ -68,7 +74,7 @@ class VoronoiRoadmap(NamedTuple):
         starts, ends = _list_adjacent_groups(vertex_of_cell)
         lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
-        _spread_groups(vertex_of_cell, is_free, _NEIGHBOR_STEPS[::2])
+        _spread_groups(vertex_of_cell, is_free, _SIDE_STEPS)
         return cls(
             vertices=vertices,
             distances=dijkstra(graph, directed=False),
@@ -155,12 +161,12 @@ def _is_neighbor_in_graph(is_in_graph: BoolArray, row: int, column: int, step: I
 def _group_cells(
     is_in_graph: BoolArray, max_steps: int, neighbor_steps: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the first cell of each group, and the group of each cell, (rows, columns), or -1 for none.
+    """Return the first cell of each group, and the group of each cell, (rows, columns), or `NO_VERTEX`.
 
     A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
     """
     rows, columns = is_in_graph.shape
-    group = np.full(is_in_graph.shape, -1)
+    group = np.full(is_in_graph.shape, NO_VERTEX)
     first_cells = np.empty(is_in_graph.size, dtype=np.intp)
     queue = np.empty(is_in_graph.size, dtype=np.intp)
     steps = np.empty(is_in_graph.size, dtype=np.intp)
@@ -168,7 +174,7 @@ def _group_cells(
     for first in range(is_in_graph.size):
         row = first // columns
         column = first % columns
-        if not is_in_graph[row, column] or group[row, column] >= 0:
+        if not is_in_graph[row, column] or group[row, column] != NO_VERTEX:
             continue
         first_cells[group_count] = first
         group[row, column] = group_count
@@ -185,7 +191,7 @@ def _group_cells(
                 i = row + neighbor_steps[k, _UP]
                 j = column + neighbor_steps[k, _RIGHT]
                 is_inside = 0 <= i < rows and 0 <= j < columns
-                if step < max_steps and is_inside and is_in_graph[i, j] and group[i, j] < 0:
+                if step < max_steps and is_inside and is_in_graph[i, j] and group[i, j] == NO_VERTEX:
                     group[i, j] = group_count
                     queue[tail] = i * columns + j
                     steps[tail] = step + 1
@@ -198,10 +204,10 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
     """List the pairs of groups with adjacent cells, each pair once, the smaller index first."""
     rows, columns = group.shape
     pairs = []
-    for up, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+    for up, right in _FORWARD_STEPS:
         first = group[: rows - up, max(0, -right) : columns - max(0, right)]
         second = group[up:, max(0, right) : columns + min(0, right)]
-        is_border = (first >= 0) & (second >= 0) & (first != second)
+        is_border = (first != NO_VERTEX) & (second != NO_VERTEX) & (first != second)
         pairs.append(np.sort(np.column_stack([first[is_border], second[is_border]]), axis=1))
     starts, ends = np.unique(np.concatenate(pairs), axis=0).T
     return starts, ends
@@ -215,7 +221,7 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray
     head = 0
     tail = 0
     for cell in range(is_free.size):
-        if group[cell // columns, cell % columns] >= 0:
+        if group[cell // columns, cell % columns] != NO_VERTEX:
             queue[tail] = cell
             tail += 1
     while head < tail:
@@ -225,7 +231,8 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray
         for k in range(len(neighbor_steps)):
             i = row + neighbor_steps[k, _UP]
             j = column + neighbor_steps[k, _RIGHT]
-            if 0 <= i < rows and 0 <= j < columns and is_free[i, j] and group[i, j] < 0:
+            is_inside = 0 <= i < rows and 0 <= j < columns
+            if is_inside and is_free[i, j] and group[i, j] == NO_VERTEX:
                 group[i, j] = group[row, column]
                 queue[tail] = i * columns + j
                 tail += 1

@@ -94,7 +94,7 @@ class Window(NamedTuple):
         Returns
         -------
         (h, w) array
-            Its shape is `shape`.
+            h and w are those of `shape`.
         """
         height, width = self.shape
         cropped = cells[
@@ -125,5 +125,5 @@ def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple
     """Return the bounds of an interval of cells, rounded outward to whole steps and clipped to `count`."""
     step = max(1, half_width // _STEPS_PER_HALF_WIDTH)
     low = (middle - half_width) // step * step
-    high = -((-middle - half_width - 1) // step) * step
+    high = math.ceil((middle + half_width + 1) / step) * step
     return max(0, low), min(count, high)
