@@ -9,7 +9,7 @@ import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
-from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
+from robocov.controllers.base import BaseController, is_plan_due
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
@@ -136,8 +136,7 @@ class Adaptive(BaseController):
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
         """Update the estimates if they are due, and compute the forces toward the centroids."""
-        next_plan_time = memory.plan_time + self.period - TIME_TOLERANCE_S
-        if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
+        if memory.goals is None or is_plan_due(memory.plan_time, self.period, seen.time):
             memory = self._plan(seen, memory)
         assert memory.goals is not None
         velocities = compute_approach_velocities(
@@ -316,7 +315,7 @@ class Lattice:
         basis : int
             Number of basis functions along each side of the bounding box.
         correlation : float
-            Correlation length, in longer sides of the bounding box.
+            Correlation length, relative to the longer side of the bounding box.
         """
         low_x, low_y, high_x, high_y = region.bounds
         longer_side = max(high_x - low_x, high_y - low_y)

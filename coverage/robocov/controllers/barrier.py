@@ -24,11 +24,11 @@ from robocov.team import Team
 _ROUNDING_M = 1e-3
 """Length over which the square root in h, which is vertical at the safe distance, is rounded."""
 _MIN_DISTANCE_M = 1e-9
-"""Lower bound of distances between robots, to avoid division by zero."""
+"""Lower limit of distances between robots in divisions."""
 _MIN_PASSING_CLEARANCE_M = 1e-3
-"""Margin added to the safe gap, for the lower bound of the distance to a passing robot."""
+"""Margin added to the safe gap in the lower limit of the distance to a passing robot."""
 _MIN_NORM = 1e-300
-"""Lower bound of norms in divisions."""
+"""Lower limit of norms in divisions."""
 
 
 class NeighborReports(NamedTuple):

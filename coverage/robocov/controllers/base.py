@@ -14,12 +14,30 @@ from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
-"""Information that a controller uses: what each robot senses and hears itself ("own"); in addition maps, and
-the last known positions of other robots, that neighbors send each other ("shared map"); or the whole map
-from the start ("whole map")."""
+"""Information that a controller uses: what each robot itself senses, and the positions of its neighbors
+("own"); in addition maps, and the last known positions of other robots, that neighbors send each other
+("shared map"); or the whole map from the start ("whole map")."""
 
 TIME_TOLERANCE_S = 1e-9
 """Margin of comparisons of times: a sum of time steps may be a little less than a multiple of them."""
+
+
+def is_plan_due(plan_time: float, period: float, time: float) -> bool:
+    """Return whether it is time for a new plan.
+
+    Parameters
+    ----------
+    plan_time : float, s
+        Time of the last plan. If it is later than `time`, the simulation was rewound, and a new plan is due.
+    period : float, s
+        Time between two plans.
+    time : float, s
+
+    Returns
+    -------
+    bool
+    """
+    return not plan_time <= time < plan_time + period - TIME_TOLERANCE_S
 
 
 @runtime_checkable

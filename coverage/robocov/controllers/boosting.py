@@ -48,9 +48,9 @@ _TRAIL_SPACING_M = 0.2
 _RETURN_GAIN = 2.0
 """Speed per meter of distance to the next point of the trail, 1/s."""
 _MIN_DISTANCE_M = 1e-3
-"""Lower bound of distances, to avoid division by zero."""
+"""Lower limit of distances in divisions."""
 _MIN_DETECTION = 1e-3
-"""Lower bound of the probability of detection, to avoid division by zero."""
+"""Lower limit of the probability of detection in divisions."""
 
 
 class Mode(Enum):

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.controllers.base import is_plan_due
 from robocov.controllers.convex_chart import ConvexChart
 from robocov.controllers.driving import (
     Margins,
@@ -16,7 +17,7 @@ from robocov.controllers.driving import (
     compute_drive_forces,
 )
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.known_map import WholeMapController, is_plan_due
+from robocov.controllers.known_map import WholeMapController
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
@@ -62,8 +63,8 @@ class Diffeomorphism(WholeMapController):
 
     Obstacles are enlarged by the radius of the robot and `clearance`; the image of a robot within that margin
     is the image of the nearest point outside. Robots avoid collisions by slowing down. Cells are sampled by
-    the triangles of the mesh, and computed every `period` seconds; a robot that does not hear all others
-    computes its cell from those that it hears. The chart includes unreachable rooms, but no moving obstacles.
+    the triangles of the mesh, and computed every `period` seconds, for each robot from the positions of the
+    robots within communication range. The chart includes unreachable rooms, but no moving obstacles.
 
     The implementation is based on general knowledge, not on the full texts of the two papers ("A coverage
     algorithm for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA

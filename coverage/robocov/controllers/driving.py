@@ -1,7 +1,7 @@
 """Safe velocities toward goals, and the forces that track them.
 
 A controller computes a desired velocity, `avoid_collisions` returns the nearest velocity that is safe as far
-as the robot senses and hears, and `compute_drive_forces` returns the force that tracks it.
+as the robot knows, and `compute_drive_forces` returns the force that tracks it.
 """
 
 from __future__ import annotations
@@ -214,8 +214,8 @@ def limit_approach_speed(
     Returns
     -------
     (n, 2) array, m/s
-        Within the clearance of an object, they point away from it. If this is not possible for all objects at
-        once, they only do not approach any object.
+        Within the clearance of an object, they point away from it. If no velocity does so for all of these
+        objects, they approach none of them.
     """
     distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
     normals = offsets / np.where(distance > 0.0, distance, np.nan)[..., None]
@@ -278,12 +278,13 @@ def find_nearest_allowed(
             # Neither a half plane that contains the disc nor nan is a constraint.
             if not (offset < r and nx * x + ny * y - offset > slack):
                 continue
+            # The new optimum is on the line offset (nx, ny) + t (-ny, nx), with t from `low` to `high`. An
+            # infinite `low` means that no point is allowed.
             high = math.sqrt(max(r * r - offset * offset, 0.0))
             low = -high
             if offset < -r:
                 low = math.inf
             for j in range(k):
-                # Points of the line are offset (nx, ny) + t (-ny, nx).
                 slope = normals[i, j, 1] * nx - normals[i, j, 0] * ny
                 rest = offsets[i, j] - offset * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
                 if slope >= _MIN_SLOPE:

@@ -166,6 +166,7 @@ def gain(
     >>> get_gains(Homing)["stiffness"].unit
     'N/m'
     """
+    # `get_gains` adds the name of the field.
     declared = Gain(
         name="",
         default=default,
@@ -218,7 +219,9 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     """
     if default not in choices:
         raise ValueError(f"default: expected one of {', '.join(choices)}, got {default!r}")
-    return field(default=default, metadata={_METADATA_KEY: Option("", default, tuple(choices), meaning)})
+    # `get_gains` adds the name of the field.
+    declared = Option(name="", default=default, choices=tuple(choices), meaning=meaning)
+    return field(default=default, metadata={_METADATA_KEY: declared})
 
 
 def get_gains(controller: Any) -> dict[str, Gain | Option]:
@@ -250,7 +253,14 @@ def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
     default = None if dataclass_field.default is MISSING else dataclass_field.default
     if declared is None:
         if is_number(default):
-            return Gain(dataclass_field.name, default, "", -_MAX_PLAIN_GAIN, _MAX_PLAIN_GAIN, "")
+            return Gain(
+                name=dataclass_field.name,
+                default=default,
+                unit="",
+                low=-_MAX_PLAIN_GAIN,
+                high=_MAX_PLAIN_GAIN,
+                meaning="",
+            )
         return None
     complete: Gain | Option = replace(declared, name=dataclass_field.name, default=default)
     if isinstance(complete, Gain) and complete.unit == _DIMENSIONLESS:

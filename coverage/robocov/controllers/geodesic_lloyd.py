@@ -1,4 +1,4 @@
-"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: an upper bound for the others."""
+"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: a reference for the others."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
+from robocov.controllers.base import is_plan_due
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.known_map import WholeMapController, build_configuration_space, is_plan_due
+from robocov.controllers.known_map import WholeMapController, build_configuration_space
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, find_nearest_inside
 from robocov.geodesic import Geodesics
@@ -54,7 +55,7 @@ class GeodesicLloyd(WholeMapController):
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) replace the straight distance
     in the locational cost by the length d of the shortest path. Each robot moves along the shortest path to
     the goal that minimizes an upper bound on the cost of its cell. This controller knows the whole map, and
-    therefore serves as a bound for those that do not.
+    therefore serves as a reference for those that do not.
 
     Notes
     -----
@@ -146,7 +147,7 @@ class GeodesicPlanner:
         shapely.prepare(self.configuration_space)
 
     def plan(self, seen: Observations, exponent: float) -> GeodesicPlan:
-        """Plan the goals of all robots, each from the positions of the robots that it hears.
+        """Plan the goals of all robots, each from the positions of the robots within communication range.
 
         Parameters
         ----------

@@ -7,7 +7,7 @@ from typing import Self
 
 import shapely
 
-from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
+from robocov.controllers.base import BaseController
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 
@@ -62,21 +62,3 @@ def build_configuration_space(environment: Environment, clearance: float) -> sha
             f"map {environment.name!r}: no space for robots that keep {clearance:g} m from its walls"
         )
     return configuration_space
-
-
-def is_plan_due(plan_time: float, period: float, time: float) -> bool:
-    """Return whether it is time for a new plan.
-
-    Parameters
-    ----------
-    plan_time : float, s
-        Time of the last plan. If it is later than `time`, the simulation was rewound, and a new plan is due.
-    period : float, s
-        Time between two plans.
-    time : float, s
-
-    Returns
-    -------
-    bool
-    """
-    return not plan_time <= time < plan_time + period - TIME_TOLERANCE_S

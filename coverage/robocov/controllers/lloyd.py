@@ -21,7 +21,7 @@ class Lloyd(BaseController):
     such that its deceleration stays within its limits. The drive tracks this velocity and compensates the
     viscosity. Obstacles are ignored: robots slide along them.
 
-    Another `target` than the centroid is the optimum of the cell for another performance function f of the
+    A `target` other than the centroid is the optimum of the cell for another performance function f of the
     locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside
     the robot's own cell.
 

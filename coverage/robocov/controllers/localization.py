@@ -24,16 +24,16 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_SIGMA_M = 1e-9
 """Lower limit of standard deviations in divisions."""
 _SENT_TOLERANCE_S = 1e-6
-"""A message is new if it was sent later than the last one by more than this, because sums of steps round."""
+"""A message is new if it was sent later than the last one by more than this, to allow for rounding."""
 _MANEUVER_FRACTION = 0.5
 """Assumed acceleration of others, as a fraction of their maximum acceleration."""
 _MAX_EXTRAPOLATION_S = 1.5
 """Maximum time that others are assumed to keep their velocities."""
-_DOUBT_SIGMAS = 1.0
+_UNCERTAINTY_SIGMAS = 1.0
 """Others may be closer than estimated by this number of standard deviations of a fix."""
-_DOUBT_SPEED = 1.0
+_UNCERTAINTY_SPEED = 1.0
 """Speed in m/s at which others may have come closer since their last message."""
-_MAX_DOUBT_FRACTION = 0.75
+_MAX_UNCERTAINTY_FRACTION = 0.75
 """Others may be closer than estimated by at most this fraction of the estimated distance."""
 
 
@@ -64,7 +64,7 @@ class _Messages(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Filter states of n robots: of their own positions, and of each other robot that they hear."""
+    """Filter states of n robots: of their own positions, and of the robots whose messages they receive."""
 
     time: float
     """s"""
@@ -103,24 +103,24 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     Parameters
     ----------
     seen : Observations
-        With noisy positions, and reported ones of neighbors.
+        With noisy positions of the robots, and reported positions of their neighbors.
     previous : Estimates
-        Filter states after the observations before.
+        Filter states after the previous observations.
     team : Team
 
     Returns
     -------
-    seen : Observations
-        The same with estimated positions.
+    estimated : Observations
+        The observations with estimated positions.
     estimates : Estimates
-        The filter states afterwards.
+        Filter states after these observations.
 
     Notes
     -----
     A robot integrates its own velocity and averages the residuals of its position fixes over two seconds.
     Others are tracked by their messages with the steady-state gains of Kalata (1984, *The tracking index*),
-    larger ones for the first messages; the noise of a message is that of the robot's own fixes. They are
-    assumed to keep their velocities for at most 1.5 seconds since their last message.
+    and with larger gains for the first messages. Their messages are assumed to be as noisy as the robot's own
+    fixes, and they are assumed to keep their velocities for at most 1.5 seconds since their last message.
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
     positions, fix_counts, variance = _filter_own_positions(seen, previous, team)
@@ -191,9 +191,9 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
     ages = np.clip(seen.time - estimates.tracks.sent_times[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
-    doubt = _DOUBT_SIGMAS * np.sqrt(estimates.variance[robot]) + _DOUBT_SPEED * ages
-    doubt = np.minimum(doubt, _MAX_DOUBT_FRACTION * distance)
-    factor = 1.0 - doubt / np.maximum(distance, _MIN_DISTANCE_M)
+    uncertainty = _UNCERTAINTY_SIGMAS * np.sqrt(estimates.variance[robot]) + _UNCERTAINTY_SPEED * ages
+    uncertainty = np.minimum(uncertainty, _MAX_UNCERTAINTY_FRACTION * distance)
+    factor = 1.0 - uncertainty / np.maximum(distance, _MIN_DISTANCE_M)
     return replace(seen, reported_positions=seen.positions[robot] + factor[:, None] * offset)
 
 
@@ -220,25 +220,27 @@ def _update_tracks(
         positions=previous.positions.copy(),
         velocities=previous.velocities.copy(),
     )
-    is_heard = np.zeros(tracks.sent_times.shape, np.bool_)
+    is_neighbor = np.zeros(tracks.sent_times.shape, np.bool_)
     for m in range(len(messages.receiver)):
         i = messages.receiver[m]
         j = messages.sender[m]
-        is_heard[i, j] = True
-        if tracks.counts[i, j] and not messages.sent_times[m] > tracks.sent_times[i, j] + _SENT_TOLERANCE_S:
+        is_neighbor[i, j] = True
+        has_track = tracks.counts[i, j] > 0
+        is_new = messages.sent_times[m] > tracks.sent_times[i, j] + _SENT_TOLERANCE_S
+        if has_track and not is_new:
             continue
-        if tracks.counts[i, j] == 0:
+        if has_track:
+            _update_track(tracks, messages, m, sigma[i], maneuver[i], max_speed[i])
+        else:
             for axis in range(2):
                 tracks.velocities[i, j, axis] = 0.0
                 tracks.positions[i, j, axis] = messages.positions[m, axis]
-        else:
-            _update_track(tracks, messages, m, sigma[i], maneuver[i], max_speed[i])
         tracks.sent_times[i, j] = messages.sent_times[m]
         tracks.counts[i, j] += 1
-    # If a robot that is not heard now is heard again later, its track starts from scratch.
-    for i in range(len(is_heard)):
-        for j in range(len(is_heard)):
-            if not is_heard[i, j]:
+    # If a robot that is not a neighbor now becomes one again later, its track starts from scratch.
+    for i in range(len(is_neighbor)):
+        for j in range(len(is_neighbor)):
+            if not is_neighbor[i, j]:
                 tracks.counts[i, j] = 0
     return tracks
 

@@ -33,7 +33,7 @@ from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
 _MIN_DISTANCE_M = 1e-9
-"""Lower bound of distances between robots, to avoid division by zero."""
+"""Lower limit of distances between robots in divisions."""
 _MIN_LENGTH = 1e-300
 """Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _MIN_CHARGE_DISTANCE_M = 0.05
@@ -143,7 +143,7 @@ class Rapf(BaseController):
     known convex region and ignore the unknown obstacles; the repulsion keeps robots away from these. A
     centroid may lie in or behind an obstacle: the robot then comes to rest where the forces balance.
 
-    Another `target` than the centroid is the optimum of the cell for another performance function f of the
+    A `target` other than the centroid is the optimum of the cell for another performance function f of the
     locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside
     the robot's own cell.
 
@@ -265,8 +265,8 @@ class Howard(BaseController):
 
     The sum over all obstacles and robots, the inverse-square forces and the friction are based on general
     knowledge, not on the full text of the paper. Three choices are our own: each ray carries a fraction of
-    the charge; forces do not grow below 5 cm; and robots repel those that they hear, because the range sensor
-    does not detect robots.
+    the charge; forces do not grow below 5 cm; and robots repel all others within communication range, because
+    the range sensor does not detect robots.
     """
 
     name = "howard"
@@ -405,20 +405,23 @@ class Poduri(BaseController):
     def _is_critical_for_neighbor(
         self, seen: Observations, links: NearNeighbors, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbor, according to the robots that are heard."""
+        """Return whether links are critical for the neighbor, as far as the robot knows its neighbors.
+
+        Entry (i, j) of `near_counts` is the number of robots near j that robot i knows.
+        """
         n = len(is_near)
-        hears = np.eye(n, dtype=bool)
-        first, second = seen.neighbors.list_pairs()
-        hears[first, second] = True
+        knows = np.eye(n, dtype=bool)
+        robot, neighbor = seen.neighbors.list_pairs()
+        knows[robot, neighbor] = True
         # Products of float matrices are much faster than those of integers.
-        near_counts = hears.astype(np.float32) @ is_near.astype(np.float32).T
+        near_counts = knows.astype(np.float32) @ is_near.astype(np.float32).T
         is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbours
         # The next table has a row of n columns for each link. Only few links remain.
         remaining = selected[is_critical]
         distances = np.full((n, n), np.inf)
         distances[links.robot, links.neighbor] = links.distance
         is_nearer = distances[links.neighbor[remaining]] < links.distance[remaining, None]
-        nearer_counts = (is_nearer & hears[links.robot[remaining]]).sum(axis=1)
+        nearer_counts = (is_nearer & knows[links.robot[remaining]]).sum(axis=1)
         is_critical[is_critical] = nearer_counts < self.neighbours
         return np.asarray(is_critical)
 
@@ -445,9 +448,10 @@ def _rank_by_distance(robot: IntArray, distance: Array) -> IntArray:
 
     Links are sorted by robot; of links of equal length the first one has the lower rank.
     """
-    rank = np.empty(len(robot), dtype=np.intp)
-    rank[np.lexsort((distance, robot))] = np.arange(len(robot))
-    return rank - np.searchsorted(robot, robot)
+    rank_among_all = np.empty(len(robot), dtype=np.intp)
+    rank_among_all[np.lexsort((distance, robot))] = np.arange(len(robot))
+    first_link_of_robot = np.searchsorted(robot, robot)
+    return rank_among_all - first_link_of_robot
 
 
 @dataclass(frozen=True)
@@ -458,8 +462,8 @@ class Dispersion(BaseController):
 
     - *Avoid*: a robot approaches obstacle points and robots only so fast that the distance decreases
       exponentially to `clearance`, and slides along them.
-    - *Disperse*: it moves away from all robots within `reach`, the faster the nearer they are, at its maximum
-      speed at most.
+    - *Disperse*: it moves away from all robots within `reach`, the faster the nearer they are, but at most at
+      its maximum speed.
     - *Explore*: without robots within `reach` it moves straight on at `explore_speed`.
 
     Robots need neither identities nor communication.

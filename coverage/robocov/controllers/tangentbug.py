@@ -46,6 +46,9 @@ _ROUNDING_M = 1e-9
 _MAX_RETURN_FACTOR = 3.0
 """A robot gives up its return after the maximum length of its boundary, times this factor."""
 
+COUNTERCLOCKWISE = 1
+CLOCKWISE = -1
+"""Directions of turns, and of the motion around obstacles."""
 
 Squares: TypeAlias = frozenset[tuple[int, int]]
 """Columns and rows of squares of the plane, of side `_SQUARE_SIDE_M`, counted from the origin."""
@@ -104,7 +107,7 @@ class BugState:
 
     mode: Mode
     turn: int
-    """Direction in which it passes obstacles: 1 if they are on its right, counter-clockwise; else -1."""
+    """`COUNTERCLOCKWISE` or `CLOCKWISE`: it passes obstacles on its right, or on its left."""
     waypoint: Array
     """(2,) m, point that it heads for."""
     is_passing: bool = False
@@ -207,7 +210,9 @@ class TangentBug(BaseController):
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         returns = update_returns(seen, memory.returns)
         obstacle_points = collect_obstacle_points(seen, returns)
-        bugs = memory.bugs or tuple(BugState(Mode.GOAL, 1, position) for position in seen.positions)
+        bugs = memory.bugs or tuple(
+            BugState(Mode.GOAL, COUNTERCLOCKWISE, position) for position in seen.positions
+        )
         obstacle_squares = memory.obstacle_squares or (frozenset(),) * len(team)
         # Robots navigate after each scan. Before the first one, they use the closest obstacle points instead.
         if not memory.bugs or seen.scans is not None or returns is None:
@@ -334,22 +339,33 @@ class ObstacleView:
         return None if np.isnan(distances).all() else self.points[int(np.nanargmin(distances))]
 
     def find_contour_ends(self, direction: Array, jump: float) -> dict[int, ContourEnd]:
-        """Return the ends of the contour that blocks the view in a direction, by the turn toward each."""
+        """Return the ends of the contour that blocks the view in a direction, by the turn toward each.
+
+        Parameters
+        ----------
+        direction : (2,) array
+            Of any length.
+        jump : float, m
+            The contour ends before a ray whose free distance exceeds that of the previous ray by this, and
+            before a ray whose free distance is the range of the sensor.
+
+        Returns
+        -------
+        dict of int to ContourEnd
+            By `COUNTERCLOCKWISE` and `CLOCKWISE`; empty if the contour is closed.
+        """
         first_ray = int((self.directions * direction).sum(axis=1).argmax())
         blocked_distance = self.compute_free_distance(direction)
         ends = {}
-        for turn in (1, -1):
-            end = find_contour_end(
-                free_distances=self.free_distances,
-                directions=self.directions,
-                first_ray=first_ray,
-                turn=turn,
-                blocked_distance=blocked_distance,
-                jump=jump,
-                reach=self.reach,
-            )
-            if end is not None:
-                ends[turn] = end
+        for turn in (COUNTERCLOCKWISE, CLOCKWISE):
+            rays = (first_ray + turn * np.arange(len(self.directions))) % len(self.directions)
+            distances = self.free_distances[rays]
+            previous = np.append(blocked_distance, distances[:-1])
+            is_past_end = (distances > previous + jump) | (distances >= self.reach)
+            if is_past_end.any():
+                k = int(is_past_end.argmax())
+                point = self.directions[rays[k]] * min(distances[k], previous[k] + jump)
+                ends[turn] = ContourEnd(ray=int(rays[k]), point=point)
         return ends
 
 
@@ -488,8 +504,8 @@ class Navigator:
         rays = np.arange(len(self.view.free_distances))
         if len(ends) == 2:
             # The contour extends counter-clockwise from one end to the other.
-            first = ends[-1].ray + 1
-            count = (ends[1].ray - first) % len(rays)
+            first = ends[CLOCKWISE].ray + 1
+            count = (ends[COUNTERCLOCKWISE].ray - first) % len(rays)
             rays = np.sort((first + np.arange(count)) % len(rays))
         best_so_far = np.zeros(2)
         if bug.fixed_goal.best_point is not None:
@@ -559,47 +575,3 @@ def compute_free_distances(points: Array, directions: Array, clearance: float, r
                 free_distance = max(along - math.sqrt(squared_depth), 0.0)
                 free_distances[k] = min(free_distances[k], free_distance)
     return free_distances
-
-
-def find_contour_end(
-    free_distances: Array,
-    directions: Array,
-    first_ray: int,
-    turn: int,
-    blocked_distance: float,
-    jump: float,
-    reach: float,
-) -> ContourEnd | None:
-    """Find the end of the contour that blocks a ray.
-
-    Parameters
-    ----------
-    free_distances : (k,) array, m
-        Distance that the robot can move along each ray.
-    directions : (k, 2) array
-        Unit vectors of the rays.
-    first_ray : int
-        The ray nearest to the blocked direction.
-    turn : int
-        1 to search counter-clockwise, -1 clockwise.
-    blocked_distance : float, m
-        Free distance in the blocked direction.
-    jump : float, m
-        The contour ends before a ray whose free distance exceeds that of the previous ray by this.
-    reach : float, m
-        The contour also ends before a ray with this free distance.
-
-    Returns
-    -------
-    ContourEnd or None
-        None if the contour is closed.
-    """
-    rays = (first_ray + turn * np.arange(len(free_distances))) % len(free_distances)
-    distances = free_distances[rays]
-    previous = np.append(blocked_distance, distances[:-1])
-    is_past_end = (distances > previous + jump) | (distances >= reach)
-    if not is_past_end.any():
-        return None
-    k = int(is_past_end.argmax())
-    point = directions[rays[k]] * min(distances[k], previous[k] + jump)
-    return ContourEnd(ray=int(rays[k]), point=point)

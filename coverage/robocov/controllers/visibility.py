@@ -68,8 +68,8 @@ class Visibility(BaseController):
     the distance along the edge, and t is normal to it, away from the obstacle (see `Windows`). Walls do not
     move, and the gradients of two cells along their common border cancel.
 
-    Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. A robot
-    that hears no others has the whole view as its cell.
+    Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. The cell
+    of a robot without neighbors in communication range is its whole view.
 
     The implementation is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not
     on the full text. In the paper, robots send each other their views. Here they send positions, and a robot

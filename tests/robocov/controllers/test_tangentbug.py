@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Lloyd, TangentBug
-from robocov.controllers.tangentbug import Mode, compute_free_distances, find_contour_end
+from robocov.controllers.tangentbug import (
+    CLOCKWISE,
+    COUNTERCLOCKWISE,
+    Mode,
+    ObstacleView,
+    compute_free_distances,
+)
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
@@ -114,20 +120,24 @@ def test_a_disc_that_is_too_near_may_move_away_and_along() -> None:
     np.testing.assert_array_equal(free_distances[1:], 2.0)
 
 
-@pytest.mark.parametrize(("turn", "low", "high"), [(1, 0.5, 0.7), (-1, -1.2, -1.0)])
-def test_the_ends_of_a_wall_are_found(turn: int, low: float, high: float) -> None:
-    """A wall from (1, -1) to (1, 0.5), seen from the origin, ends at angles between two slopes."""
-    wall = np.column_stack([np.ones(60), np.linspace(-1.0, 0.5, 60)])
+def view_obstacles(points: np.ndarray) -> ObstacleView:
     directions = compute_ray_directions(360)
-    free_distances = compute_free_distances(wall, directions, 0.1, 3.0)
-    end = find_contour_end(free_distances, directions, 0, turn, 0.9, 0.5, 3.0)
-    assert end is not None
-    slope = directions[end.ray, 1] / directions[end.ray, 0]
-    assert low < slope < high
+    free_distances = compute_free_distances(points, directions, 0.1, 3.0)
+    return ObstacleView(points, directions, free_distances, clearance=0.1, reach=3.0)
+
+
+def test_the_ends_of_a_wall_are_found() -> None:
+    """A wall from (1, -1) to (1, 0.5), seen from the origin, ends at angles between two slopes."""
+    view = view_obstacles(np.column_stack([np.ones(60), np.linspace(-1.0, 0.5, 60)]))
+    ends = view.find_contour_ends(np.array([1.0, 0.0]), jump=0.5)
+    slopes = {turn: view.directions[end.ray, 1] / view.directions[end.ray, 0] for turn, end in ends.items()}
+    assert 0.5 < slopes[COUNTERCLOCKWISE] < 0.7
+    assert -1.2 < slopes[CLOCKWISE] < -1.0
 
 
 def test_a_closed_contour_has_no_end() -> None:
-    assert find_contour_end(np.full(360, 1.0), compute_ray_directions(360), 7, 1, 1.0, 0.5, 3.0) is None
+    view = view_obstacles(compute_ray_directions(360))
+    assert view.find_contour_ends(np.array([1.0, 0.1]), jump=0.5) == {}
 
 
 def test_the_goal_is_fixed_while_a_robot_follows_a_boundary() -> None:
