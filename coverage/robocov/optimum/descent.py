@@ -22,10 +22,10 @@ _MEMORY = 8
 _SUFFICIENT_DECREASE = 1e-4
 """Fraction of the decrease predicted by the gradient that a step must achieve (Armijo's condition)."""
 
-_MAX_QUASI_NEWTON_HALVINGS = 4
+_MAX_QUASI_NEWTON_TRIALS = 4
 """Maximum number of trial steps along the quasi-Newton direction, each half as long as the previous one."""
 
-_MAX_GRADIENT_HALVINGS = 14
+_MAX_GRADIENT_TRIALS = 14
 """Maximum number of trial steps along the scaled gradient."""
 
 _STALL_STEPS = 5
@@ -111,27 +111,27 @@ class _Descent:
         """Move the robots to a lower cost; return whether that was possible."""
         gradient = _compute_gradient(self.result)
         scale = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
-        lower = None
+        improved = None
         if self.recent_pairs:
             direction = _compute_quasi_newton_direction(gradient, scale, self.recent_pairs)
-            lower = self._search_line(gradient, direction, _MAX_QUASI_NEWTON_HALVINGS)
-        if lower is None:
+            improved = self._search_line(gradient, direction, _MAX_QUASI_NEWTON_TRIALS)
+        if improved is None:
             self.recent_pairs.clear()
-            lower = self._search_line(gradient, -gradient / scale, _MAX_GRADIENT_HALVINGS)
-        if lower is None:
+            improved = self._search_line(gradient, -gradient / scale, _MAX_GRADIENT_TRIALS)
+        if improved is None:
             return False
-        move = lower.positions - self.result.positions
-        change = _compute_gradient(lower) - gradient
+        move = improved.positions - self.result.positions
+        change = _compute_gradient(improved) - gradient
         # Quasi-Newton directions lead downhill only if the cost is convex along all recorded steps.
         if (move * change).sum() > _MIN_CURVATURE * (change * change).sum():
             self.recent_pairs.append(_CurvaturePair(move, change))
-        self.result = lower
+        self.result = improved
         return True
 
-    def _search_line(self, gradient: Array, direction: Array, halvings: int) -> CoverageResult | None:
+    def _search_line(self, gradient: Array, direction: Array, max_trials: int) -> CoverageResult | None:
         """Return the result of the longest trial step that lowers the cost enough, or None if none does."""
         start = self.result
-        for k in range(halvings):
+        for k in range(max_trials):
             positions = self.space.find_nearest(start.positions + 0.5**k * direction, self.component)
             if positions is None:
                 continue

@@ -265,9 +265,9 @@ class _Search:
         Distances from groups of sites to the candidates, times the weights of the groups.
     """
 
-    def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
+    def __init__(self, environment: Environment, cost: CoverageCost, robot_count: int, radius: float) -> None:
         self.cost = cost
-        self.robots = robots
+        self.robot_count = robot_count
         self.space = ConfigurationSpace(environment.free, radius)
         _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
         # A site on the border of two components belongs to the first one.
@@ -276,14 +276,14 @@ class _Search:
         site_counts = np.bincount(site_component, minlength=len(areas))
         usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
         # The robots occupy the largest components; these come first.
-        covered = usable[:robots]
+        covered = usable[:robot_count]
         candidates = self._spread_candidates(covered)
         self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
-        if len(self.component) < robots:
+        if len(self.component) < robot_count:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
                 f"robots: expected at most about {capacity}, as many as fit with radius {radius:g} m in map "
-                f"{environment.name!r}, got {robots}"
+                f"{environment.name!r}, got {robot_count}"
             )
         self.candidates = np.concatenate(candidates)
         groups = self._group_sites(site_component, np.isin(site_component, covered))
@@ -294,7 +294,7 @@ class _Search:
     def _spread_candidates(self, covered: list[int]) -> list[Array]:
         """Return candidate positions in each of the covered components, (c, 2) m each."""
         areas = [self.space.components[k] for k in covered]
-        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robots)
+        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robot_count)
         spacing = max(math.sqrt(sum(area.area for area in areas) / count), self.space.spacing)
         return [_spread_points(area, spacing) for area in areas]
 
@@ -346,7 +346,7 @@ class _Search:
         Since the table only approximates the cost, the result of an earlier stage is used if its exact cost
         is lower.
         """
-        drawn = seed_sources(self.table, self.robots, rng)
+        drawn = seed_sources(self.table, self.robot_count, rng)
         moved = run_lloyd(self.table, drawn, heartbeat=heartbeat)
         swapped = apply_best_swaps(self.table, moved, heartbeat)
         stages = [np.sort(sources) for sources in (swapped, moved, drawn)]
@@ -358,9 +358,10 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     low_x, low_y, high_x, high_y = area.bounds
     step = spacing / _STEPS_PER_SPACING
     step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS))
-    columns = int((high_x - low_x) / 2.0 / step)
-    rows = int((high_y - low_y) / 2.0 / step)
-    row_grid, column_grid = np.mgrid[-rows : rows + 1, -columns : columns + 1]
+    # Rows and columns of a fine grid, counted from the middle of the bounding box.
+    max_column = int((high_x - low_x) / 2.0 / step)
+    max_row = int((high_y - low_y) / 2.0 / step)
+    row_grid, column_grid = np.mgrid[-max_row : max_row + 1, -max_column : max_column + 1]
     row = row_grid.ravel()
     column = column_grid.ravel()
     x = (low_x + high_x) / 2.0 + column * step

@@ -68,7 +68,7 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     for name in names:
         if name not in saved:
             raise InputError(f"{path}: there is no array {name}")
-        _check_shape(path, name, saved[name], saved["time"].shape, robots=len(team))
+        _check_shape(path, name, saved[name], saved["time"].shape, robot_count=len(team))
     for name, maximum in _MAX_VALUES.items():
         if name in names:
             _check_range(path, name, saved[name], maximum)
@@ -77,9 +77,9 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     return {name: saved[name] for name in names}
 
 
-def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robots: int) -> None:
+def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robot_count: int) -> None:
     is_time = name == "time"
-    shape = time_shape if is_time else (*time_shape, robots, 2)
+    shape = time_shape if is_time else (*time_shape, robot_count, 2)
     has_moments = len(time_shape) == 1 and time_shape != (0,)
     if array.dtype != np.float64 or array.shape != shape or not has_moments:
         expected = "(T,)" if is_time else str(shape)
@@ -89,8 +89,8 @@ def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...
 
 
 def _check_range(path: Path, name: str, array: Array, maximum: float) -> None:
-    is_good = np.abs(array) <= maximum
-    if not is_good.all():
+    is_in_range = np.abs(array) <= maximum
+    if not is_in_range.all():
         raise InputError(
-            f"{path}: {name}: expected finite numbers up to {maximum:g}, got {array[~is_good][0]:g}"
+            f"{path}: {name}: expected finite numbers up to {maximum:g}, got {array[~is_in_range][0]:g}"
         )

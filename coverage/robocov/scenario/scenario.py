@@ -286,7 +286,7 @@ class Scenario:
         steps : int
             Number of control steps taken before.
         is_computed : bool
-            Whether a simulation computed the starting positions; see `TeamState`.
+            Whether a simulation computed the starting positions, which are then not checked for overlaps.
 
         Returns
         -------

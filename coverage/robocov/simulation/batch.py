@@ -109,7 +109,7 @@ class SimulationBatch:
         check_dt(dt)
         if environment.has_moving_obstacles:
             raise ParameterError(
-                f"environment: expected obstacles that stand still, got map {environment.name!r}"
+                f"environment: expected a map without moving obstacles, got map {environment.name!r}"
             )
         positions = _to_starts(starts)
         run_count, robot_count, _ = positions.shape
@@ -231,7 +231,6 @@ class SimulationBatch:
                 world=self._world,
                 sensor=self.sensor,
                 environment=self.environment,
-                team=self._joint_team,
                 neighbors=self._get_joint_graph(),
                 time=self.time,
                 scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,

@@ -57,13 +57,13 @@ def count_steps(duration: float, dt: float) -> int:
     return steps
 
 
-def check_team(team: Any, robots: int) -> Team:
+def check_team(team: Any, robot_count: int) -> Team:
     """Return a team of the expected size, by default one of identical robots.
 
     Parameters
     ----------
     team : Team or None
-    robots : int
+    robot_count : int
 
     Returns
     -------
@@ -75,21 +75,21 @@ def check_team(team: Any, robots: int) -> Team:
         If it is not a team, or has another number of robots.
     """
     if team is None:
-        return Team.homogeneous(robots)
+        return Team.homogeneous(robot_count)
     if not isinstance(team, Team):
         raise ParameterError(f"team: expected a Team, got {quote(team)}")
-    if len(team) != robots:
-        raise ParameterError(f"team: expected {robots} robots, one for each start, got {len(team)}")
+    if len(team) != robot_count:
+        raise ParameterError(f"team: expected {robot_count} robots, one for each start, got {len(team)}")
     return team
 
 
-def check_conditions(conditions: Any, robots: int) -> Conditions | None:
+def check_conditions(conditions: Any, robot_count: int) -> Conditions | None:
     """Check conditions. Return None if they are ideal, and otherwise the conditions.
 
     Parameters
     ----------
     conditions : Conditions or None
-    robots : int
+    robot_count : int
 
     Returns
     -------
@@ -104,7 +104,7 @@ def check_conditions(conditions: Any, robots: int) -> Conditions | None:
         return None
     if not isinstance(conditions, Conditions):
         raise ParameterError(f"conditions: expected Conditions, got {quote(conditions)}")
-    conditions.check_team(robots)
+    conditions.check_team(robot_count)
     return None if conditions.is_ideal else conditions
 
 

@@ -59,6 +59,7 @@ class ControllerCaller:
         self._informed_controller: Controller = self._call(
             time, inform_controller, team_controller, environment
         )
+        # In a user's controller, `scanning` may be a property that fails.
         self.scanning: Scanning | None = self._call(time, getattr, team_controller, "scanning", None)
         if not isinstance(self.scanning, Scanning | None):
             raise ParameterError(

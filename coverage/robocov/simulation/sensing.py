@@ -6,7 +6,6 @@ from robocov.environment import Environment
 from robocov.observation import Observations, Scanning, Scans
 from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
-from robocov.team import Team
 from robocov.world import ChangingWorld, World
 
 
@@ -14,7 +13,6 @@ def build_observations(
     world: World | ChangingWorld,
     sensor: RangeSensor,
     environment: Environment,
-    team: Team,
     neighbors: Neighbors,
     time: float,
     scanning: Scanning | None,
@@ -26,7 +24,6 @@ def build_observations(
     world : World or ChangingWorld
     sensor : RangeSensor
     environment : Environment
-    team : Team
     neighbors : Neighbors
         The communication graph.
     time : float, s
@@ -37,6 +34,7 @@ def build_observations(
     -------
     Observations
     """
+    team = world.team
     scans = None
     if scanning is not None:
         distances, is_hit = sensor.scan(world.positions, scanning.rays, team.sensing_range)

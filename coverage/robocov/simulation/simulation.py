@@ -121,9 +121,9 @@ class Simulation:
         check_dt(dt)
         state = to_team_state(starts)
         self.environment = environment
-        self.team = check_team(team, robots=len(state))
+        self.team = check_team(team, robot_count=len(state))
         self.dt = dt
-        self.conditions = check_conditions(conditions, robots=len(state))
+        self.conditions = check_conditions(conditions, robot_count=len(state))
         self.joined: tuple[JoinedRobot, ...] = ()
         self.decision_time = 0.0
         self.sent_bytes = 0
@@ -282,9 +282,9 @@ class Simulation:
         """
         if self._snapshot is None:
             knowledge = self._get_knowledge()
-            started = process_time()
+            start_time = process_time()
             decision = self._caller.decide(knowledge.observations, self.memory)
-            self.decision_time += process_time() - started
+            self.decision_time += process_time() - start_time
             if self._perception is None:
                 self._snapshot = Snapshot(knowledge.observations, decision)
             else:
@@ -318,7 +318,6 @@ class Simulation:
             world=self._world,
             sensor=self.sensor,
             environment=self.environment,
-            team=self.team,
             neighbors=neighbors,
             time=self.time,
             scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,

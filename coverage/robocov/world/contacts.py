@@ -54,6 +54,7 @@ class FreeSpace:
         self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, team_count: int = 1
     ) -> None:
         space, movers = build_obstacle_space(obstacles)
+        # This space only detects contacts: it does not resolve them, and forgets them after a step.
         space.iterations = 1
         space.collision_persistence = 1
         space.collision_bias = 1.0  # Overlaps are never pushed apart.
@@ -233,27 +234,24 @@ class ContactSolver:
     ) -> None:
         """Run substeps of `dt` seconds each, all under the same forces."""
         for _ in range(substeps):
-            positions = self._list_positions(members)
             self._arrays.write_forces()
-            self._space.step(dt)
-            if self._movers:
-                self._keep_out_of_walls(members, positions)
+            self._run_substep(members, dt)
 
     def _finish_corrections(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
         """Apply the overlap corrections that pymunk has computed but not yet applied, and read the states."""
         self._arrays.states[:, 2:] = 0.0
         self._arrays.write_states()
-        positions = self._list_positions(members)
-        self._space.step(dt)
-        if self._movers:
-            self._keep_out_of_walls(members, positions)
+        self._run_substep(members, dt)
         self._arrays.read_states()
 
-    def _list_positions(self, members: list[tuple[pymunk.Body, pymunk.Circle]]) -> list[pymunk.Vec2d]:
-        """Return the positions of robots, or an empty list if nothing can push them into a wall."""
+    def _run_substep(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
+        """Run a substep; afterwards, no robot is in a wall into which a moving obstacle has pushed it."""
         if not self._movers:
-            return []
-        return [body.position for body, _ in members]
+            self._space.step(dt)
+            return
+        old_positions = [body.position for body, _ in members]
+        self._space.step(dt)
+        self._keep_out_of_walls(members, old_positions)
 
     def _keep_out_of_walls(
         self, members: list[tuple[pymunk.Body, pymunk.Circle]], old_positions: list[pymunk.Vec2d]

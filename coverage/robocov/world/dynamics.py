@@ -96,7 +96,7 @@ def compute_net_forces(forces: Array, velocities: Array, response: MotionRespons
     velocities : (n, 2) array, m/s
     response : MotionResponse
     external : (n, 2) or (0, 2) array, N
-        Further forces, to which no limits apply.
+        Further forces, to which no limits apply; empty if there are none.
 
     Returns
     -------

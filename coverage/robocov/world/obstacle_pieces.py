@@ -186,10 +186,10 @@ def _merge_loops(loops: list[Loop]) -> list[Loop]:
 
 def _unite_if_convex(first: Loop, second: Loop, a: Point, b: Point) -> Loop | None:
     """Return the union of two loops across the edge a→b of `first`, or None if it is not convex."""
-    from_b = first.index(b)
-    from_a = second.index(a)
-    b_to_a = first[from_b:] + first[:from_b]
-    a_to_b = second[from_a:] + second[:from_a]
+    index_of_b = first.index(b)
+    index_of_a = second.index(a)
+    b_to_a = first[index_of_b:] + first[:index_of_b]
+    a_to_b = second[index_of_a:] + second[:index_of_a]
     is_convex_at_a = _compute_doubled_area(b_to_a[-2], a, a_to_b[1]) > 0.0
     is_convex_at_b = _compute_doubled_area(a_to_b[-2], b, b_to_a[1]) > 0.0
     if is_convex_at_a and is_convex_at_b:

@@ -25,10 +25,10 @@ Guarantees:
   moves as a point and keeps its heading. When it is released, its wheels stop the sideways part of its
   velocity.
 
-Freedom from contact is not guaranteed. A point turns its velocity by up to max_acceleration / v, which at low
-speed is more than the turning rate; a unicycle brakes instead, but keeps moving straight ahead meanwhile. A
-proof that a controller avoids all contact, such as that of safety barrier certificates, therefore holds for
-points alone. For unicycles it is tested on maps, not proven.
+Unicycles may come into contact where points would not. A point turns its velocity by up to
+max_acceleration / v, which at low speed is more than the turning rate; a unicycle brakes instead, but keeps
+moving straight ahead meanwhile. A proof that a controller avoids all contact, such as that of safety barrier
+certificates, therefore holds only for points. For unicycles it is tested on maps, not proven.
 """
 
 import math

@@ -31,6 +31,7 @@ MAX_MASS_RATIO = 1000.0
 """Largest ratio of the masses of two robots; beyond it contacts cannot be resolved."""
 
 _NO_FORCES = np.zeros((0, 2))
+"""External forces of a step without any."""
 _ROUNDING = 1e-9
 """Tolerance of the number of substeps for rounding errors."""
 
@@ -85,7 +86,7 @@ class World:
     -----
     In each step the controllers' forces, the viscous term of (28) and the kinematic limits are combined into
     the net forces that pymunk integrates. Contacts are resolved by pymunk, in substeps fine enough that no
-    robot sinks into a standing wall or another robot by more than `contacts.MAX_PENETRATION`. A step depends
+    robot sinks into a static wall or another robot by more than `contacts.MAX_PENETRATION`. A step depends
     on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
 
     Moving obstacles keep to their path and push robots aside. They may press a robot deeper into a wall, by
@@ -129,7 +130,6 @@ class World:
         self._is_unicycle = team.is_unicycle
         self._max_team_speed = float(team.max_speed.max())
         self._min_radius = float(team.radius.min())
-        self._runs = runs
         self._team_size = len(team) // runs
         self._may_exceed_max_speed = velocities is not None
         if velocities is None:
@@ -138,6 +138,7 @@ class World:
         self._set_state(
             np.array(positions, dtype=float), velocities, initialize_steering(team, velocities, steering)
         )
+        # Each substep sets the states of moving obstacles first; the values before do not matter.
         self._mover_states = compute_mover_states(obstacles.movers, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan

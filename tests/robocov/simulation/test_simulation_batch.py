@@ -198,5 +198,5 @@ def test_each_record_has_its_own_seed() -> None:
 def test_obstacles_of_a_batch_stand_still() -> None:
     cart = CircleObstacle((2, 1), 0.6, "cart", ObstaclePath(((2, 1), (8, 1)), 0.5))
     busy = Environment("busy", ((0, 0), (10, 0), (10, 6), (0, 6)), (cart,))
-    with pytest.raises(ParameterError, match="environment: expected obstacles that stand still"):
+    with pytest.raises(ParameterError, match="environment: expected a map without moving obstacles"):
         SimulationBatch(busy, Rapf(), [[[4.0, 4.0]]])
