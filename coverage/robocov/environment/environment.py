@@ -163,7 +163,7 @@ class Environment(Drawable):
 
     @cached_property
     def free_masses(self) -> Array:
-        """Integral of φ over each component of the free space, m²: their areas without a density."""
+        """Integral of φ over each component of the free space, m²: the area if there is no density."""
         components = self.free.geoms
         if self.density is None:
             return freeze([component.area for component in components])

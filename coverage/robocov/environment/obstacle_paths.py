@@ -26,8 +26,8 @@ _PARALLEL_TOLERANCE_M2 = 1e-12
 class ObstaclePath:
     """A polyline along which an obstacle moves at constant speed, without turning.
 
-    A point moves along the polyline and is at the first of `points` at time zero. The obstacle starts at its
-    position in the map and is always displaced by as much as the point.
+    A point moves along the polyline, from the first of `points` at time zero. The obstacle is displaced from
+    its position in the map by as much as the point from its start.
 
     Attributes
     ----------
@@ -109,7 +109,10 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 
 
 def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
-    """Return the Minkowski sum of a polygon and a line: both end positions and what the edges sweep."""
+    """Return the area that a polygon sweeps while its displacement changes from `start` to `end`.
+
+    It consists of the polygon at both ends, and of the parallelograms that its edges sweep.
+    """
     pieces: list[BaseGeometry] = []
     motion = end - start
     for ring in (polygon.exterior, *polygon.interiors):
@@ -117,10 +120,10 @@ def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
         first = corners[:-1]
         second = corners[1:]
         edges = second - first
-        quadrilaterals = np.stack([first + start, second + start, second + end, first + end], axis=1)
+        parallelograms = np.stack([first + start, second + start, second + end, first + end], axis=1)
         cross_products = edges[:, 0] * motion[1] - edges[:, 1] * motion[0]
         is_parallel = np.abs(cross_products) < _PARALLEL_TOLERANCE_M2
-        pieces += shapely.polygons(quadrilaterals[~is_parallel]).tolist()
+        pieces += shapely.polygons(parallelograms[~is_parallel]).tolist()
     for displacement in (start, end):
         pieces.append(shapely.transform(polygon, lambda points, by=displacement: points + by))
     return shapely.union_all(pieces)

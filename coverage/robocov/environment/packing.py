@@ -45,6 +45,8 @@ def compute_max_points(area: BaseGeometry, spacing: float) -> int:
     -------
     int
     """
+    # Discs of diameter `spacing` around the points lie in the buffered area. No packing of the plane is
+    # denser than the hexagonal lattice; in a small area, one more disc may fit.
     return 1 + int(area.buffer(spacing / 2).area / (spacing**2 * _ROW_SPACING))
 
 
@@ -99,6 +101,7 @@ def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: f
     rng : numpy.random.Generator
     area : geometry, m
     n : int
+        Maximum number of points.
     spacing : float, m
         Smallest distance between two points.
 
@@ -141,13 +144,17 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
 
 
 def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n points of a hexagonal lattice, the best of several random positions and orientations.
+    """Choose up to n points of a hexagonal lattice with a random position and orientation.
+
+    Several positions and orientations are tried, until one has n points in the area. If none does, the result
+    is that with the most points.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     area : geometry, m
     n : int
+        Maximum number of points.
     spacing : float, m
         Smallest distance between two points.
 

@@ -20,7 +20,7 @@ MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
 _MAX_CRACK_M = 2 * MAX_SAGITTA_M
 """Walls closer than this count as touching, because the polygon of a touching circle may leave a crack."""
 _FUSED_CRACK_M = 1e-9
-"""Width that is left of a closed crack, so that walls do not touch in a single point."""
+"""Remaining width of a closed crack, so that walls do not touch in a single point."""
 _MITRE_LIMIT = 100.0
 """Corners of less than about a degree are cut off."""
 _CORNERS_AT_ONCE = 256
@@ -140,7 +140,7 @@ class _Candidates(NamedTuple):
 
 
 class _PassageSearch:
-    """The edges of a free space, which lies to the left of each, and the search for passages among them.
+    """Search for passages between the edges of a free space, which lies to the left of each edge.
 
     As a disc grows, it can reach the same points along the same routes until its diameter exceeds the width
     of a gap. At a gap, two wall points face each other, and the disc whose diameter is the segment between
@@ -156,10 +156,11 @@ class _PassageSearch:
         all_rings = shapely.get_rings(shapely.get_parts(self.free))
         rings = [shapely.get_coordinates(ring)[:-1] for ring in all_rings]
         sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
+        # The ring, the start and the end of each edge.
         self._ring = np.repeat(np.arange(len(rings)), sizes)
         self._start = np.concatenate([np.empty((0, 2)), *rings])
         self._end = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
-        # The edges of ring r are those from `_first[r]` until `_stop[r]`.
+        # The edges of ring r are `_first[r]` to `_stop[r] - 1`.
         self._stop = np.cumsum(sizes)
         self._first = self._stop - sizes
         # The edge that ends where each edge starts.

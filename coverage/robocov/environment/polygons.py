@@ -35,7 +35,7 @@ def find_overlaps(
     area : geometry, m
     others : mapping of name to geometry, m
     container : geometry or None, m
-        Area that should contain the first one.
+        Area that should contain `area`.
 
     Returns
     -------

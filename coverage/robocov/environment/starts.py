@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import TypeAlias
@@ -11,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, Point, Ring, compute_lengths
+from robocov.arrays import Array, Point, compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
     choose_points,
@@ -101,7 +102,7 @@ class PointsStart:
            [2., 1.]])
     """
 
-    positions: Ring
+    positions: tuple[Point, ...]
 
 
 StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
@@ -230,7 +231,7 @@ class Start:
             f"Try {', '.join(suggestions)} or another map."
         )
 
-    def _take_given_positions(self, n: int, radius: float, positions: Ring) -> Array:
+    def _take_given_positions(self, n: int, radius: float, positions: Sequence[Point]) -> Array:
         if n > len(positions):
             raise self._build_error(
                 f"expected at most {format_count(len(positions), 'robot')}, one for each of its positions, "

@@ -69,7 +69,7 @@ def read_arrays(file: BinaryIO, where: str, max_bytes: int = MAX_BYTES) -> dict[
     Raises
     ------
     InputError
-        If the file is damaged or too large, contains an entry twice, or Python objects.
+        If the file is damaged or too large, or contains duplicate entries or Python objects.
     """
     try:
         file_size = file.seek(0, io.SEEK_END)
@@ -113,10 +113,10 @@ class _LimitedReader:
 
 
 class ArrayCache:
-    """A folder of cached arrays, whose files are named by what the arrays were computed from.
+    """A folder of cached arrays, whose keys identify the inputs of the computation.
 
-    An entry that is damaged, not private or unreadable counts as missing, and one that cannot be written is
-    not written. Any number of processes may use a folder at the same time.
+    An entry that is damaged, not private or unreadable counts as missing, and errors on writing are ignored.
+    Any number of processes may use a folder at the same time.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ _EXPECTED_BY_ERROR_TYPE = {
 
 
 class Document(BaseModel):
-    """An object in a file of results: known keys are checked strictly, unknown ones are kept unread."""
+    """An object in a file of results: known keys are checked strictly, unknown ones are not checked."""
 
     model_config = ConfigDict(extra="allow", strict=True)
 

@@ -115,7 +115,7 @@ def find_line_and_column(text: str, offset: int) -> tuple[int, int]:
     Returns
     -------
     line, column : int
-        Counted from 1; a column is a character.
+        Counted from 1, the column in characters.
 
     Examples
     --------

@@ -86,6 +86,17 @@ _SIGNATURE_BYTES = 4096
 class ResultFolder:
     """A folder whose result is being written; see `create_result` and `extend_result`.
 
+    Parameters
+    ----------
+    path : Path
+        The folder; it must exist.
+    owned_files : set of str
+        Files of the result in the folder, which may be replaced.
+    replaces : bool
+        Whether the first commit removes the files of the earlier result that are not replaced.
+    part : str
+        Name of the run to which files are added, in the folder of a comparison.
+
     Attributes
     ----------
     path : Path
@@ -326,7 +337,7 @@ def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
 
 
 def _require_result_file(name: str) -> None:
-    """Raise ValueError unless a path, relative to the folder of a result, is that of one of its files.
+    """Raise ValueError unless a relative path may be that of a file in the folder of a result.
 
     Without this check, a manifest from an untrusted source could make robocov replace or remove any file.
     """
@@ -469,7 +480,7 @@ def _list_parts(folder: Path) -> list[Path]:
 
 
 def _has_signature(path: Path, name: str) -> bool:
-    """Return whether a file starts like the files of the given name that robocov writes."""
+    """Return whether a file begins with the signature of the files that robocov writes under a name."""
     try:
         if not path.is_file():
             return False
@@ -493,12 +504,12 @@ def _require_replaceable(folder: Path, name: str, owned_files: set[str]) -> None
 
 
 def _resolve_inside(folder: Path, name: str) -> Path:
-    """Return the path of a file in a folder; raise an error if a link or a file is in the way."""
+    """Return the path of a file in a folder; raise an error if a parent is a link or not a folder."""
     path = folder
     for step in name.split("/")[:-1]:
         path /= step
         if path.is_symlink():
             raise OutputError(f"{path}: is a link, which is not followed; choose another --out")
         if os.path.lexists(path) and not path.is_dir():
-            raise OutputError(f"{path}: is in the way of a folder; choose another --out")
+            raise OutputError(f"{path}: is in the way, expected a folder; choose another --out")
     return folder / name

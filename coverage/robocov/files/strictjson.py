@@ -102,8 +102,8 @@ def parse_json(text: str | bytes, where: str) -> Any:
     Raises
     ------
     MapError
-        With line and column, if the text is not UTF-8 or not JSON, contains a number that is not finite or a
-        key twice in one object, or is too large or nested too deeply.
+        With line and column, if the text is not UTF-8 or not JSON, contains a number that is not finite or
+        duplicate keys in an object, or is too large or nested too deeply.
 
     Examples
     --------

@@ -128,7 +128,7 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     where : str
         Name of the file in messages.
     folder : Path or None
-        Folder of pictures that the map names.
+        Folder of the pictures to which the map refers.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def from_json(document: dict[str, Any], where: str = "map", folder: Path | None 
     where : str
         Name of the document in messages.
     folder : Path or None
-        Folder of pictures that the map names.
+        Folder of the pictures to which the map refers.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
     where : str
         Name of the map in messages.
     folder : Path or None
-        Folder of the picture that the density may name.
+        Folder of the picture to which the density may refer.
 
     Returns
     -------
@@ -207,13 +207,15 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
     density = None
     if model.density is not None:
         density = _build_density(model.density, boundary, folder, where)
+    # A copy with plain dicts, which does not share mutable objects with the document.
+    extra = json.loads(json.dumps(model.extra))
     environment = Environment(
         name=model.name,
         boundary=boundary,
         obstacles=tuple(obstacle.build() for obstacle in model.obstacles),
         starts={name: start.build() for name, start in model.starts.items()},
         description=model.description,
-        extra=json.loads(json.dumps(model.extra)),
+        extra=extra,
         schema=model.schema_,
         density=density,
     )
@@ -222,9 +224,10 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
 
 
 def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
-    """Return the density that a model describes; a raster without an extent covers the boundary's box.
+    """Return the density that a model describes.
 
-    The folder is that of the map and its picture; None if the map did not come from a file.
+    A raster without an extent covers the bounding box of the boundary. The folder is that of the map and its
+    picture; None if the map did not come from a file.
     """
     if not isinstance(model, RasterModel):
         return model.build()

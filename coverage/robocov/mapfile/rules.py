@@ -202,7 +202,10 @@ def _find_room_mistakes(
 
 
 def _fits_at_disc_center(environment: Environment, start: DiscStart | UniformStart) -> bool:
-    """Return whether a robot fits at the center of a start disc, which is faster to check than sampling."""
+    """Return whether a robot fits at the center of a start disc, which is faster to check than sampling.
+
+    For a uniform start, the discs of all other starts are checked: a robot that fits there fits in the map.
+    """
     starts = [start] if isinstance(start, DiscStart) else environment.starts.values()
     centers = [disc.center for disc in starts if isinstance(disc, DiscStart)]
     points = shapely.points(np.reshape(centers, (-1, 2)))

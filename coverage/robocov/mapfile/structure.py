@@ -122,6 +122,7 @@ def _build_member_mistake(path: list[int | str], detail: ErrorDetails, model: ty
     """Return the mistake in a member of an object with a model, by its path in the file."""
     if detail["type"] == "extra_forbidden":
         return _build_unknown_key_mistake(path, model)
+    # The steps after the last key are indices in nested lists, such as 2 and 0 in vertices[2][0].
     last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
     nesting_depth = len(path) - 1 - last_key
     expected = _EXPECTED[str(path[last_key])][nesting_depth]

@@ -1,7 +1,7 @@
 """Metrics of recorded runs.
 
 - `cost_history`: the coverage cost along a run
-- `settling`: the rule by which a team has settled, and when it did
+- `settling`: whether a team is at rest, and when it came to rest
 - `motion`: path lengths and stuck robots
 - `clearance`: distances to walls and other robots, and contacts
 - `summary`: the summary of a run in ``run.json``

@@ -1,4 +1,4 @@
-"""Settling of a team: the rule by which it is at rest, and when it came to rest."""
+"""Settling of a team: whether it is at rest, and when it came to rest."""
 
 from __future__ import annotations
 

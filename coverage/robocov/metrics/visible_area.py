@@ -16,12 +16,18 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.angular_index import NO_SPACE, AngularWallIndex, compute_pseudo_angle, index_walls
+from robocov.geodesic.angular_index import (
+    NO_ENTRY,
+    NO_SPACE,
+    AngularWallIndex,
+    compute_pseudo_angle,
+    index_walls,
+)
 from robocov.geodesic.grid import Grid
-from robocov.geodesic.walls import END_X, END_Y, START_X, START_Y, Walls, build_walls
+from robocov.geodesic.walls import END_X, END_Y, NO_WALL, START_X, START_Y, Walls, build_walls
 
 _BINS = 512
-"""Angular bins of a robot's view."""
+"""Angular bins of a robot's view, a power of 2."""
 _INITIAL_ENTRIES_PER_BIN = 64
 """Initial size of the index of walls, per bin. It is doubled whenever it is too small."""
 _QUARTER_SEGMENTS = 128
@@ -166,10 +172,10 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position:
     wall = np.empty(len(start), dtype=np.int64)
     rays = np.column_stack([np.cos(middle), np.sin(middle)])
     _find_nearest_walls(walls.ends, index, rays, wall)
-    is_blocked = wall >= 0
-    start = start[is_blocked]
-    end = end[is_blocked]
-    wall = wall[is_blocked]
+    is_bounded = wall != NO_WALL
+    start = start[is_bounded]
+    end = end[is_bounded]
+    wall = wall[is_bounded]
     # Successive sectors with the same wall become one.
     first = np.flatnonzero(wall != np.roll(wall, 1))
     last = np.roll(first, -1) - 1
@@ -178,16 +184,16 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position:
 
 @kernel
 def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
-    """Write the index of the wall that each of (m, 2) rays from the source hits first, -1 for none."""
+    """Write the index of the wall that each of (m, 2) rays from the source hits first, or `NO_WALL`."""
     for m in range(len(rays)):
         x = rays[m, 0]
         y = rays[m, 1]
-        nearest[m] = -1
+        nearest[m] = NO_WALL
         min_distance = np.inf
         # The pseudo-angle of a full turn is 4.
         unwrapped_bin = int(compute_pseudo_angle(x, y) * (_BINS * 0.25))
         entry = index.head[0, unwrapped_bin & (_BINS - 1)]
-        while entry >= 0:
+        while entry != NO_ENTRY:
             wall = index.entry_wall[entry]
             # From the source to the first end a, and from there along the wall u.
             ax = ends[wall, START_X] - index.positions[0, 0]
@@ -212,5 +218,6 @@ def _intersect(walls: Array, angles: Array) -> Array:
     starts = walls[:, [START_X, START_Y]]
     along = walls[:, [END_X, END_Y]] - starts
     determinant = x * along[:, 1] - y * along[:, 0]
+    # On a wall that is parallel to its ray, s is 0, which is the start of the wall.
     s = (starts[:, 0] * y - starts[:, 1] * x) / np.where(determinant == 0.0, np.inf, determinant)
     return np.asarray(starts + s.clip(0.0, 1.0)[:, None] * along)
