@@ -171,12 +171,12 @@ def _hide_links(observations: Observations, robot: int) -> Observations:
     first, second = neighbors.list_pairs()
     is_known_link = first == robot
     if observations.reported_positions is None:
-        is_heard = np.zeros(neighbors.count, dtype=bool)
+        is_heard = np.zeros(neighbors.robot_count, dtype=bool)
         is_heard[neighbors.indices[start:stop]] = True
         is_heard[robot] = True
         is_known_link = is_heard[first] & is_heard[second]
     links = Neighbors.from_pairs(
-        neighbors.count, first[is_known_link], second[is_known_link], neighbors.ranges
+        neighbors.robot_count, first[is_known_link], second[is_known_link], neighbors.ranges
     )
     hidden = replace(observations, neighbors=links)
     if observations.reported_positions is not None:

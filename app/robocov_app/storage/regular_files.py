@@ -17,6 +17,6 @@ def require_regular_file(path: Path) -> None:
     except (OSError, ValueError) as error:
         raise MapError(f"{to_one_line(path)}: cannot be read: {describe_error(error)}") from None
     if is_broken_link:
-        raise MapError(f"{to_one_line(path)}: expected a file, got a link to nothing")
+        raise MapError(f"{to_one_line(path)}: expected a file, got a broken link")
     if exists and not is_file:
         raise MapError(f"{to_one_line(path)}: expected a file, got a pipe or a device")

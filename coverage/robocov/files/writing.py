@@ -84,14 +84,14 @@ def resolve_target(target: Path) -> Path:
     Raises
     ------
     OutputError
-        If it is not a regular file, or a link to nothing, or cannot be accessed.
+        If it is not a regular file, or a broken link, or cannot be accessed.
     """
     try:
         real_target = target.resolve(strict=True) if target.is_symlink() else target
         mode = real_target.stat().st_mode
     except FileNotFoundError as error:
         if target.is_symlink():
-            raise _build_error(target, "expected a file, got a link to nothing") from error
+            raise _build_error(target, "expected a file, got a broken link") from error
         return target
     except (OSError, RuntimeError, ValueError) as error:
         # Before Python 3.13, circular links raise RuntimeError.

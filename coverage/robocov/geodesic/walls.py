@@ -43,7 +43,7 @@ OUTGOING_Y = 3
 """Column of the same arrays: y of the direction of the outgoing wall."""
 
 NO_WALL = -1
-"""Used in place of the following wall unless there is exactly one."""
+"""Used in place of a wall where there is none, and of the following wall unless there is exactly one."""
 NO_VERTEX = -1
 """Returned instead of a vertex if a point does not coincide with any."""
 

@@ -56,7 +56,7 @@ def count_starts(point_count: int) -> int:
     Returns
     -------
     int
-        Two more than the largest possible number of bins, rounded up.
+        At least two more than the largest possible number of bins.
     """
     # The bounding box of n points has w x h bins, apart from the last row and column, with w * h <= n and
     # max(w, h) <= n (see `sort_into_bins`). Therefore w + h <= n + 1, and (w + 1) * (h + 1) <= 2 n + 2.

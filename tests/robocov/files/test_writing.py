@@ -65,7 +65,7 @@ def test_links_and_permissions_are_kept(tmp_path: Path) -> None:
 @posix
 @pytest.mark.parametrize(
     ("target", "message"),
-    [("nowhere", "expected a file, got a link to nothing"), ("link", "cannot be written")],
+    [("nowhere", "expected a file, got a broken link"), ("link", "cannot be written")],
 )
 def test_broken_links_are_rejected(tmp_path: Path, target: str, message: str) -> None:
     (tmp_path / "link").symlink_to(tmp_path / target)

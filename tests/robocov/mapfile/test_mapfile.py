@@ -355,7 +355,7 @@ def test_links_are_kept_when_saving(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "m.json"
     link.symlink_to(tmp_path / "there" / "real.json")
-    with pytest.raises(OutputError, match="expected a file, got a link to nothing"):
+    with pytest.raises(OutputError, match="expected a file, got a broken link"):
         save_map(from_json(DOCUMENT), link)
     (tmp_path / "there" / "real.json").touch()
     save_map(from_json(DOCUMENT), link)

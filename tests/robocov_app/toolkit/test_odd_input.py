@@ -59,12 +59,12 @@ def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path)
     os.mkfifo(pipe)
     link.symlink_to(link)
     with open_viewer(tmp_path / "viewer") as driver:
-        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
+        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a broken link")):
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
             assert expected in driver.viewer.message
     with open_editor(tmp_path) as driver:
-        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
+        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a broken link")):
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
             assert expected in driver.message
