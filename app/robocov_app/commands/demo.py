@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -116,7 +117,7 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
     file: Path | None = None
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
-        session, map_name = _load_session(file, controllers)
+        session, map_name = _load_session(file, controllers, at_once=options.is_headless)
         if options.serve and not file.resolve().is_relative_to(options.folder.resolve()):
             # The session is saved to another file, in the folder that may be written to.
             file = None
@@ -142,13 +143,17 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
     )
 
 
-def _load_session(file: Path, controllers: tuple[str, ...]) -> tuple[Session, str]:
-    """Load a session, and return it with the name of its map."""
+def _load_session(file: Path, controllers: tuple[str, ...], *, at_once: bool) -> tuple[Session, str]:
+    """Load a session, and return it with the name of its map.
+
+    Unless it is recomputed at once, the window does so while it is open already.
+    """
     from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
 
     saved = load_session(file, controllers)
-    return Session.open(saved), str(saved.view.get("map") or "")
+    seconds = math.inf if at_once else 0.0
+    return Session.open(saved, seconds), str(saved.view.get("map") or "")
 
 
 def build_session(options: Arguments) -> Session:

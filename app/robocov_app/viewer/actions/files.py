@@ -155,7 +155,8 @@ class FileActions:
     def open_session(self, path: Path) -> None:
         """Open a session file in place of the present session."""
         saved = load_session(path, self._viewer.controllers)
-        workspace = SessionWorkspace(Session.open(saved), self._draft_folder, path)
+        seconds = self._viewer.session.playback.seek_seconds
+        workspace = SessionWorkspace(Session.open(saved, seconds), self._draft_folder, path)
         self._replace_workspace(workspace, saved.view)
         self._add_recent(path)
         self._viewer.show_message(f"session opened: {path}")
@@ -167,7 +168,8 @@ class FileActions:
             if not drafts:
                 return "no unsaved work was found"
             draft = drafts[0]
-        workspace, view = recover_draft(draft, self._viewer.controllers, self._draft_folder)
+        seconds = self._viewer.session.playback.seek_seconds
+        workspace, view = recover_draft(draft, self._viewer.controllers, self._draft_folder, seconds)
         self._replace_workspace(workspace, view)
         return f"recovered: {describe_draft(draft)}"
 
@@ -181,7 +183,11 @@ class FileActions:
         self.workspace = workspace
         self._viewer.inspection.selected = None
         self._viewer.show_session(workspace.session)
-        self.map_name = str(view.get("map") or self._viewer.session.displayed.environment.name)
+        # The session may still be on the way to its present, which is on another map than its start.
+        timeline = workspace.session.timeline
+        root = timeline.document.get_path(timeline.destination[0])[0]
+        environment_name = root.require_scenario().environment.name
+        self._map_names[environment_name] = str(view.get("map") or environment_name)
         layers = view.get("shown")
         if isinstance(layers, list):
             self._viewer.view.layers = set(map(str, layers))

@@ -110,7 +110,8 @@ class PlaybackActions:
         """Go to the end of the next branch, or of another one in the list."""
         session = self._viewer.session
         ends = [branch.node for branch in session.timeline.document.list_branches()]
-        index = ends.index(session.timeline.head) if session.timeline.head in ends else -1
+        head, _ = session.timeline.destination
+        index = ends.index(head) if head in ends else -1
         self.enter_node(ends[(index + steps) % len(ends)].number)
 
     def enter_node(self, number: int) -> None:
@@ -126,7 +127,9 @@ class PlaybackActions:
         session = self._viewer.session
         description = session.undo()
         if description:
-            self._viewer.show_message(f"undone: {description}; back at {session.displayed.time:.1f} s")
+            _, step = session.timeline.destination
+            time = step * session.timeline.scenario.dt
+            self._viewer.show_message(f"undone: {description}; back at {time:.1f} s")
         elif session.timeline.document.nodes[1:]:
             self._viewer.show_message("nothing to undo; Alt ← leads to other branches")
         else:

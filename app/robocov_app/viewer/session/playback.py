@@ -8,8 +8,6 @@ from robocov_app.viewer.session.timeline import Timeline
 
 SEEK_SLICE_S = 0.03
 """Computing time in each frame for building another state of the session."""
-FIRST_SEEK_SLICES = 4
-"""Number of such slices that are spent at once when another state is requested."""
 
 
 class Playback:
@@ -41,7 +39,7 @@ class Playback:
         """Time that `Timeline.seek` may take at once, s."""
         if np.isinf(self.clock.budget):
             return np.inf
-        return FIRST_SEEK_SLICES * SEEK_SLICE_S
+        return SEEK_SLICE_S
 
     def advance(self, seconds: float) -> int:
         """Let time pass.

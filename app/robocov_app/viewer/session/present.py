@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -86,7 +86,7 @@ def build_present(
     node: Node,
     step: int,
     edit: Callable[[Lockstep], None] | None = None,
-) -> Generator[None, None, Present]:
+) -> Generator[float, None, Present]:
     """Build the state at a step of a node. The old present stays as it is.
 
     Parameters
@@ -104,8 +104,8 @@ def build_present(
 
     Yields
     ------
-    None
-        After each simulated step, so that a caller can pause.
+    float
+        Fraction of the steps that are done, after each of them, so that a caller can pause.
 
     Returns
     -------
@@ -125,13 +125,16 @@ def build_present(
         run = start.run
         history = start.history
     since = next(ancestor for ancestor in path if ancestor.number == history.last.node)
+    first_step = run.step
+    step_count = max(step - first_step, 1)
     for _, current in replay(document, node, step, run, since):
         if (run.step, current.number) != (history.last.step, history.last.node):
             history.amend(run.build_state(current.number))
-        yield
+        yield (run.step - first_step) / step_count
     cache_present(document, old)
     new = Present(node, run, history)
-    _restore_panes(document, old, new)
+    for _ in _restore_panes(document, old, new):
+        yield 1.0
     if edit is not None:
         edit(run)
     return new
@@ -216,8 +219,8 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
     return history
 
 
-def _restore_panes(document: SessionDocument, old: Present, new: Present) -> None:
-    """Rebuild the trails, curves and sensed points of the panes of a new present."""
+def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Iterator[None]:
+    """Rebuild the trails, curves and sensed points of the panes of a new present, a piece at a time."""
     path = document.get_path(new.head)
     last_steps = document.get_last_steps(new.head, new.run.step)
     old_last_step = document.get_last_steps(old.head, old.run.step).get(new.head.number, -1)
@@ -233,11 +236,11 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Non
             pane.sensed = old_panes[pane.number].sensed.copy()
             pane.sensed.remove_after(new.run.time)
         elif new.run.step > 0:
-            pane.sensed = _rebuild_sensed_points(new.history, pane)
+            yield from _rebuild_sensed_points(new.history, pane)
 
 
-def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> SensedPoints:
-    """Sense again at some of the recorded states."""
+def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Iterator[None]:
+    """Sense again at some of the recorded states, one at a time."""
     sensed = SensedPoints()
     stride = max(1, len(history) // MAX_SENSED_STATES)
     for index in range(0, len(history), stride):
@@ -248,4 +251,5 @@ def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> SensedPoints:
         sensor.set_time(time)
         points = sensor.find_nearest_points(state.positions, setup.team.sensing_range)
         sensed.add(time, setup.numbers, points)
-    return sensed
+        yield
+    pane.sensed = sensed

@@ -117,12 +117,24 @@ class Session:
         self._gesture: _Gesture | None = None
 
     @classmethod
-    def open(cls, saved: SavedSession) -> Self:
-        """Recompute the session of a file up to its present. It is paused."""
+    def open(cls, saved: SavedSession, seconds: float = np.inf) -> Self:
+        """Recompute the session of a file up to its present. It is paused.
+
+        Parameters
+        ----------
+        saved : SavedSession
+            Content of the file.
+        seconds : float, s
+            Time that the call may take. If it is not enough, playback does the rest.
+
+        Returns
+        -------
+        Session
+        """
         root = saved.document.get_path(saved.head)[0]
         session = cls(timeline=Timeline(saved.document, Present.start(root)))
         session.playback.is_playing = False
-        session.timeline.seek(saved.head, saved.step)
+        session.timeline.seek(saved.head, saved.step, seconds=seconds)
         return session
 
     def apply(self, edit: RunEdit, kind: str, description: str, gesture: object = None) -> None:
@@ -243,7 +255,7 @@ class Session:
         str or None
             Description of the edit; None if there is none.
         """
-        node = self.timeline.head
+        node, _ = self.timeline.destination
         if node.parent is None:
             return None
         node.parent.redo = node
@@ -258,7 +270,7 @@ class Session:
         str or None
             Description of the edit; None if there is none.
         """
-        node = self.timeline.head.redo
+        node = self.timeline.destination[0].redo
         if node is None:
             return None
         self.seek(node)

@@ -17,6 +17,8 @@ from robocov_app.viewer.session.present import Present, build_present, cache_pre
 from robocov_app.viewer.session.scenario import SessionScenario
 
 STEPS_BETWEEN_SETTLED_CHECKS = 12
+MIN_NOTICED_SEEK_S = 0.3
+"""Time after which the progress of a seek is shown."""
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -74,7 +76,10 @@ class Timeline:
         self.record_end_time = record_end_time
         self.is_record_reproducible = is_record_reproducible
         self.past_version = 0
-        self._seeking: Generator[None, None, Present] | None = None
+        self._seeking: Generator[float, None, Present] | None = None
+        self._destination = (document.nodes[0], 0)
+        self._seek_start_s = 0.0
+        self._seek_fraction = 0.0
         self._followed_path: list[Node] = []
         self.replace_present(present or Present.start(document.nodes[0]))
 
@@ -129,6 +134,20 @@ class Timeline:
     def is_seeking(self) -> bool:
         """Whether a seek is in progress."""
         return self._seeking is not None
+
+    @property
+    def destination(self) -> tuple[Node, int]:
+        """Node and step to which the seek in progress leads; without one, those of the present."""
+        if self._seeking is None:
+            return self.head, self.step
+        return self._destination
+
+    @property
+    def seek_progress(self) -> float | None:
+        """Fraction of the seek that is done, if it has been in progress for a noticeable time."""
+        if self._seeking is None or perf_counter() - self._seek_start_s < MIN_NOTICED_SEEK_S:
+            return None
+        return self._seek_fraction
 
     @property
     def events(self) -> list[SessionEvent]:
@@ -219,6 +238,8 @@ class Timeline:
     ) -> None:
         """Make a step of a node the present. If an error is raised, nothing changes.
 
+        A seek that is still in progress is abandoned.
+
         Parameters
         ----------
         node : Node
@@ -235,11 +256,13 @@ class Timeline:
         StartError, ParameterError, InputError
             If the state cannot be built. Controllers may raise any exception.
         """
-        self.finish_seek()
         old = Present(self.head, self.run, self.history)
         if step is None:
             step = node.last_step
         self._seeking = build_present(self.document, old, node, step, edit)
+        self._destination = (node, step)
+        self._seek_start_s = perf_counter()
+        self._seek_fraction = 0.0
         self.continue_seek(seconds)
 
     def finish_seek(self) -> None:
@@ -256,7 +279,7 @@ class Timeline:
         started = perf_counter()
         while True:
             try:
-                next(seeking)
+                self._seek_fraction = next(seeking)
             except StopIteration as end:
                 self.replace_present(end.value)
                 return

@@ -217,6 +217,7 @@ class ViewerWindow(CommandWindow):
             session.timeline.past_version,
             session.playback.is_playing,
             self._cost_curves.answer_count,
+            session.timeline.seek_progress,
             viewer.costs.state,
             self._arranged,
             self.panel.ui.needs_redraw,
@@ -291,6 +292,9 @@ class ViewerWindow(CommandWindow):
         viewer = self.viewer
         message = viewer.message
         is_error = bool(message) and viewer.has_error_message
+        progress = viewer.session.timeline.seek_progress
+        if progress is not None and not is_error:
+            message = f"Recomputing the session: {100 * progress:.0f} %"
         if not message and can_suggest and not self.is_unattended:
             message = suggest_actions(viewer)
         arena = self.layout.arena

@@ -5,6 +5,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+import numpy as np
+
 from robocov_app.storage import autosave
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.session.files.session_file import (
@@ -69,7 +71,8 @@ class SessionWorkspace:
             Whether to save it even if the last draft is recent.
         """
         timeline = self.session.timeline
-        state = (timeline.document.revision, timeline.step)
+        head, step = timeline.destination
+        state = (timeline.document.revision, step)
         is_needed = self.has_unsaved_edits and state != self._drafted_state and timeline.is_reproducible
         is_recent = monotonic() - self._draft_time < DRAFT_PAUSE_S
         if not is_needed or (is_recent and not at_once):
@@ -77,7 +80,7 @@ class SessionWorkspace:
         self._drafted_state = state
         self._draft_time = monotonic()
         timeline.cache_present()
-        content = build_session_content(timeline.document, timeline.head, timeline.step, view)
+        content = build_session_content(timeline.document, head, step, view)
         self._autosaver.save_draft(lambda: {"session": content})
 
     def save(self, folder: Path, view: Mapping[str, Any], path: Path | None = None) -> Path:
@@ -111,7 +114,7 @@ class SessionWorkspace:
         if target is None:
             name = self.session.displayed.environment.name.lower() or "session"
             target = find_free_path(folder, name, SUFFIX)
-        save_session(target, timeline.document, timeline.head, timeline.step, view)
+        save_session(target, timeline.document, *timeline.destination, view)
         self.path = target
         self._saved_revision = timeline.document.revision
         self._autosaver.mark_saved(target)
@@ -144,7 +147,7 @@ def describe_draft(draft: autosave.Draft) -> str:
 
 
 def recover_draft(
-    draft: autosave.Draft, controllers: Collection[str], folder: Path | None
+    draft: autosave.Draft, controllers: Collection[str], folder: Path | None, seconds: float = np.inf
 ) -> tuple[SessionWorkspace, Mapping[str, Any]]:
     """Open the session of a draft.
 
@@ -156,6 +159,8 @@ def recover_draft(
         Controllers in files of the user's own that may be run, as the user has named them.
     folder : Path or None
         Folder for drafts.
+    seconds : float, s
+        Time that the call may take; see `Session.open`.
 
     Returns
     -------
@@ -164,5 +169,5 @@ def recover_draft(
         Displayed layers and theme.
     """
     saved = parse_session(draft.content["session"], str(draft.folder), controllers)
-    workspace = SessionWorkspace(Session.open(saved), folder, draft.path, draft.folder)
+    workspace = SessionWorkspace(Session.open(saved, seconds), folder, draft.path, draft.folder)
     return workspace, saved.view
