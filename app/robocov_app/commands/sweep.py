@@ -94,7 +94,7 @@ def _estimate(options: Arguments, study: Study, out: Path) -> None:
 
 
 def _count_workers(options: Arguments) -> int:
-    """Return the number of runs that are done at the same time."""
+    """Return the number of runs that are executed in parallel."""
     from robocov_app.sweep.cluster import Cluster
     from robocov_app.sweep.local_pool import count_processors
 

@@ -50,9 +50,9 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         Several runs have their median and a band between the quartiles, a single run has its line.
     size : (width, height), px
     label : str
-        Of the value axis.
+        Label of the value axis.
     unit : str
-        Of the final values at the ends of the curves.
+        Unit of the final values at the ends of the curves.
 
     Returns
     -------

@@ -156,7 +156,7 @@ def add_curve_axes(
     box : PageBox, optional
         Area of the page for the axes and all their labels. By default the whole page.
     unit : str
-        Of the values at the ends, as for `draw_curves`.
+        Unit of the values at the ends, as for `draw_curves`.
 
     Returns
     -------
@@ -200,9 +200,9 @@ def draw_curves(
     bands : sequence of ((T,) array, (T,) array) or None, optional
         Lower and upper edge of a band around each curve.
     label : str
-        Of the value axis.
+        Label of the value axis.
     unit : str
-        Of the values at the ends.
+        Unit of the values at the ends.
     weight : float
         Factor of the widths of lines.
     """

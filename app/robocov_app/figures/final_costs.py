@@ -61,11 +61,11 @@ def plot_final_costs(
         Name of each group, which may be empty, and its samples. Values that are not finite are left out.
         Samples of less than `MIN_BOX_VALUES` values have no box.
     label : str
-        Of the value axis.
+        Label of the value axis.
     width : int, px
-        Of the page, whose height depends on the number of samples.
+        Width of the page, whose height depends on the number of samples.
     scale : float
-        Of texts and lines.
+        Scale of texts and lines.
     theme : Theme
     origin : float
         The axis starts here unless all values are far from it.

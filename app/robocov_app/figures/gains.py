@@ -91,7 +91,7 @@ def plot_gains(
         Name of the gain.
     size : (width, height), px
     label : str
-        Of the value axis.
+        Label of the value axis.
     choices : sequence of str
         Values of a gain that is a text. For a number, a line connects the medians; the axis is logarithmic
         for a wide range, and "none", for no limit, is at its right end.

@@ -246,7 +246,7 @@ class FigurePage:
         ----------
         text : str
         x, y : float, px
-            Position of the middle of the line at the edge that `align` names.
+            Position on the middle of the line, at the edge given by `align`.
         points : float
             Text size.
         bold : bool
@@ -357,7 +357,7 @@ class FigurePage:
         boxes : sequence of PageBox
             Boxes of the maps.
         zoom : float, px/m
-            Of the maps.
+            Zoom of the maps.
         start : float, px
             Nothing is drawn to the left of this.
         """

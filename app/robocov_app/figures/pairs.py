@@ -63,11 +63,11 @@ def plot_pairs(
     ----------
     pairs : sequence of Pairs
     label : str
-        Of the axis of ratios.
+        Label of the axis of ratios.
     width : int, px
-        Of the page, whose height depends on the number of rows.
+        Width of the page, whose height depends on the number of rows.
     scale : float
-        Of texts and lines.
+        Scale of texts and lines.
     theme : Theme
 
     Returns

@@ -98,9 +98,9 @@ def create_row_axes(
         Names of the rows.
     theme : Theme
     width : int, px
-        Of the page.
+        Width of the page.
     scale : float
-        Of texts and lines.
+        Scale of texts and lines.
 
     Returns
     -------

@@ -114,7 +114,7 @@ def plot_trajectories(
     size : (width, height), px, optional
         Size of the page.
     mean_distance, mean_time : float, optional
-        Of the final positions, m and s, for the title.
+        Costs of the final positions, m and s, for the title.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def plot_comparison(
     colors : {"paper", "robots"}
     size : (width, height), px, optional
     mean_distances, mean_times : sequence of float or None, optional
-        Of the final positions, m and s, for the titles.
+        Costs of the final positions, m and s, for the titles.
 
     Returns
     -------
@@ -385,7 +385,7 @@ def plot_cost(
     size : (width, height), px, optional
         Size of the page.
     title : str
-        Of the page.
+        Title of the page.
 
     Returns
     -------
@@ -584,7 +584,7 @@ class MetricPanel(NamedTuple):
     Attributes
     ----------
     label, unit : str
-        Of the axis.
+        Label and unit of the axis.
     get_values : callable
         Returns the values of a run.
     """
@@ -624,7 +624,7 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     runs : sequence of MeasuredRun
     theme : Theme or str
     title : str
-        Of the page.
+        Title of the page.
 
     Returns
     -------

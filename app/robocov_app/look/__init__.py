@@ -9,6 +9,6 @@ Nothing in this package draws.
 - `curve_styles`: color, dashes and marker of the curve of each controller.
 - `axes`: limits and ticks of axes.
 - `lengths`: round lengths of scale bars and grids, and their labels.
-- `labels`: places of labels side by side, and texts that fit in.
+- `labels`: positions of labels that do not overlap, and shortened texts.
 - `legend`: names of the elements of a picture, and one legend for several pictures.
 """

@@ -1,4 +1,4 @@
-"""Labels: places where they do not overlap, and texts that fit into the space there is."""
+"""Labels: positions at which they do not overlap, and texts shortened to the available space."""
 
 from collections.abc import Callable, Sequence
 

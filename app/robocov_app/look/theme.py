@@ -29,9 +29,9 @@ class Theme:
     background, panel : Color
         Behind maps and curves, and behind the controls of windows.
     ink, faint : Color
-        Of texts, and of texts that matter less.
+        Colors of texts, and of secondary texts.
     grid, boundary, obstacle, obstacle_edge, cell_edge, robot_ring, velocity, unreached : Color
-        Of what their names say. `unreached` is free space that no robot can reach.
+        Colors of these elements. `unreached` is free space that no robot can reach.
     start, final, trajectory : Color
         The article's green, blue and red.
     controllers : dict of str to Color

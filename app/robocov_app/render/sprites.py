@@ -288,7 +288,7 @@ def render_ring(radius: float, color: Color, width: float, shift: Shift) -> pyga
     Parameters
     ----------
     radius : float, px
-        Of the middle of the stroke.
+        Radius of the middle of the stroke.
     color : Color
     width : float, px
     shift : Shift

@@ -53,9 +53,9 @@ class ReplayRun:
     facts : str
         Below the title.
     label : str
-        Of its curve; by default that of the record.
+        Label of its curve; by default that of the record.
     style : CurveStyle or None
-        Of its curve; by default one that no other controller has.
+        Style of its curve; by default one that no other controller has.
     """
 
     record: Record
@@ -192,7 +192,7 @@ def embed_run(
     map_number : int
         Index of its map.
     style : CurveStyle
-        Of its curve.
+        Style of its curve.
     rate : float
         Frames per simulated second.
     has_goals : bool

@@ -213,7 +213,7 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
     gap : int, px
         Width of the lines between frames.
     line, background : Color
-        Colors of these lines, and of places without a frame.
+        Colors of these lines, and of areas without a frame.
 
     Returns
     -------

@@ -381,10 +381,8 @@ def test_names_are_words_whatever_is_in_them(tmp_path):
     ],
 )
 def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
-    assert (
-        format_end_label(TimeCurve("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit)
-        == words
-    )
+    curve = TimeCurve("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan]))
+    assert format_end_label(curve, unit) == words
 
 
 def test_moving_obstacles_have_an_arrow_a_path_and_a_legend_entry():

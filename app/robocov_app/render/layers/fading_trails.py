@@ -33,7 +33,7 @@ class Pen(NamedTuple):
     Attributes
     ----------
     colors : list of Color
-        Of each robot.
+        Color of each robot.
     width : float, px
     """
 

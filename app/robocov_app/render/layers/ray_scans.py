@@ -34,9 +34,9 @@ class _Scan(NamedTuple):
     Attributes
     ----------
     position : (2,) array, px
-        Of the sensor.
+        Position of the sensor.
     ends : (r, 2) array, px
-        Of the rays.
+        Ends of the rays.
     """
 
     position: Array

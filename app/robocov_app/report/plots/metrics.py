@@ -30,7 +30,7 @@ class _Metric(NamedTuple):
     ----------
     title : str
     label : str
-        Of the axis.
+        Label of the axis.
     unit : str
     get_values : callable
         Returns the values over time.
