@@ -175,7 +175,7 @@ def test_watching_from_outside(file: Path, terminal: bool) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
-def test_watching_costs_next_to_nothing(file: Path) -> None:
+def test_watching_takes_little_processor_time(file: Path) -> None:
     with subprocess.Popen(
         [*COMMAND, "check", "--watch", str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:

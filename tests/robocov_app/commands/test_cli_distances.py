@@ -34,7 +34,7 @@ def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: 
 
 
 @pytest.mark.parametrize("option", ["--show", "--hide"])
-def test_unknown_layers_are_named_before_anything_is_made(
+def test_unknown_layers_are_rejected_before_the_run(
     option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
@@ -57,9 +57,7 @@ def test_cost_draws_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert (tmp_path / "map.svg").read_text().startswith("<?xml")
 
 
-def test_a_map_that_cannot_be_written_is_told_first(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unwritable_map_is_reported_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("cost", "rooms", "--positions", str(tmp_path / "missing.json"), "--plot")
     assert "'.jpg'" in complaint(capsys, *words, str(tmp_path / "a.jpg"))
     assert "there is no folder" in complaint(capsys, *words, str(tmp_path / "b" / "a.png"))

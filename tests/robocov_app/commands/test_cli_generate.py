@@ -22,7 +22,7 @@ from robocov_app.replication.design.study_maps import (
 )
 
 
-def test_every_kind_can_be_asked_for() -> None:
+def test_every_kind_of_map_can_be_generated() -> None:
     assert KindName.__args__ == tuple(GENERATORS)  # type: ignore[attr-defined]
 
 
@@ -68,9 +68,7 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
     assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; choose another --out or")
 
 
-def test_overwriting_replaces_maps_and_nothing_else(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["generate", "--count", "2", "--out", str(tmp_path), "--overwrite"]
     other, mine = tmp_path / "other.json", tmp_path / "polygons-1.json"
     other.write_text("mine")
@@ -141,7 +139,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("--out none/map.json", "none/map.json: cannot be written: No such file or directory"),
     ],
 )
-def test_what_cannot_be_made_is_told_with_its_option(
+def test_impossible_maps_are_reported_with_the_option(
     words: str,
     message: str,
     tmp_path: Path,

@@ -102,7 +102,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.yaml", "--preview a.bmp", "a.bmp"),
     ],
 )  # fmt: skip
-def test_what_is_refused(
+def test_invalid_options_are_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str, expected: str
 ) -> None:
     write_ros_map(tmp_path, draw_pixels(PLAN))

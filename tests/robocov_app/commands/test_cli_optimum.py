@@ -44,7 +44,7 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     assert len(file.read_text().splitlines()) == 3
 
 
-def test_it_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_import_is_reported_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["optimum", "square", "--lattice", "16", "--restarts", "5", "--robots", "1"]) == 0
     said = capsys.readouterr().out
     assert "mean distance   3.82" in said
@@ -53,7 +53,7 @@ def test_it_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert "[5.000, 5.000]" in said
 
 
-def test_a_lower_bound_is_proved_when_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_lower_bound_is_proved_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     how = ("optimum", "square", "--lattice", "12", "--restarts", "2", "--robots", "1", "--bound")
     bound = (row := answer(capsys, *how))["lower_bound"]
     assert bound["mean_distance_m"] < row["mean_distance_m"]
@@ -66,7 +66,7 @@ def test_a_lower_bound_is_proved_when_asked_for(capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.usefixtures("no_pictures")
-def test_how_far_a_run_is_above(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_gap_of_a_run_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
     assert main(["run", "trap", *SHORT, "--robots", "4", "--out", str(out)]) == 0
     capsys.readouterr()
@@ -165,7 +165,7 @@ def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.Ca
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_files(tmp_path: Path) -> None:
     file = tmp_path / "best.json"
     words = ("optimum", "museum", "--restarts", "100000", "--robots", "20", "--positions", str(file))
     process = subprocess.Popen([*COMMAND, *words], stderr=subprocess.PIPE, text=True)

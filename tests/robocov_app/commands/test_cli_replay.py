@@ -101,7 +101,7 @@ def test_the_json_file_does_as_well_as_its_folder(made: Path, tmp_path: Path, ca
         assert len(pictures(tmp_path / name)) == 3
 
 
-def test_an_earlier_film_is_replaced_only_where_that_is_wanted(made: Path, tmp_path: Path, capsys) -> None:
+def test_an_earlier_video_is_replaced_only_with_overwrite(made: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "film"
     words = ("replay", str(made / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
     answer(capsys, *words)
@@ -134,7 +134,7 @@ def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsy
     )
 
 
-def test_of_a_comparison_that_was_killed_there_is_what_there_is(both: Path, tmp_path: Path, capsys) -> None:
+def test_the_finished_runs_of_a_killed_comparison_can_be_replayed(both: Path, tmp_path: Path, capsys) -> None:
     shutil.rmtree(both / "lloyd")
     answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "film"))
     assert len(pictures(tmp_path / "film")) == 3
@@ -176,7 +176,7 @@ def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None
 
 
 @pytest.mark.skipif("sys.platform != 'linux'", reason="elsewhere there is always one")
-def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, capsys) -> None:
+def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
     said = complaint(capsys, "replay", str(run))
@@ -205,7 +205,7 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
         ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(run: Path, capsys, words: str, message: str) -> None:
+def test_inapplicable_options_are_rejected(run: Path, capsys, words: str, message: str) -> None:
     assert complaint(capsys, "replay", str(run), *words.split()).startswith(message)
 
 
@@ -271,7 +271,7 @@ def arrays(folder: Path, **changes) -> None:
         ),
     ],
 )
-def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: str) -> None:
+def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message: str) -> None:
     spoil(run)
     assert complaint(capsys, "replay", str(run)).startswith(message.format(run=run))
 
@@ -315,6 +315,6 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
         ),
     ],
 )
-def test_a_spoilt_comparison_is_refused_in_one_line(both: Path, capsys, spoil, message: str) -> None:
+def test_a_damaged_comparison_is_rejected_in_one_line(both: Path, capsys, spoil, message: str) -> None:
     spoil(both)
     assert complaint(capsys, "replay", str(both)).startswith(message.format(both=both))

@@ -14,7 +14,9 @@ from robocov_app.commands import options
 FILES = "run.json record.npz cost.csv trajectories.png trajectories.svg cost.png cost.svg".split()
 
 
-def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_saves_everything_and_prints_the_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "run"
     words = "--frames --video --fps 10 --film-speed 1 --out".split()
     assert main(["run", "rooms", *SHORT, *words, str(out)]) == 0
@@ -45,7 +47,7 @@ def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
-def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_same_command_gives_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):
         answer(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
     for file in FILES:
@@ -70,7 +72,7 @@ def test_compare_gives_every_controller_the_same_starts(
 
 
 @pytest.mark.usefixtures("no_pictures")
-def test_overwrite_removes_the_old_result_and_nothing_else(
+def test_overwrite_removes_only_the_earlier_result(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
@@ -88,7 +90,7 @@ def test_overwrite_removes_the_old_result_and_nothing_else(
 
 @pytest.mark.skipif(os.name == "nt", reason="links of POSIX")
 @pytest.mark.usefixtures("no_pictures")
-def test_what_is_in_the_way_of_a_result_leaves_the_earlier_one(
+def test_an_obstructed_result_keeps_the_earlier_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
@@ -126,7 +128,7 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.usefixtures("no_pictures")
-def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
         "from dataclasses import dataclass\n"
@@ -203,7 +205,7 @@ def test_a_class_that_fails_is_named_with_its_line(
     assert not out.exists()
 
 
-def test_all_that_led_to_an_error_is_shown_where_it_is_wanted(
+def test_a_traceback_is_shown_on_request(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROBOCOV_TRACEBACK", "1")
@@ -229,7 +231,7 @@ def test_all_that_led_to_an_error_is_shown_where_it_is_wanted(
     ],
     ids=range(9),
 )
-def test_a_gain_of_no_use_is_refused(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_gain_is_rejected(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     said = complaint(capsys, "run", "square", "--set", f"k_rep={value}")
     assert said.startswith(message) and len(said) < 200
 

@@ -35,7 +35,7 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sweep_answers_in_words(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_prints_its_results(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = study.parent / "out"
     assert main(["sweep", str(study), "--out", str(out), "--workers", "1"]) == 0
     said = capsys.readouterr()
@@ -75,7 +75,7 @@ def test_a_sweep_answers_in_json(
     assert laws == ["rapf", "rpf", "rpf", "mine.py:Mine"] * 2
 
 
-def test_failures_are_told_each_time_and_are_an_exit_status(
+def test_failures_are_reported_each_time_with_an_exit_status(
     study: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study.write_text(STUDY.replace("robots = 3", "robots = [3, 900]"))
@@ -117,7 +117,7 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
     assert "failed: start 'corner': room for about" in capsys.readouterr().out
 
 
-def test_a_dry_run_says_what_is_done_already(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(study.parent / "out")
     answer(capsys, "sweep", str(study), "--out", out, "--workers", "1")
     study.write_text(STUDY.replace("seeds = 2", "seeds = 3"))
@@ -149,7 +149,7 @@ def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
+def test_a_full_disk_is_reported_and_the_sweep_can_be_resumed(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(path: Path, content: bytes) -> int:
@@ -170,7 +170,7 @@ def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
 
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet", "runs", "study.json", ".lock"])
 @pytest.mark.parametrize("finished", [True, False])
-def test_something_else_that_has_a_name_of_ours_is_one_line(
+def test_a_foreign_file_with_a_reserved_name_is_rejected_in_one_line(
     study: Path, name: str, finished: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = study.parent / "out"
@@ -188,7 +188,7 @@ def test_something_else_that_has_a_name_of_ours_is_one_line(
 
 
 @pytest.mark.slow
-def test_a_run_of_a_sweep_can_be_seen_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_of_a_sweep_can_be_replayed(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = study.parent / "out"
     answer(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")
     with (out / "results.csv").open(newline="") as file:

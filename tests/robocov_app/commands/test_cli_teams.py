@@ -51,7 +51,9 @@ def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.
     assert (speeds <= record.team.max_speed + 1e-9).all()
 
 
-def test_a_comparison_tells_the_time(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_comparison_prints_mean_times(
+    tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "both"
     words = ["compare", "rooms", "--controllers", "rapf", "lloyd", "--team", str(team), *SHORT]
     assert main([*words, "--out", str(out)]) == 0
@@ -60,7 +62,7 @@ def test_a_comparison_tells_the_time(tmp_path: Path, team: Path, capsys: pytest.
     assert all(row["mean_time_s"] > 0 for row in rows)
 
 
-def test_the_cost_of_places_in_seconds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_cost_of_positions_in_seconds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     places = tmp_path / "places.json"
     places.write_text("[[1, 1], [9, 5]]")
     words = ("cost", "rooms", "--positions", str(places), "--lattice", "16")

@@ -64,7 +64,7 @@ def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
     ],
 )
 @pytest.mark.parametrize("name", ["pipe", "link", pytest.param("x" * 252, id="too long")])
-def test_what_cannot_be_written_is_one_line_and_stays_as_it_is(
+def test_an_unwritable_file_is_reported_and_unchanged(
     words: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A named pipe, also by a link, and a name that is too long; a suffix makes it fit its command."""
@@ -120,7 +120,7 @@ def test_a_folder_without_permission_is_one_line(
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
-def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
+def test_ctrl_c_keeps_and_reports_partial_results(tmp_path: Path) -> None:
     words = ("--duration", "3000", "--lattice", "16", "--size", "480x320")
     for patience in (1.0, 5.0, 25.0):  # until it is under way
         out = tmp_path / f"run-{patience}"
@@ -192,7 +192,7 @@ def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
 @pytest.mark.slow
-def test_nobody_listening_is_no_error(tmp_path: Path) -> None:
+def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     words = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
     done = subprocess.run(f"{' '.join([*COMMAND, *words])} >&-", shell=True, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -221,7 +221,7 @@ def test_a_controller_for_the_whole_team_needs_no_names(
     assert (Record.load(out / "Still").forces == 0).all()
 
 
-def test_names_with_brackets_are_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_with_brackets_are_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
         "from dataclasses import dataclass\n"

@@ -44,7 +44,9 @@ def test_json_has_the_figures_of_the_end(folder: Path, capsys: pytest.CaptureFix
     assert run["near_final_s"] is not None
 
 
-def test_what_is_no_run_is_told(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_a_run_is_reported(
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert str(tmp_path) in complaint(capsys, "metrics", str(tmp_path))
     assert complaint(capsys, "metrics", str(folder), "--rate", "-1").startswith(
         "--rate: expected a number from 0 to 10000 Hz, got -1.0"

@@ -13,12 +13,12 @@ from robocov_app.cli import main
 from robocov_app.commands.options import ConditionOptions
 
 
-def test_nothing_said_is_no_conditions() -> None:
+def test_without_options_there_are_no_conditions() -> None:
     assert ConditionOptions().build_conditions(3, 6) is None
     assert ConditionOptions(forget_after=1.0).build_conditions(3, 6) is None
 
 
-def test_what_is_said_becomes_conditions() -> None:
+def test_options_become_conditions() -> None:
     options = ConditionOptions(loss=0.2, delay=0.3, bandwidth=1e4, fail=("3@20",), join=("5@30:2.5,1", "6@4"))
     assert options.build_conditions(7, 6) == Conditions(
         loss=0.2,
@@ -39,7 +39,7 @@ def test_what_is_said_becomes_conditions() -> None:
         (ConditionOptions(loss=2.0), "conditions.loss: expected a number from 0 to 1"),
     ],
 )
-def test_what_cannot_be_is_named(options: ConditionOptions, message: str) -> None:
+def test_invalid_conditions_are_named(options: ConditionOptions, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         options.build_conditions(0, 6)
 
@@ -62,7 +62,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_folder(
     assert simulation.run(1.0).positions.tobytes() == record.positions.tobytes()
 
 
-def test_one_line_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     said = complaint(capsys, "run", "rooms", "--fail", "3@x")
     assert said == "--fail: expected ROBOT@SECONDS, as in 3@20, got '3@x'"
 
@@ -76,7 +76,7 @@ def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.
     assert len(list((out / "frames").iterdir())) > 2
 
 
-def test_a_robot_that_joins_outside_of_the_map_is_refused(
+def test_a_robot_that_joins_outside_the_map_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"

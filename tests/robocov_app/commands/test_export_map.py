@@ -34,7 +34,9 @@ def test_options_reach_the_format(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert json.loads(here.read_text())["origin"] == [8.4, 49.0]
 
 
-def test_closed_gaps_are_told_beside_the_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_closed_gaps_are_reported_next_to_the_answer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = ["export", "office", "-o", str(tmp_path / "office.yaml"), "--cell", "1"]
     assert main(words) == 0
     said = capsys.readouterr()
@@ -45,7 +47,7 @@ def test_closed_gaps_are_told_beside_the_answer(tmp_path: Path, capsys: pytest.C
     assert json.loads(said.out)["warnings"] == [said.err.removeprefix("robocov: warning: ").strip()]
 
 
-def test_what_is_wrong_gets_one_line_and_leaves_nothing(
+def test_errors_are_reported_in_one_line_and_leave_no_files(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -62,7 +64,9 @@ def test_what_is_wrong_gets_one_line_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_is_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_file_is_overwritten_without_the_option(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "plan.json"
     out.write_text("precious")
     assert "exists already" in complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")

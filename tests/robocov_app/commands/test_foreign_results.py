@@ -149,7 +149,7 @@ def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_who_opens_a_run_may_load_its_controller(
+def test_the_controller_of_a_run_is_loaded_only_on_request(
     shared: Path,
     windows: list[Session],
     tmp_path: Path,

@@ -6,12 +6,12 @@ from robocov_app.commands.gain_options import select_gains
 NAMES = ("rapf", "rpf", "lloyd")
 
 
-def test_a_gain_goes_to_every_controller_that_has_it() -> None:
+def test_a_gain_applies_to_every_controller_that_has_it() -> None:
     assert select_gains(NAMES, {"k_rep": 1, "k_att": 3}) == [{"k_rep": 1, "k_att": 3}, {"k_rep": 1}, {}]
 
 
 @pytest.mark.parametrize("order", [("k_rep", "rpf.k_rep"), ("rpf.k_rep", "k_rep")])
-def test_what_is_said_of_one_counts_for_more(order: tuple[str, str]) -> None:
+def test_a_gain_of_one_controller_takes_precedence(order: tuple[str, str]) -> None:
     given = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
     assert select_gains(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
 
@@ -24,6 +24,6 @@ def test_what_is_said_of_one_counts_for_more(order: tuple[str, str]) -> None:
         ("rap.k_rep", "--set rap.k_rep: unknown controller 'rap': did you mean 'rapf'"),
     ],
 )
-def test_a_gain_of_nobody_is_refused(key: str, message: str) -> None:
+def test_a_gain_without_a_controller_is_rejected(key: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         select_gains(NAMES, {key: 1})

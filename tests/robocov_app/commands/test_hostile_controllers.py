@@ -88,7 +88,7 @@ def test_one_line_names_a_controller_that_fails(folder: Path, body: str) -> None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
-def test_a_comparison_that_a_controller_ends_says_so(folder: Path) -> None:
+def test_a_comparison_ended_by_a_controller_is_reported(folder: Path) -> None:
     ended = call(folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL)
     assert ended.returncode == 1
     assert ENDED["os._exit(0)"] in last_line(ended)

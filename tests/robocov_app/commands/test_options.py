@@ -22,7 +22,7 @@ def test_gains_are_json_values() -> None:
 
 
 @given(st.lists(st.text(max_size=12), max_size=3))
-def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
+def test_any_text_is_a_gain_or_rejected_in_one_line(texts: list[str]) -> None:
     try:
         parse_gains(tuple(texts))
     except ParameterError as error:
@@ -47,7 +47,7 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
         {"robots": 10_000, "duration": 100.0, "record_hz": 60.0},
     ],
 )
-def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
+def test_values_out_of_range_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match=r"wanted|expected"):
         RunOptions(**wrong)  # type: ignore[arg-type]
 
@@ -55,7 +55,7 @@ def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
 @pytest.mark.parametrize(
     "wrong", [{"size": "640"}, {"size": "1x1"}, {"size": "99999x99999"}, {"fps": 0}, {"film_speed": 0.0}]
 )
-def test_films_out_of_range_are_refused(wrong: dict[str, object]) -> None:
+def test_videos_out_of_range_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match=r"wanted|expected"):
         VideoOptions(**wrong)  # type: ignore[arg-type]
 
@@ -70,7 +70,7 @@ def test_options_have_the_defaults_of_the_library() -> None:
     assert RunOptions().build_team().to_dict() == Team.homogeneous(6).to_dict()
 
 
-def test_every_cost_is_evaluated_on_the_same_lattice_unless_told() -> None:
+def test_every_cost_has_the_same_lattice_by_default() -> None:
     commands = (cost.Arguments, optimum.Arguments, demo.Arguments, RunOptions)
     told = {each.__dataclass_fields__["lattice"].default for each in commands}
     assert told == {Costs().lattice, CoverageCost(SQUARE).lattice}

@@ -42,7 +42,7 @@ class TestEveryKind:
             save_figure(plot_trajectories(run_of(ROOMS, 4), size=(500, 400)), tmp_path / f"{name}.{kind}")
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
-    def test_the_users_own_style_changes_nothing(self, tmp_path, kind):
+    def test_the_matplotlib_style_of_the_user_has_no_effect(self, tmp_path, kind):
         save_figure(plot_cost(CURVES, size=(500, 300)), tmp_path / f"a.{kind}")
         theirs = {"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.bbox": "tight"}
         theirs |= {"pdf.fonttype": 3, "svg.fonttype": "none", "savefig.transparent": True}
@@ -52,7 +52,7 @@ class TestEveryKind:
             assert dict(matplotlib.rcParams) == before
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
-    def test_names_are_words_whatever_is_in_them(self, tmp_path, kind):
+    def test_names_are_never_markup(self, tmp_path, kind):
         name = "cost $x^2$ $\\frac$ [/] { a)b(c\\ 倉庫 🤖"
         record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
         save_figure(plot_trajectories(record, size=(500, 400)), tmp_path / f"a.{kind}")
@@ -115,7 +115,7 @@ class TestPdf:
             program = re.search(rb"\n%d 0 obj\n.*?stream\n(.*?)\nendstream" % file, pdf, flags=re.DOTALL)[1]
             assert zlib.decompress(program)[:4] == b"\x00\x01\x00\x00", "no TrueType font"
 
-    def test_its_words_can_be_searched(self, tmp_path):
+    def test_texts_of_a_pdf_can_be_searched(self, tmp_path):
         """Every font says which letters its glyphs are."""
         save_figure(plot_cost(CURVES, size=(500, 300)), tmp_path / "a.pdf")
         pdf = (tmp_path / "a.pdf").read_bytes()

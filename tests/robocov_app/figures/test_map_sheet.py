@@ -10,7 +10,7 @@ def words(figure) -> list[str]:  # type: ignore[no-untyped-def]
     return [text.get_text() for text in figure.texts]
 
 
-def test_maps_stand_side_by_side_at_one_scale(empty: Environment, cluttered: Environment) -> None:
+def test_maps_are_side_by_side_at_one_scale(empty: Environment, cluttered: Environment) -> None:
     wide = replace(empty, name="wide", boundary=((5.0, 5.0), (25.0, 5.0), (25.0, 12.0), (5.0, 12.0)))
     figure = plot_maps([empty, cluttered, wide])
     panels = figure.axes
@@ -35,7 +35,7 @@ def test_all_is_on_the_page_and_the_dark_is_dark(empty: Environment) -> None:
 
 
 @pytest.mark.slow
-def test_of_very_many_the_first_are_drawn_and_the_title_says_so(empty: Environment) -> None:
+def test_only_the_first_of_many_maps_are_drawn(empty: Environment) -> None:
     figure = plot_maps([empty] * (MAX_MAPS + 5))
     assert len(figure.axes) == MAX_MAPS
     assert f"{MAX_MAPS} of {MAX_MAPS + 5}" in words(figure)

@@ -20,14 +20,14 @@ def test_the_page_is_shown_for_its_axes():
     assert "RAPF  ·  rooms" in said["alt"] and "3 robots" in said["alt"]
 
 
-def test_what_is_drawn_on_them_later_is_shown():
+def test_later_drawing_on_page_axes_is_shown():
     axes = plot_trajectories(run_of(ROOMS, 3)).axes[0]
     before, _ = axes._repr_png_()
     axes.plot([2, 8], [1, 9])
     assert axes._repr_png_()[0] != before
 
 
-def test_it_looks_alike_whatever_style_the_user_has():
+def test_page_axes_do_not_depend_on_the_style_of_the_user():
     axes = FigurePage((400, 300), DARK).add_axes((20, 20, 360, 260))
     before = axes._repr_png_()
     with matplotlib.rc_context({"savefig.facecolor": "red", "savefig.bbox": "tight", "savefig.dpi": 17}):

@@ -42,7 +42,7 @@ def curves(*finals):
 @pytest.mark.parametrize(
     "size", [None, (900, 600), *(pytest.param(size, marks=pytest.mark.slow) for size in SIZES[1:])]
 )
-def test_nothing_covers_or_cuts_anything(environment, size):
+def test_no_element_covers_or_cuts_another(environment, size):
     record = run_of(environment, 6)
     all_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
     all_clear(plot_environment(environment, size=size))
@@ -82,7 +82,7 @@ def test_the_arena_is_not_distorted(environment):
 
 
 @pytest.mark.parametrize("size", [(901, 600), (641, 487), pytest.param((2560, 1440), marks=pytest.mark.slow)])
-def test_a_png_has_exactly_the_pixels_asked_for(tmp_path, size):
+def test_a_png_has_the_requested_size(tmp_path, size):
     path = tmp_path / "a.png"
     for figure in (plot_trajectories(run_of(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
         save_figure(figure, path)
@@ -202,7 +202,7 @@ class TestTrajectories:
         (legend,) = plot_trajectories(run_of(CORRIDOR, 3)).legends
         assert "obstacle (unknown to robots)" not in [text.get_text() for text in legend.get_texts()]
 
-    def test_the_scale_bar_is_as_long_as_it_says(self):
+    def test_the_scale_bar_has_the_length_of_its_label(self):
         figure = plot_trajectories(run_of(ROOMS, 3))
         box = figure.axes[0].get_window_extent()
         bars = [artist for artist in figure.artists if isinstance(artist, Line2D)]
@@ -238,7 +238,7 @@ class TestText:
         assert figure.bbox.width == pytest.approx(1600, abs=0.1)
         assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
 
-    def test_what_all_runs_share_is_said_once(self):
+    def test_common_facts_are_in_the_heading_only(self):
         figure = plot_comparison([run_of(ROOMS, 3), run_of(ROOMS, 3, controller="rpf")])
         words = [text.get_text() for text in figure.texts]
         assert sum("t = 3.9 s" in text for text in words) == 1
@@ -247,13 +247,13 @@ class TestText:
         assert "t = 3.9 s" in words and "t = 2.0 s" in words
 
     @pytest.mark.parametrize(("environment", "rows"), [(ROOMS, 1), (CORRIDOR, 3)])
-    def test_wide_maps_stand_below_each_other(self, environment, rows):
+    def test_wide_maps_are_stacked(self, environment, rows):
         figure = plot_comparison([run_of(environment, 3)] * 3)
         assert len({round(axes.get_position().y0, 6) for axes in figure.axes}) == rows
 
 
 class TestCost:
-    def test_curves_on_each_other_are_all_seen(self):
+    def test_equal_curves_are_all_visible(self):
         """Each is wider than the next, which lies on it, and has dashes and a mark of its own."""
         figure = plot_cost(curves(1.0, 1.0, 1.0, 1.0))
         long = [line for line in figure.axes[0].lines if len(line.get_xdata()) == len(T)]
@@ -264,7 +264,7 @@ class TestCost:
         marks = {line.get_marker() for line in figure.axes[0].lines if len(line.get_xdata()) == 1}
         assert len(dashes) == len(marks) == 4
 
-    def test_a_controller_looks_alike_in_every_company(self):
+    def test_the_style_of_a_controller_does_not_depend_on_others(self):
         time, values = T, 1.0 + np.exp(-T)
         lloyd = TimeCurve("LA", "lloyd", time, values)
         alone = plot_cost([lloyd]).axes[0].lines
@@ -273,7 +273,7 @@ class TestCost:
         assert alone[0]._dash_pattern == among[2]._dash_pattern
         assert alone[1].get_marker() == among[3].get_marker()
 
-    def test_two_controllers_of_ones_own_differ(self):
+    def test_two_custom_controllers_have_different_colors(self):
         figure = plot_cost([TimeCurve("a", "a", T, T + 1), TimeCurve("b", "b", T, T + 2)])
         first, _, second, *_ = figure.axes[0].lines
         assert first.get_color() != second.get_color()
@@ -301,7 +301,7 @@ class TestCost:
 
     @pytest.mark.parametrize("finals", [(1.0,), (1.0, 1.0, 1.0, 1.0), (1.0, 1.01, 3.0), (0.0, 0.001, 0.002)])
     @pytest.mark.parametrize("size", [(900, 600), (2560, 1440), (500, 320)])
-    def test_labels_stand_apart_in_order_and_on_the_page(self, finals, size):
+    def test_labels_are_separate_ordered_and_on_the_page(self, finals, size):
         figure = plot_cost(curves(*finals), size=size)
         figure.canvas.draw()
         renderer = figure.canvas.get_renderer()
@@ -329,7 +329,7 @@ class TestCost:
     @pytest.mark.parametrize(
         "bad", [[], [TimeCurve("A", "rapf", T, T[:-1])], [TimeCurve("A", "rapf", T, np.full(len(T), np.nan))]]
     )
-    def test_what_cannot_be_plotted_is_named(self, bad):
+    def test_invalid_curves_are_named(self, bad):
         with pytest.raises(ParameterError, match="curve"):
             plot_cost(bad)
 
@@ -358,7 +358,7 @@ def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
     assert done.returncode == 0, done.stderr
 
 
-def test_names_are_words_whatever_is_in_them(tmp_path):
+def test_names_are_never_markup(tmp_path):
     """No formula, and no warning (an error here) of letters that the font has not."""
     name = "cost $x^2$ and $y$ $\\frac$ [/] { 倉庫 🤖"
     record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))

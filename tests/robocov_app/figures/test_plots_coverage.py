@@ -63,7 +63,7 @@ def written(figure):
     [ROOMS, *(pytest.param(each, marks=pytest.mark.slow) for each in (HALL, CORRIDOR, SHAFT))],
     ids=lambda map_: map_.name,
 )
-def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
+def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
     snapshots = [build_snapshot(environment, seed=k) for k in range(count)]
     figure = plot_coverage(curves(count if with_curves else 0), snapshots, size=size)
     extents = written(figure)
@@ -83,7 +83,7 @@ def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
 @pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.slow
-def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
+def test_mean_times_are_next_to_or_below_the_mean_distances(size, count):
     figure = plot_coverage(
         curves(count), [build_snapshot(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
     )
@@ -131,7 +131,7 @@ def test_all_maps_are_in_one_scale_of_colors():
     assert bar.get_xlim()[1] == choose_color_limit(far.field.max_distance) > near.field.max_distance
 
 
-def test_the_words_say_what_is_seen():
+def test_the_texts_describe_the_coverage():
     figure = plot_coverage(curves(1), [build_snapshot(ROOMS)], title="Coverage cost  ·  rooms")
     words = [text.get_text() for text in figure.texts]
     assert "Coverage cost  ·  rooms" in words

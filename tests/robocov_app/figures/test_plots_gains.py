@@ -72,7 +72,7 @@ def test_a_grid_has_its_numbers_and_the_lowest_is_bold() -> None:
     assert get_texts(axes.get_yticklabels()) == ["2", "none"]
 
 
-def test_numbers_of_a_grid_tell_small_differences() -> None:
+def test_numbers_of_a_grid_show_small_differences() -> None:
     values = np.array([[1.0, 1.001, 1.002]])
     grid = GainGrid("a", "b", [1.0, 2.0, 3.0], [1.0], values)
     axes = plot_gain_grid(grid, (420, 290)).axes[0]

@@ -33,7 +33,7 @@ def test_goals_of_another_kind_are_times_signs(layer: str) -> None:
         assert all(nearest(frame, center + arm, LIGHT.final) < 90 for arm in ACROSS)
 
 
-def test_crosses_are_called_what_they_are() -> None:
+def test_the_legend_distinguishes_centroids_and_goals() -> None:
     """RPF has no goals: neither crosses nor their entry in the legend."""
     for goals, words in ((CENTROIDS, ["cell centroid"]), (TWO + 1, ["goal"]), (None, [])):
         scene = explained(TWO, goals=goals)
@@ -42,7 +42,7 @@ def test_crosses_are_called_what_they_are() -> None:
         assert list_legend_texts(painter, scene) == words
 
 
-def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
+def test_goals_are_centroids_with_limited_communication() -> None:
     """That of what it takes for its cell; the word does not change with each message that is lost."""
     scene = explained(TWO, goals=CENTROIDS)
     alone = partition(TWO[:1], SQUARE.region)
@@ -58,13 +58,13 @@ def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
 
 
 @pytest.mark.parametrize("goals", [CENTROIDS, TWO + 1])
-def test_no_cross_where_a_robot_has_arrived(goals: np.ndarray) -> None:
+def test_a_robot_that_has_arrived_has_no_cross(goals: np.ndarray) -> None:
     arrived = goals if goals is not CENTROIDS else partition(CENTROIDS, SQUARE.region).centroid
     pixels, _ = changed(explained(arrived, goals=arrived), "centroids")
     assert len(pixels) == 0
 
 
-def test_who_has_no_goal_has_no_cross() -> None:
+def test_a_robot_without_a_goal_has_no_cross() -> None:
     goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
     for layer in ("centroids", "goals"):
         scene = explained(TWO, goals=goals)
@@ -74,6 +74,6 @@ def test_who_has_no_goal_has_no_cross() -> None:
         assert (painter.camera.to_world(pixels.astype(float))[:, 0] < 4.0).all()
 
 
-def test_are_centroids_looks_at_those_that_are_known() -> None:
+def test_are_centroids_ignores_unknown_goals() -> None:
     assert are_centroids(np.array([[1.0, 1.0], [np.nan, np.nan]]), np.array([[1.0, 1.02], [5.0, 5.0]]))
     assert not are_centroids(np.array([[1.0, 1.0], [5.0, 4.9]]), np.array([[1.0, 1.0], [5.0, 5.0]]))

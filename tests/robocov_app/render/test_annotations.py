@@ -15,7 +15,7 @@ from robocov_app.render.painter import Painter
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
 @pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
-def test_the_scale_bar_is_as_long_as_it_says(environment, size):
+def test_the_scale_bar_has_the_length_of_its_label(environment, size):
     from robocov_app.look.lengths import round_down
 
     pixels, painter = changed(scene_of(run_of(environment, 2)), "scale_bar", size=size)
@@ -26,7 +26,7 @@ def test_the_scale_bar_is_as_long_as_it_says(environment, size):
     assert meters == pytest.approx(round_down(meters * 1.02), rel=0.03)
 
 
-def test_the_status_line_says_what_it_is_given():
+def test_the_status_line_contains_the_cost():
     record = run_of(SQUARE, 3)
     frames = [drawn(scene_of(record, cost=cost), "status")[0] for cost in ("mean 1.23 m", "mean 1.24 m")]
     rows, columns = np.nonzero((frames[0] != frames[1]).any(axis=2))
@@ -35,7 +35,7 @@ def test_the_status_line_says_what_it_is_given():
     assert np.ptp(columns) < 12  # one digit
 
 
-def test_the_status_leaves_out_whole_facts_the_least_important_first():
+def test_a_narrow_status_omits_the_least_important_facts():
     scene = scene_of(run_of(SQUARE, 3), cost="mean distance 1.234 m")
     size = 14
     found = []
@@ -50,13 +50,13 @@ def test_the_status_leaves_out_whole_facts_the_least_important_first():
     assert found[2] == lead + "t = 3.9 s"
 
 
-def test_the_width_of_a_text_is_that_of_its_picture():
+def test_measured_texts_have_the_width_of_rendered_ones():
     for text in ("", "RAPF", "mean distance 1.234 m · Museum", "…"):
         for bold in (False, True):
             assert measure_text(text, 17, bold) == render_text(text, 17, (0, 0, 0), bold).get_width()
 
 
-def test_a_caption_has_what_the_brief_status_leaves_out():
+def test_a_caption_contains_the_facts_that_the_status_omits():
     """In a pane, controller and cost stand above the arena, and nothing of them below it."""
     record = run_of(SQUARE, 3)
     frames = []
@@ -69,7 +69,7 @@ def test_a_caption_has_what_the_brief_status_leaves_out():
         assert set(columns.tolist()) <= set(range(SIZE[0])[side])
 
 
-def test_a_long_status_is_cut_before_the_scale_bar():
+def test_a_long_status_ends_before_the_scale_bar():
     scene = scene_of(run_of(SQUARE, 3), cost="word " * 60)
     pixels, _ = changed(scene, "status", "scale_bar")
     alone, _ = changed(scene, "scale_bar")
@@ -78,7 +78,7 @@ def test_a_long_status_is_cut_before_the_scale_bar():
     assert status[:, 0].min() > alone[:, 0].max() + 8
 
 
-def test_the_legend_lists_exactly_what_is_shown():
+def test_the_legend_lists_the_visible_elements():
     scene = explained(
         TWO,
         forces=np.ones((2, 2)),
@@ -114,7 +114,7 @@ def test_the_legend_lists_exactly_what_is_shown():
     assert list_legend_texts(painter, rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
 
 
-def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
+def test_the_legend_is_above_the_arena_in_enough_rows():
     scene = scene_of(run_of(ROOMS, 6))
     names = [layer.name for layer in build_standard_layers()]
     for size in (SIZE, (1920, 1080)):

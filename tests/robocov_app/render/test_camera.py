@@ -17,20 +17,20 @@ cameras = st.builds(
 
 
 @given(cameras, places, places)
-def test_there_and_back(camera, x, y):
+def test_conversion_to_pixels_is_inverted(camera, x, y):
     point = np.array([x, y])
     assert camera.to_world(camera.to_pixels(point)) == pytest.approx(point, abs=1e-6)
 
 
 @given(cameras)
-def test_y_goes_up_in_the_world_and_down_on_the_page(camera):
+def test_y_points_up_in_the_world_and_down_in_pixels(camera):
     low, high = camera.to_pixels(np.array([[0.0, 0.0], [1.0, 1.0]]))
     assert high[0] > low[0] and high[1] < low[1]
     assert high[0] - low[0] == pytest.approx(camera.zoom, rel=1e-6, abs=1e-6)
 
 
 @given(cameras, st.floats(0.2, 5), st.floats(0, 4000), st.floats(0, 4000))
-def test_zoom_keeps_what_is_under_the_pointer(camera, factor, x, y):
+def test_zoom_keeps_the_position_under_the_pointer(camera, factor, x, y):
     under = camera.to_world(np.array([x, y]))
     zoomed = camera.zoom_at(factor, (x, y))
     assert zoomed.zoom == pytest.approx(camera.zoom * factor)
@@ -38,7 +38,7 @@ def test_zoom_keeps_what_is_under_the_pointer(camera, factor, x, y):
 
 
 @given(cameras, st.floats(-500, 500), st.floats(-500, 500))
-def test_pan_moves_everything_by_what_was_dragged(camera, dx, dy):
+def test_pan_moves_the_world_by_the_dragged_pixels(camera, dx, dy):
     point = np.array([1.0, 2.0])
     moved = camera.pan(dx, dy).to_pixels(point) - camera.to_pixels(point)
     assert moved == pytest.approx([dx, dy], abs=1e-3)

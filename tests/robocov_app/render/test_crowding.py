@@ -71,7 +71,7 @@ def merge(*legends: str) -> str:
     return "".join(merge_legends([list(legend) for legend in legends], str))
 
 
-def test_entries_of_later_legends_keep_their_place() -> None:
+def test_entries_of_later_legends_keep_their_position() -> None:
     assert merge("abe", "abcde") == "abcde"
     assert merge("abcde", "ace") == "abcde"
     assert merge("bc", "abd") == "abdc"

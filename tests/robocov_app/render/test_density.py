@@ -20,7 +20,7 @@ BOUNDS = (0.0, 0.0, 8.0, 8.0)
 SQUARE = Environment("square", ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)))
 
 
-def test_words_are_there_only_where_places_differ():
+def test_only_nonuniform_densities_are_described():
     for density in (None, Uniform(3.0), Gaussians((), 2.0), Raster(np.ones((2, 2)), BOUNDS)):
         assert describe_density(SQUARE.with_density(density)) == ""
         assert get_cost_name(SQUARE.with_density(density)) == "mean distance"
@@ -49,7 +49,7 @@ def test_the_more_the_stronger():
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_it_is_seen_and_nothing_drowns_in_it(theme):
+def test_the_density_is_visible_and_hides_nothing(theme):
     alpha = float(color_density(np.array([1.0]), theme)[0, 3]) / 255.0
     full = mix(theme.background, theme.density, alpha)
     assert compute_contrast(full, theme.background) > 1.4

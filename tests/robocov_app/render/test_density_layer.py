@@ -37,7 +37,7 @@ def pixel(painter: Painter, frame, x: float, y: float):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_the_shading_is_where_it_counts(theme):
+def test_the_shading_covers_the_region(theme):
     frames = {}
     for environment in (PLAIN, HEAVY):
         painter = Painter(environment, (500, 460), theme)
@@ -55,7 +55,7 @@ def test_the_shading_is_where_it_counts(theme):
     assert (pixel(painter, heavy, 5.0, 5.0) == pixel(painter, plain, 5.0, 5.0)).all()
 
 
-def test_the_legend_tells_of_it():
+def test_the_legend_contains_the_density():
     painter = Painter(HEAVY, (500, 460))
     assert "density φ, 0.1 to 2.1" in list_legend_texts(painter, scene_of(HEAVY))
     assert not any("φ" in words for words in list_legend_texts(painter, scene_of(PLAIN)))
@@ -78,7 +78,7 @@ def test_colors_of_distances_hide_it():
     assert not np.array_equal(painter.render_frame(scene_of(HEAVY)), with_both)
 
 
-def test_another_density_is_drawn_anew():
+def test_another_density_is_redrawn():
     painter = Painter(PLAIN, (400, 380))
     first = painter.render_frame(scene_of(HEAVY))
     other = PLAIN.with_density(POLYGONS["rooms"])

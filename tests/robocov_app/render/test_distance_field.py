@@ -80,7 +80,7 @@ def test_the_owner_is_the_nearest_robot(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_borders_are_where_two_robots_are_equally_near(seed):
+def test_borders_are_equally_far_from_two_robots(seed):
     cost, field = field_of(ROOMS, 6, seed)
     x, y, step = pixels(ROOMS)
     borders = field.compute_borders(x, y, 0.5 * step)
@@ -107,7 +107,7 @@ def test_every_change_of_owner_in_the_open_has_a_border(seed):
     assert (marked[:, 1:] | marked[:, :-1])[changes].mean() > 0.99
 
 
-def test_where_obstacles_move_a_field_is_of_its_time():
+def test_fields_with_moving_obstacles_depend_on_time():
     path = ObstaclePath(((2.0, 1.0), (2.0, 5.0)), 1.0)
     crossed = Environment("crossed", SEALED.boundary, (CircleObstacle((2.0, 1.0), 0.8, path=path),))
     fields = DistanceFields(CoverageCost(crossed, 64), 5.0)
@@ -163,7 +163,7 @@ THEMES = [LIGHT, DARK]
 
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-def test_colors_run_one_way_from_the_page_to_its_opposite(theme):
+def test_colors_change_monotonically_away_from_the_background(theme):
     brightness = np.array([compute_luminance(tuple(color)) for color in theme.build_heat_table(254).tolist()])
     steps = np.diff(brightness) * (1 if theme is DARK else -1)
     assert (steps >= -1e-3).all()
@@ -197,7 +197,7 @@ def test_levels_follow_the_distances_up_to_the_limit():
     np.testing.assert_allclose(level[near] / MAX_LEVEL * 5.0, distance[near], atol=5.0 / MAX_LEVEL)
 
 
-def test_where_nobody_can_come_is_hatched():
+def test_unreachable_areas_are_hatched():
     cost = CoverageCost(ROOMS, 32)
     field = DistanceField(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
     courtyard = compute_color_levels(field, np.linspace(1.8, 3.2, 50), np.linspace(8.6, 7.8, 30), 5.0, 9)
@@ -209,7 +209,7 @@ def test_where_nobody_can_come_is_hatched():
         assert tuple(colors[MAX_LEVEL + 1]) == theme.unreached
 
 
-def test_lines_are_as_wide_as_asked_for_and_smooth():
+def test_lines_have_the_requested_width_and_are_smooth():
     gap = np.linspace(0.0, 0.1, 1001)
     none = np.zeros(1001, dtype=np.intp)
     part = compute_line_opacities(BorderPixels(none, none, none, gap), zoom=50.0, width=3.0)

@@ -92,7 +92,7 @@ def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
         assert tuple(frame[y, x]) == LIGHT.get_cell_color(int(painter._hues[robot]))
 
 
-def test_borders_are_drawn_where_owners_change_and_nowhere_else():
+def test_borders_are_drawn_only_between_owners():
     cost, what = scene(seed=4)
     frame, painter = painted(what, "geodesic_cells", "distances")
     plain, _ = painted(what, "distances")
@@ -114,14 +114,14 @@ def test_cells_below_colors_are_lines_only():
     assert 0.001 < differs.mean() < 0.05
 
 
-def test_without_a_field_nothing_is_drawn_or_explained():
+def test_without_a_field_nothing_is_drawn():
     _, what = scene()
     frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "color_bar", "legend")
     assert (frame == LIGHT.background).all()
     assert list_legend_texts(painter, replace(what, field=None)) == []
 
 
-def test_the_legend_explains_what_is_shown():
+def test_the_legend_explains_the_distance_layers():
     _, what = scene()
     painter = Painter(ROOMS, SIZE)
     painter.change_visible(["distances", "geodesic_cells"], ["cells"])
@@ -134,7 +134,7 @@ def test_the_legend_explains_what_is_shown():
     "size", [(480, 360), *(pytest.param(size, marks=pytest.mark.slow) for size in ((900, 600), (1920, 1080)))]
 )
 @pytest.mark.parametrize("limit", [0.8, 8.0, 15.0, 2500.0])
-def test_the_scale_of_colors_stands_beside_the_map_and_is_whole(size, limit):
+def test_the_color_scale_is_complete_and_next_to_the_map(size, limit):
     _, what = scene(limit=limit)
     frame, painter = painted(what, "distances", "color_bar", "boundary", "status", size=size)
     corner = painter.camera.to_pixels(np.array([16.0, 0.0]))
@@ -150,7 +150,7 @@ def test_the_scale_of_colors_stands_beside_the_map_and_is_whole(size, limit):
     assert far.mean() < size[1] / 2
 
 
-def test_the_scale_says_when_there_is_more(monkeypatch):
+def test_the_color_scale_marks_values_beyond_its_end(monkeypatch):
     from robocov_app.render import canvas
 
     said = []
@@ -164,7 +164,7 @@ def test_the_scale_says_when_there_is_more(monkeypatch):
 
 
 @pytest.mark.parametrize("layer", ["distances", "geodesic_cells"])
-def test_an_unchanged_picture_is_kept(layer, monkeypatch):
+def test_an_unchanged_picture_is_cached(layer, monkeypatch):
     _, what = scene()
     made = []
     name = f"render_{layer}"

@@ -14,7 +14,7 @@ from robocov_app.look.theme import DARK, LIGHT
 
 @settings(deadline=None, max_examples=25)
 @given(st.floats(0, 2 * np.pi), st.sampled_from(["velocities", "force_attraction", "force_resultant"]))
-def test_arrows_point_the_right_way(angle, name):
+def test_arrows_have_the_direction_of_their_vectors(angle, name):
     direction = np.array([np.cos(angle), np.sin(angle)])
     scene = explained(ONE, forces=1.5 * direction[None], velocities=0.9 * direction[None])
     pixels, painter = changed(scene, name)
@@ -85,7 +85,7 @@ def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_viscosity_has_its_color_and_its_words(theme):
+def test_viscosity_has_its_own_color_and_legend(theme):
     scene = gliding(-0.9, 0.0)
     frame, painter = drawn(scene, "force_viscosity", theme=theme)
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
@@ -130,7 +130,7 @@ def test_links_are_those_of_the_graph():
     assert nearest(frame, none, LIGHT.final) < 120
 
 
-def test_obstacle_points_are_marked_where_there_are_any():
+def test_sensed_obstacle_points_are_marked():
     points = np.array([[np.nan, np.nan], [7.0, 1.0]])
     scene = explained(TWO, obstacle_points=points)
     frame, painter = drawn(scene, "obstacle_points")

@@ -46,7 +46,7 @@ def scanned(*scans):
 
 class TestRayScan:
     @THEMES
-    def test_what_is_looked_over_is_tinted_a_little_and_nothing_else(self, theme):
+    def test_only_the_scanned_area_is_tinted(self, theme):
         place, ends = scan()
         frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
         area = shapely.Polygon(ends)
@@ -61,14 +61,14 @@ class TestRayScan:
             assert distance(frame, pixel, theme.background) == 0
 
     @THEMES
-    def test_dots_are_where_rays_hit_and_not_where_they_end_in_the_open(self, theme):
+    def test_only_rays_that_hit_end_in_dots(self, theme):
         place, ends = scan()
         frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
         for pixel, end in zip(painter.camera.to_pixels(ends), ends, strict=True):
             far = nearest(frame, pixel, theme.final)
             assert far < 40 if end[0] > 5.39 else far > 60
 
-    def test_rays_are_no_hedgehog(self):
+    def test_rays_are_sparse_near_the_robot(self):
         """They are seen far out, and near the robot there is no more ink than there."""
         place, ends = scan(wall=8.0)
         frame, painter = drawn(scanned((place, ends)), "scan")
@@ -83,7 +83,7 @@ class TestRayScan:
         rim = ink[(away > 0.8 * reach - 0.5) & (away < 0.8 * reach + 0.5)]
         assert (rim > np.median(ink[(away > 3) & (away < 10)]) + 5).sum() >= 100
 
-    def test_where_scans_overlap_nothing_gets_darker(self):
+    def test_overlapping_scans_are_not_darker(self):
         alone, painter = drawn(scanned(scan(wall=9.0)), "scan")
         both, _ = drawn(scanned(scan(wall=9.0), scan((4.5, 4.0), wall=9.0)), "scan")
         fills = []
@@ -95,7 +95,7 @@ class TestRayScan:
             fills.append(colors[count.argmax()].tolist())
         assert fills[0] == fills[1] != list(LIGHT.background)
 
-    def test_close_up_it_is_drawn_too(self):
+    def test_scans_are_drawn_at_high_zoom(self):
         scene = scanned(scan())
         painter = Painter(SQUARE, SIZE)
         painter.show_only({"scan"})
@@ -107,7 +107,7 @@ class TestRayScan:
         painter.camera = Camera((400.0, 4.0), 100.0, painter.camera.view)
         assert (painter.render_frame(scene) == 255).all()
 
-    def test_without_scans_there_is_nothing(self):
+    def test_without_scans_nothing_is_drawn(self):
         pixels, painter = changed(explained(ONE), "scan")
         assert len(pixels) == 0
         assert list_legend_texts(painter, explained(ONE)) == []
@@ -133,7 +133,7 @@ def dots(frame, painter, theme=LIGHT, points=SEEN):
 
 class TestSensedObstacles:
     @THEMES
-    def test_what_was_sensed_stands_out_against_the_pale_truth(self, theme):
+    def test_sensed_points_contrast_with_pale_obstacles(self, theme):
         frame, painter = drawn(knowing(), "obstacles", "sensed", theme=theme)
         assert dots(frame, painter, theme) == [True, True, True]
         pale = mix(theme.background, theme.obstacle, 0.3)
@@ -145,13 +145,13 @@ class TestSensedObstacles:
         for pixel in painter.camera.to_pixels(inside(ROOMS.free.buffer(-0.12), 200)):
             assert distance(frame, pixel, theme.background) == 0  # that of the courtyard too
 
-    def test_the_truth_keeps_its_outline(self):
+    def test_pale_obstacles_keep_their_outline(self):
         frame, painter = drawn(knowing(), "obstacles", "sensed")
         edge = painter.camera.to_pixels(np.array([[4.0, 4.0], [2.5, 7.0], [2.5, 7.6], [10.05, 2.8]]))
         for pixel in edge:
             assert nearest(frame, pixel, mix(LIGHT.background, LIGHT.obstacle_edge, 0.6)) < 40
 
-    def test_an_obstacle_in_a_courtyard_pales_too(self):
+    def test_an_obstacle_in_a_courtyard_is_pale_as_well(self):
         ring = PolygonObstacle(
             ((0.5, 0.5), (7.5, 0.5), (7.5, 7.5), (0.5, 7.5)), (((1, 1), (7, 1), (7, 7), (1, 7)),)
         )
@@ -164,7 +164,7 @@ class TestSensedObstacles:
         for point, color in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
             assert distance(frame, painter.camera.to_pixels(np.array(point)), color) == 0
 
-    def test_the_boundary_stays_as_it_is(self):
+    def test_the_boundary_does_not_change(self):
         scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
         plain, painter = drawn(scene, "obstacles", "boundary")
         frame, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "boundary", "sensed")
@@ -176,13 +176,13 @@ class TestSensedObstacles:
         pale, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "sensed")
         assert (pale != frame).any()
 
-    def test_where_obstacles_are_not_shown_only_points_are(self):
+    def test_points_are_drawn_without_the_obstacle_layer(self):
         pixels, painter = changed(knowing(), "sensed")
         away = np.linalg.norm(pixels[:, None] - painter.camera.to_pixels(SEEN), axis=2)
         assert len(pixels) >= 3 * 9
         assert away.min(axis=1).max() < 2.1 * painter.scale + 1.5
 
-    def test_of_the_robot_that_is_asked_about_only(self):
+    def test_only_points_of_the_selected_robot_are_drawn(self):
         scene = knowing(selected=1, numbers=(1, 7, 3))
         scene = replace(scene, numbers=(1, 7, 3, 9))
         frame, painter = drawn(scene, "obstacles", "sensed")
@@ -192,7 +192,7 @@ class TestSensedObstacles:
         assert dots(frame, painter) == [True, True, True]
         assert list_legend_texts(painter, replace(scene, selected=None))[-1] == "known obstacles"
 
-    def test_points_come_and_go_with_time(self):
+    def test_points_depend_on_the_time(self):
         record = run_of(ROOMS, 4)
         sensed = SensedPoints()
         for time, point in zip((0.0, 1.0, 2.0), SEEN, strict=True):
@@ -203,7 +203,7 @@ class TestSensedObstacles:
             frame = painter.render_frame(replace(scene_of(record, row), sensed=sensed)).astype(int)
             assert dots(frame, painter) == [True] * known + [False] * (3 - known)
 
-    def test_another_history_leaves_nothing_of_the_old(self):
+    def test_another_history_replaces_all_points(self):
         painter = Painter(ROOMS, SIZE)
         painter.show_only({"obstacles", "sensed"})
         scene = knowing(SEEN[:2], (1, 2))
@@ -217,7 +217,7 @@ class TestSensedObstacles:
             False,
         ]
 
-    def test_another_map_or_theme_or_view_is_drawn_anew(self):
+    def test_another_map_theme_or_view_is_redrawn(self):
         painter = Painter(ROOMS, SIZE)
         painter.show_only({"obstacles", "sensed"})
         painter.render_frame(knowing())
@@ -230,7 +230,7 @@ class TestSensedObstacles:
         at = painter.camera.to_pixels(np.array([4.4, 5.5]))
         assert distance(frame, at, DARK.background) == 0
 
-    def test_nothing_is_drawn_anew_where_nothing_is_new(self, monkeypatch):
+    def test_known_points_are_not_redrawn(self, monkeypatch):
         counts = []
         draw_dots = known_obstacles.draw_dots
 
@@ -254,7 +254,7 @@ class TestSensedObstacles:
         assert len(pages) == 1
 
     @THEMES
-    def test_it_does_not_hide_where_obstacles_head(self, theme):
+    def test_known_points_do_not_hide_headings_of_obstacles(self, theme):
         cart = CircleObstacle(
             (12.0, 7.0), 0.8, "cart", ObstaclePath(((12, 7), (15, 7)), 1.0, "back-and-forth")
         )
@@ -266,7 +266,7 @@ class TestSensedObstacles:
         pale = mix(theme.background, theme.obstacle, 0.3)
         assert nearest(frame, painter.camera.to_pixels(np.array([13.0, 7.5])), pale) < 5
 
-    def test_without_knowledge_there_is_nothing(self):
+    def test_without_knowledge_nothing_is_drawn(self):
         scene = scene_of(run_of(ROOMS, 4))
         assert len(changed(scene, "sensed")[0]) == 0
         assert not layer_named("sensed").can_draw(scene)
@@ -293,14 +293,14 @@ class TestCursorPath:
                 assert nearest(frame, pixel, theme.final) < 50
         assert nearest(frame, painter.camera.to_pixels(WAY[0]), theme.final) < 5  # a dot at the cursor
 
-    def test_draws_nothing_else(self):
+    def test_only_the_path_is_drawn(self):
         pixels, painter = changed(pathed(), "path")
         line = shapely.LineString(painter.camera.to_pixels(WAY)).buffer(3 * painter.scale)
         begin = shapely.Point(painter.camera.to_pixels(WAY[0])).buffer(75 * painter.scale)
         assert shapely.contains_xy(line.union(begin), pixels).all()
 
     @THEMES
-    def test_has_a_light_around_it_that_parts_it_from_what_it_crosses(self, theme):
+    def test_the_path_has_a_halo(self, theme):
         scene = pathed((1.0, 4.0), (7.0, 4.0))
         frame, painter = drawn(scene, "cells", "path", theme=theme)
         pixel = painter.camera.to_pixels(np.array([5.5, 4.0]))
@@ -326,7 +326,7 @@ class TestCursorPath:
         assert np.abs(away).max() < 45 * painter.scale
         assert len(tags(frame, painter, "9.87 m", theme)) == 0
 
-    def test_long_ways_are_told_in_whole_meters(self):
+    def test_long_paths_have_whole_meters(self):
         painter = Painter(SQUARE, SIZE)
         painter.show_only({"path"})
         painter.camera = Camera((4.0, 4.0), 0.5, painter.camera.view)
@@ -343,7 +343,7 @@ class TestCursorPath:
         assert len(tags(frame, painter, "5.66 m")) == 1
 
     @pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
-    def test_the_tag_does_not_hide_the_way_nor_the_robot(self, angle):
+    def test_the_tag_hides_neither_path_nor_robot(self, angle):
         heading = np.array([np.cos(angle), np.sin(angle)])
         end = 4.0 + 0.6 * heading
         scene = pathed((4.0, 4.0), end, positions=np.array([end]))
@@ -368,7 +368,7 @@ class TestCursorPath:
         assert (frame[y - 4 : y + 5, x - 4 : x + 5] == 255).all()
 
     @pytest.mark.parametrize("path", [None, np.empty((0, 2)), np.array([[1.0, 1.0]])])
-    def test_without_a_way_there_is_nothing(self, path):
+    def test_without_a_path_nothing_is_drawn(self, path):
         scene = replace(explained(TWO), path=path)
         pixels, painter = changed(scene, "path")
         assert len(pixels) == 0

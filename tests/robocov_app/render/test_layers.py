@@ -23,13 +23,13 @@ from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 
 
-def test_every_layer_has_a_name_of_its_own_and_words():
+def test_every_layer_has_a_unique_name_and_a_title():
     layers = build_standard_layers()
     assert len({layer.name for layer in layers}) == len(layers)
     assert all(layer.title for layer in layers)
 
 
-def test_nothing_is_drawn_when_nothing_is_shown():
+def test_without_visible_layers_nothing_is_drawn():
     pixels, _ = changed(scene_of(run_of(ROOMS, 6)))
     assert len(pixels) == 0
 
@@ -51,7 +51,7 @@ def test_a_cell_has_the_tint_of_the_nearest_robot(n, theme):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_cells_by_time_have_the_tint_of_who_is_there_first(theme):
+def test_cells_by_travel_time_have_the_tint_of_the_first_to_arrive(theme):
     """Slow robots' cells are holes in those of fast ones, with arcs for borders."""
     record = run_of(SQUARE, 6)
     speeds = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
@@ -97,7 +97,7 @@ def test_narrow_cells_have_plain_edges(n):
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
-def test_obstacles_are_where_the_robots_cannot_be(environment):
+def test_obstacles_are_drawn_on_blocked_positions(environment):
     frame, painter = drawn(scene_of(run_of(environment, 4)), "obstacles")
     solid = inside(environment.blocked.buffer(-0.08), 150)
     free = inside(environment.free.buffer(-0.08), 300)
@@ -169,7 +169,7 @@ class TestCrowds:
         canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, choose_robot_hues(0))
         return np.array(compute_drawn_radii(canvas, scene)), painter
 
-    def test_discs_keep_apart_where_the_smallest_ones_can(self):
+    def test_discs_overlap_only_if_the_smallest_ones_would(self):
         positions = 4.0 + np.random.default_rng(0).normal(size=(150, 2)) * 0.9
         radii, painter = self.radii(positions)
         pixels = painter.camera.to_pixels(positions)
@@ -186,7 +186,7 @@ class TestCrowds:
         assert radii[-1] == pytest.approx(9.0 * painter.scale, abs=0.25)
         assert radii[:4].max() <= 2.4 * painter.scale + 0.5
 
-    def test_numbers_only_where_they_have_room(self, monkeypatch):
+    def test_numbers_are_drawn_only_if_they_fit(self, monkeypatch):
         from robocov_app.render import sprites
 
         seen = {}
@@ -351,7 +351,7 @@ class TestCells:
         snapshot = Snapshot(scene.snapshot.seen, decision)
         return Scene.from_snapshot(SQUARE, scene.team, snapshot)
 
-    def test_those_of_the_law_are_taken_where_all_hear_all(self):
+    def test_cells_of_the_controller_are_used_with_full_communication(self):
         used = partition(TWO, SQUARE.region)
         scene = self.scene(np.inf, used)
         assert scene.cells is used.polygons
@@ -367,7 +367,7 @@ class TestCells:
             None,
         ],
     )
-    def test_where_the_law_has_others_those_of_all_robots_are_drawn(self, reach, used):
+    def test_true_cells_are_drawn_if_the_controller_has_others(self, reach, used):
         scene = self.scene(reach, used)
         frame, painter = drawn(scene, "cells")
         assert nearest(frame, painter.camera.to_pixels(np.array([3.0, 5.0])), LIGHT.cell_edge) < 70
@@ -386,7 +386,7 @@ class TestTrajectories:
             for pixel in painter.camera.to_pixels(record.positions[5:35:4, robot]):
                 assert nearest(frame, pixel, color) < 110
 
-    def test_frame_by_frame_looks_like_all_at_once(self):
+    def test_frames_one_by_one_look_like_the_whole_trail(self):
         record = run_of(SQUARE, 5, steps=60)
         painter = Painter(SQUARE, SIZE)
         painter.show_only({"trajectories"})
@@ -407,7 +407,7 @@ class TestTrajectories:
         )
         assert (stepwise[far] == 255).all()
 
-    def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
+    def test_another_run_or_a_step_back_replaces_the_page(self):
         first, second = run_of(SQUARE, 5, seed=1), run_of(SQUARE, 5, seed=2)
         painter = Painter(SQUARE, SIZE)
         painter.show_only({"trajectories"})
@@ -438,7 +438,7 @@ class TestMovingObstacles:
     def scene(self, time: float) -> Scene:
         return Scene(self.CARTS.at(time), Team.homogeneous(1), moving=list_moving_obstacles(self.CARTS, time))
 
-    def test_know_where_they_are_and_head(self):
+    def test_moving_obstacles_have_positions_and_headings(self):
         (cart,) = list_moving_obstacles(self.CARTS, 6.0)
         assert cart.middle == pytest.approx([5.0, 3.0])
         assert cart.heading == pytest.approx([0.0, 1.0])
@@ -446,7 +446,7 @@ class TestMovingObstacles:
         assert list_moving_obstacles(self.CARTS.static, 6.0) == []
 
     @pytest.mark.parametrize("theme", [LIGHT, DARK])
-    def test_look_different_from_static_ones(self, theme):
+    def test_moving_obstacles_differ_from_static_ones(self, theme):
         painter = Painter(self.CARTS, (480, 360), theme)
         frame = painter.render_frame(self.scene(2.0))
 

@@ -31,7 +31,7 @@ def around(frame, painter, place, radius):
 
 class TestFailed:
     @THEMES
-    def test_is_grey_and_crossed_out_where_it_stands(self, theme):
+    def test_a_failed_robot_is_gray_and_crossed_out(self, theme):
         frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
         center = painter.camera.to_pixels(np.array([4.0, 5.0]))
         assert distance(frame, center, theme.ink) < 8
@@ -42,7 +42,7 @@ class TestFailed:
             assert nearest(frame, at, mix(theme.background, theme.ink, 0.3)) < 12
 
     @THEMES
-    def test_does_not_look_like_a_robot_that_works(self, theme):
+    def test_a_failed_robot_differs_from_a_working_one(self, theme):
         frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
         disc = around(frame, painter, (4.0, 5.0), 9)
         assert np.ptp(disc, axis=1).max() < 32  # no hue
@@ -51,7 +51,7 @@ class TestFailed:
         assert compute_contrast(mix(theme.background, theme.ink, 0.3), theme.ink) > 4
 
     @THEMES
-    def test_has_its_number_beside_it(self, theme):
+    def test_a_failed_robot_has_its_number_next_to_it(self, theme):
         failed = {12: (2.0, 6.0), 3: (6.0, 2.0)}
         frame, painter = drawn(broken(failed), "failed", theme=theme)
         for number, place in failed.items():
@@ -71,7 +71,7 @@ class TestFailed:
             ([(1, 0), (-1, 0), (0, 1)], (0, 1)),
         ],
     )
-    def test_its_number_is_where_no_robot_is(self, robots, side):
+    def test_the_number_of_a_failed_robot_covers_no_robot(self, robots, side):
         """Robots at the right, left and above (y up) push it left, above and below (y down)."""
         near = 4.0 + 0.4 * np.array(robots).reshape(-1, 2)
         positions = np.vstack([near, [[1.0, 1.0]]])
@@ -112,13 +112,13 @@ class TestFailed:
         disc = (around(alone, painter, (4.0, 4.0), 7), around(frame, painter, (4.0, 4.0), 7))
         assert (disc[0] == disc[1]).all()
 
-    def test_where_none_failed_there_is_nothing(self):
+    def test_without_failed_robots_nothing_is_drawn(self):
         pixels, painter = changed(broken({}), "failed")
         assert len(pixels) == 0
         assert list_legend_texts(painter, broken({})) == []
         assert list_legend_texts(painter, broken({3: (4.0, 5.0)})) == ["failed robot"]
 
-    def test_it_is_there_too_before_anything_moves(self):
+    def test_failed_robots_are_drawn_before_the_first_step(self):
         frame, painter = drawn(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
         assert len(numbers(frame, painter, "3")) == 1
 
@@ -159,7 +159,7 @@ class TestSelection:
         away = np.hypot(*(pixels - painter.camera.to_pixels(TWO[1])).T)
         assert painter.camera.zoom < away.min() < away.max() < 1.15 * painter.camera.zoom
 
-    def test_where_nobody_is_asked_about_there_is_nothing(self):
+    def test_without_a_selected_robot_nothing_is_drawn(self):
         assert len(changed(explained(TWO), "selection")[0]) == 0
         assert len(changed(replace(explained(TWO), selected=0, snapshot=None), "selection")[0]) == 0
 
@@ -179,7 +179,7 @@ def test_marks_stay_inside_the_picture_of_the_map():
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_unicycles_have_a_nose_where_they_face(theme):
+def test_unicycles_have_a_nose_in_their_heading(theme):
     plain = explained(TWO)
     team = replace(plain.team, track_width=np.array([0.0, 0.16]))
     painter = Painter(SQUARE, SIZE, theme)

@@ -18,7 +18,7 @@ from robocov_app.render.painter import Painter, choose_scale
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
-def test_a_frame_has_the_size_that_was_asked_for(size):
+def test_a_frame_has_the_requested_size(size):
     frame = Painter(ROOMS, size).render_frame(scene_of(run_of(ROOMS, 6)))
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
@@ -47,7 +47,7 @@ def test_a_frame_is_not_overwritten_by_the_next():
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
 @pytest.mark.parametrize("size", [(480, 360), (1280, 720), (400, 900)])
-def test_the_whole_region_is_in_the_picture(environment, size):
+def test_the_whole_region_is_visible(environment, size):
     painter = Painter(environment, size)
     painter.render_frame(scene_of(run_of(environment, 3)))
     corners = painter.camera.to_pixels(environment.region.vertices)
@@ -97,7 +97,7 @@ def test_any_zoom_can_be_drawn(factor, pan, at):
 
 @settings(deadline=None, max_examples=15)
 @given(st.floats(20, 5000), st.floats(0.5, 7.5), st.floats(0.5, 7.5))
-def test_what_is_magnified_is_still_true(factor, x, y):
+def test_magnified_pictures_are_exact(factor, x, y):
     """Cells seen through a strong lens: edges that end far outside do not turn."""
     scene = explained(np.array([[1.0, 2.0], [6.0, 7.0], [5.0, 1.0]]))
     painter = Painter(SQUARE, (320, 240))
@@ -150,7 +150,7 @@ def test_a_surface_of_another_size_is_filled():
     assert painter.render_frame(scene).shape == (500, 800, 3)
 
 
-def test_what_does_not_change_is_drawn_once():
+def test_static_layers_are_drawn_once():
     calls = []
     layers = build_standard_layers()
     at = [layer.name for layer in layers].index("obstacles")
@@ -166,7 +166,7 @@ def test_what_does_not_change_is_drawn_once():
     assert len(calls) == 2
 
 
-def test_kept_pages_follow_what_is_shown():
+def test_cached_pages_depend_on_the_visible_layers():
     scene = scene_of(run_of(ROOMS, 6))
     painter = Painter(ROOMS, (640, 480))
     with_grid = painter.render_frame(scene)
@@ -205,7 +205,7 @@ def test_the_fonts_are_there():
         assert path is not None and path.is_file()
 
 
-def test_text_is_cut_to_the_width_given():
+def test_texts_are_shortened_to_a_width():
     text = "a rather long name of a map"
     assert fonts.shorten_to_width(text, 12, 1000) == text
     cut = fonts.shorten_to_width(text, 12, 90)
@@ -244,7 +244,7 @@ def test_frames_need_no_display_and_no_matplotlib():
     assert done.stdout == ""  # pygame's greeting is for others
 
 
-def test_the_map_does_not_jump_when_what_the_legend_tells_of_comes_and_goes() -> None:
+def test_the_map_does_not_jump_when_the_legend_changes() -> None:
     scene = scene_of(run_of(ROOMS, 6))
     there = replace(scene, path=np.array([[1.0, 4.5], [2.0, 4.5]]), failed={9: (3.0, 4.0)})
     painter = Painter(ROOMS, (420, 320))

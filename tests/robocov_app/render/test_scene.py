@@ -35,7 +35,7 @@ def record() -> Record:
     return Simulation(HALL, Rapf(), STARTS, team, 0.05, conditions=conditions).run(1.5)
 
 
-def test_robots_that_work_failed_ones_and_obstacles_where_they_are(record: Record) -> None:
+def test_a_scene_has_working_and_failed_robots_and_obstacles(record: Record) -> None:
     first, later, last = (build_record_scene(record, row) for row in (0, 12, 30))
     assert first.numbers == (1, 2, 4)
     assert first.failed == {}
@@ -65,7 +65,7 @@ def test_neighbors_are_renumbered(record: Record) -> None:
     assert set(zip(rows[robot].tolist(), rows[neighbor].tolist(), strict=True)) == expected
 
 
-def test_who_joins_has_no_trail_before(record: Record) -> None:
+def test_a_robot_has_no_trail_before_it_joins(record: Record) -> None:
     scene = build_record_scene(record, 30)
     assert scene.trail is not None
     assert scene.starts is not None
@@ -73,7 +73,7 @@ def test_who_joins_has_no_trail_before(record: Record) -> None:
     assert (scene.trail[:15, 1] == scene.starts[1]).all()
 
 
-def test_films_and_plots_of_it_can_be_drawn(record: Record) -> None:
+def test_videos_and_plots_of_changing_teams_can_be_drawn(record: Record) -> None:
     frames = [
         frame.copy()
         for frame in draw_frames(
@@ -108,7 +108,7 @@ def test_a_record_of_ideal_conditions_is_shown_as_ever() -> None:
 NOTHING = (np.nan, np.nan)
 
 
-def test_points_come_with_their_robots():
+def test_points_have_the_numbers_of_their_robots():
     sensed = SensedPoints()
     sensed.add(0.0, (1, 4), np.array([[1.0, 1.0], [2.0, 2.0]]))
     sensed.add(0.5, (1, 4), np.array([[1.5, 1.0], NOTHING]))
@@ -118,7 +118,7 @@ def test_points_come_with_their_robots():
     assert robots.tolist() == [1, 4, 1]
 
 
-def test_what_is_sensed_again_counts_once():
+def test_a_point_that_is_sensed_again_counts_once():
     sensed = SensedPoints()
     for k in range(50):
         sensed.add(k / 60, (1, 2), np.full((2, 2), CELL_SIZE_M * (3.1 + 0.01 * k)))
@@ -133,7 +133,7 @@ def test_what_is_sensed_again_counts_once():
     assert len(sensed) == 6
 
 
-def test_nothing_sensed_is_nothing_known():
+def test_without_sensing_no_point_is_known():
     sensed = SensedPoints()
     sensed.add(0.0, (1, 2), np.array([NOTHING, NOTHING]))
     sensed.add(0.0, (), np.empty((0, 2)))
@@ -143,7 +143,7 @@ def test_nothing_sensed_is_nothing_known():
     assert robots.shape == (0,)
 
 
-def test_what_was_known_at_a_time():
+def test_known_points_at_a_time():
     sensed = SensedPoints()
     for k in range(10):
         sensed.add(float(k), (1,), np.array([[float(k), 0.0]]))
@@ -153,7 +153,7 @@ def test_what_was_known_at_a_time():
     assert len(sensed.get_until(1e9)[0]) == 10
 
 
-def test_what_was_sensed_later_is_forgotten_and_can_be_sensed_again():
+def test_removed_points_can_be_sensed_again():
     sensed = SensedPoints()
     for k in range(10):
         sensed.add(float(k), (1,), np.array([[float(k), 0.0]]))
@@ -198,7 +198,7 @@ def test_more_than_so_many_are_not_remembered(monkeypatch):
         max_size=30,
     )
 )
-def test_it_is_what_was_sensed_first_in_each_square(steps):
+def test_the_first_point_in_each_square_is_known(steps):
     sensed, time, kept = SensedPoints(), 0.0, []
     for seconds, points, back in steps:
         time += seconds

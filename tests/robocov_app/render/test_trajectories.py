@@ -93,7 +93,7 @@ class TestThinning:
 
     @FADES
     @pytest.mark.parametrize("together", [pytest.param(0, marks=pytest.mark.slow), 3])
-    def test_gives_the_same_picture_and_redraws_nothing(self, fade, together):
+    def test_a_continued_trail_gives_the_same_picture_without_redrawing(self, fade, together):
         """Also where rows were added before the next frame."""
         trail = walks(self.rows)
         whole, _ = painter_of(fade)
@@ -110,7 +110,7 @@ class TestThinning:
                 assert layer._page is page
         assert fade is not None or layer._page is page
 
-    def test_where_nothing_is_kept_the_picture_is_nearly_the_same(self):
+    def test_without_a_cached_page_the_picture_is_nearly_the_same(self):
         trail = walks(self.rows)
         expected = frame_of(painter_of()[0], trail)
         seen = frame_of(painter_of()[0], *self.thinned(trail))
@@ -118,7 +118,7 @@ class TestThinning:
         assert drawn_pixels.sum() > 800
         assert np.abs(expected - seen)[drawn_pixels].mean() < 12
 
-    def test_another_trail_of_the_same_length_is_drawn_anew(self):
+    def test_another_trail_of_the_same_length_is_redrawn(self):
         painter, _ = painter_of()
         for seed in (0, 1, 0):
             seen = frame_of(painter, walks(60, seed=seed))
@@ -151,7 +151,7 @@ class TestGaps:
             assert ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max() == 0
 
     @FADES
-    def test_robots_that_come_back_elsewhere_leave_no_line_between(self, fade):
+    def test_robots_that_join_again_elsewhere_have_separate_paths(self, fade):
         trail = straight(60, 2)
         trail[30:40, 1] = np.nan
         trail[40:, 1, 1] = 6.0
@@ -176,7 +176,7 @@ class TestGaps:
         assert (ink(frame) > 0).any()
 
     @FADES
-    def test_robots_that_go_leave_their_path_and_nothing_else(self, fade):
+    def test_robots_that_fail_leave_only_their_path(self, fade):
         trail = straight(50, 2)
         trail[35:, 1] = np.nan
         painter, _ = painter_of(fade)
@@ -186,7 +186,7 @@ class TestGaps:
         assert nearest(frame, painter.camera.to_pixels(trail[30, 1]), choose_trail_color(LIGHT, 1)) < 200
 
     @FADES
-    def test_a_robot_that_never_was_there_draws_nothing(self, fade):
+    def test_an_absent_robot_has_no_path(self, fade):
         trail = straight(40, 2)
         trail[:, 1] = np.nan
         alone = frame_of(painter_of(fade)[0], trail)
@@ -245,7 +245,7 @@ class TestFading:
         assert self.strengths(frame, painter, trail, [5], theme) == [0]
 
     @THEMES
-    def test_it_fades_into_what_lies_below(self, theme):
+    def test_trails_fade_into_the_layers_below(self, theme):
         """On a cell it is neither paler nor darker than the cell and the color of its robot."""
         trail = straight(70)
         painter, _ = painter_of(3.0, theme, also={"cells"})
@@ -259,7 +259,7 @@ class TestFading:
         x, y = np.rint(painter.camera.to_pixels(trail[14, 0])).astype(int)
         assert 0 < nearest(frame, (x, y), theme.get_cell_color(0), reach=0) < 60
 
-    def test_where_paths_cross_the_newer_is_on_top(self):
+    def test_newer_paths_are_on_top(self):
         rows = 61
         trail = np.empty((rows, 2, 2))
         part = np.arange(rows) / RATE
@@ -286,7 +286,7 @@ class TestFading:
         assert band.max(axis=0).min() > 60
 
     @pytest.mark.slow
-    def test_rows_as_old_as_it_goes_are_no_trouble(self):
+    def test_the_oldest_rows_of_a_fading_trail_are_drawn(self):
         """Rounding may find them a little older."""
         painter, _ = painter_of(0.3)
         trail = straight(40)
@@ -300,7 +300,7 @@ class TestFading:
                 assert (ink(frame) > 0).any()
         assert older > 0
 
-    def test_its_page_is_kept_between_steps(self):
+    def test_the_page_of_a_fading_trail_is_cached_between_steps(self):
         trail = walks(200)
         painter, layer = painter_of(6.0)
         pages = []
@@ -310,13 +310,13 @@ class TestFading:
                 pages.append(layer._page)
         assert len(pages) == pytest.approx(100 / RATE / (6.0 / FADE_STEPS), abs=2)
 
-    def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
+    def test_another_run_or_a_step_back_replaces_the_page(self):
         painter, _ = painter_of(4.0)
         frame_of(painter, walks(43))
         for trail in (walks(43, seed=1), walks(41, seed=1), walks(42), walks(20), walks(3)):
             assert (frame_of(painter, trail) == frame_of(painter_of(4.0)[0], trail)).all()
 
-    def test_other_colors_are_drawn_anew(self):
+    def test_other_colors_are_redrawn(self):
         trail = straight(40, 2)
         for fade in (None, 4.0):
             painter, _ = painter_of(fade)
@@ -341,14 +341,14 @@ class TestFading:
         scene = replace(walked(trail), trail_time=None)  # it cannot, without times
         assert (painter.render_frame(scene) == stays).all()
 
-    def test_a_single_row_or_robots_at_rest_draw_nothing_far_off(self):
+    def test_short_trails_and_robots_at_rest_draw_nothing_distant(self):
         still = np.repeat(walks(1), 30, axis=0)
         for trail in (still, still[:1]):
             frame = frame_of(painter_of(1.0)[0], trail)
             assert (ink(frame) > 0).sum() <= 3 * 9
 
     @FADES
-    def test_close_up_it_is_drawn_too(self, fade):
+    def test_scans_are_drawn_at_high_zoom(self, fade):
         painter, _ = painter_of(fade)
         trail = walks(60)
         x, y = trail[-5, 0]

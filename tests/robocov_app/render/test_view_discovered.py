@@ -32,7 +32,7 @@ def scene(selected: int | None = 0):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_walls_and_what_is_unknown_are_seen(theme):
+def test_walls_and_unknown_cells_are_visible(theme):
     known, shown = scene()
     assert get_discovered_map(shown) is known
     frame, painter = drawn(shown, "sensed", theme=theme)
@@ -52,7 +52,7 @@ def test_walls_and_what_is_unknown_are_seen(theme):
     assert distance(frame, at["unknown"], mix(theme.background, theme.obstacle, 0.28)) < 6
 
 
-def test_without_a_robot_or_a_map_nothing_is_drawn():
+def test_without_a_selected_robot_or_map_nothing_is_drawn():
     _, shown = scene(selected=None)
     assert get_discovered_map(shown) is None
     assert get_discovered_map(replace(explained(ONE), selected=0)) is None

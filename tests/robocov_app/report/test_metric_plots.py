@@ -47,7 +47,7 @@ def test_every_metric_has_a_plot_that_is_described_with_its_final_values() -> No
     assert len(first_ids) == len(plots)
 
 
-def test_a_single_robot_has_no_distance_to_others() -> None:
+def test_a_single_robot_has_no_separation() -> None:
     assert "Separation" not in draw_plots([build_replay_run(robots=1, seconds=1.0)])
 
 

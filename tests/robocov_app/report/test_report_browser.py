@@ -103,7 +103,7 @@ def opened(browser: Browser, page: Path) -> Browser:
     return browser
 
 
-def test_it_opens_without_a_complaint_and_asks_for_nothing(browser, page, tmp_path) -> None:
+def test_a_page_opens_without_errors_or_requests(browser, page, tmp_path) -> None:
     browser.open(page)
     browser.until(lambda: browser.all(".pane"))
     assert browser.complaints() == []
@@ -164,7 +164,7 @@ def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
                 assert opened.pixel(pane, column - 7, row) == LIGHT.final
 
 
-def test_a_click_into_the_curves_goes_to_that_time(opened) -> None:
+def test_a_click_on_the_curves_seeks_to_that_time(opened) -> None:
     from selenium.webdriver import ActionChains
 
     chart = opened.find(".chart")
@@ -176,7 +176,7 @@ def test_a_click_into_the_curves_goes_to_that_time(opened) -> None:
     assert 0.5 < first < opened.time < SECONDS
 
 
-def test_all_of_it_can_be_done_with_the_keyboard(opened) -> None:
+def test_everything_can_be_done_with_the_keyboard(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
     opened.js("document.querySelector('.stage').focus()")
@@ -203,7 +203,7 @@ def test_all_of_it_can_be_done_with_the_keyboard(opened) -> None:
     assert opened.time == SECONDS
 
 
-def test_the_focus_is_seen(opened) -> None:
+def test_the_focus_is_visible(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
     opened.keys(Keys.TAB)
@@ -233,7 +233,7 @@ def test_controls_have_names(opened) -> None:
     assert roles["button"] > 10
 
 
-def test_the_time_is_told_when_it_stands_and_not_while_it_runs(opened) -> None:
+def test_the_time_is_announced_only_when_paused(opened) -> None:
     said = "return document.querySelector('.said').textContent"
     opened.seek(3.0)
     opened.until(lambda: opened.js(said).startswith("At 3.0 s: RAPF: mean distance to the nearest robot"))
@@ -334,7 +334,7 @@ def test_it_prints_without_controls(browser, page) -> None:
 
 
 @pytest.mark.parametrize("width", [360, 390, 768, 1920])
-def test_nothing_sticks_out_at_any_width(browser, page, width) -> None:
+def test_no_element_overflows_at_any_width(browser, page, width) -> None:
     browser.open(page, width, 844)
     browser.until(lambda: browser.all(".pane"))
     assert browser.js("return document.documentElement.scrollWidth") <= width
@@ -348,7 +348,7 @@ def test_nothing_sticks_out_at_any_width(browser, page, width) -> None:
     assert browser.complaints() == []
 
 
-def test_who_wants_little_motion_gets_few_pictures(browser, page) -> None:
+def test_reduced_motion_is_respected(browser, page) -> None:
     browser.open(page, reduced_motion="reduce")
     browser.js(
         "window.seen = new Set(); const slider = document.querySelector('.transport input');"
@@ -360,7 +360,7 @@ def test_who_wants_little_motion_gets_few_pictures(browser, page) -> None:
     assert 3 <= browser.js("return window.seen.size") <= 8
 
 
-def test_hostile_names_do_nothing(browser, tmp_path) -> None:
+def test_hostile_names_have_no_effect(browser, tmp_path) -> None:
     entries = [replace(build_run(HOSTILE, seed, map_name=HOSTILE), label=HOSTILE) for seed in range(2)]
     path = tmp_path / "hostile.html"
     path.write_text(
@@ -412,7 +412,7 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
 
 
 @pytest.mark.parametrize("repeat", ["loop", "back-and-forth"])
-def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
+def test_obstacles_have_their_positions_in_the_run(browser, repeat) -> None:
     path = ObstaclePath(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0)), 0.7, repeat)
     cart = CircleObstacle((1.0, 1.0), 0.3, path=path)
     (mover,) = embed_map(replace(ROOMS, obstacles=(cart,)))["movers"]
@@ -422,7 +422,7 @@ def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
         assert shift == pytest.approx(path.compute_displacement(seconds).tolist(), abs=1e-6)
 
 
-def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_on(browser, tmp_path) -> None:
+def test_robots_that_fail_are_crossed_out_and_late_robots_appear(browser, tmp_path) -> None:
     record = replace(build_record(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
     page = tmp_path / "replay.html"
     run = ReplayRun(record, build_history(record, 2.0), "a run")
@@ -446,7 +446,7 @@ def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_
     assert browser.complaints() == []
 
 
-def test_labels_of_curves_are_where_figures_have_them(browser) -> None:
+def test_labels_of_curves_have_the_positions_of_figures(browser) -> None:
     script = read_asset("arena.js") + read_asset("chart.js") + "return spreadLabels(...arguments)"
     rng = np.random.default_rng(2)
     for count in (1, 2, 4, 7, 12):

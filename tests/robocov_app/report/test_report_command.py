@@ -26,7 +26,7 @@ def run(tmp_path: Path) -> Path:
     return tmp_path / "one"
 
 
-def test_a_page_stands_in_the_folder_of_the_run(run, capsys) -> None:
+def test_a_page_is_in_the_folder_of_the_run(run, capsys) -> None:
     assert main(["report", str(run)]) == 0
     said = capsys.readouterr()
     assert said.out.splitlines()[0] == f"{run}: run of 1 run"
@@ -49,7 +49,7 @@ def test_the_answer_as_json(run, tmp_path, capsys) -> None:
     assert "<title>&lt;Two&gt; – robocov</title>" in out.read_text()
 
 
-def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
+def test_foreign_files_are_not_replaced(run, capsys) -> None:
     (run / "report.html").write_text("mine")
     said = complaint(capsys, "report", str(run))
     assert said.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
@@ -58,7 +58,7 @@ def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
     assert is_report(run / "report.html")
 
 
-def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run) -> None:
+def test_a_report_is_replaced_with_its_results_unlike_foreign_files(run) -> None:
     assert main(["report", str(run)]) == 0
     save_run(run / "again", build_record(SQUARE, robots=2, seconds=1.0))
     (run / "again" / "report.html").write_text("mine")
@@ -97,7 +97,7 @@ def test_a_folder_that_cannot_be_written_to_is_named(run, capsys) -> None:
         run.chmod(0o700)
 
 
-def test_the_page_does_not_say_where_it_was_made(run) -> None:
+def test_the_page_contains_no_paths_of_the_machine(run) -> None:
     assert main(["report", str(run)]) == 0
     assert str(run.parent) not in (run / "report.html").read_text()
 
@@ -114,7 +114,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.slow
-def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
+def test_a_wheel_contains_all_assets_of_pages(tmp_path) -> None:
     from hatchling.builders.wheel import WheelBuilder
 
     (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
@@ -125,7 +125,7 @@ def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
+def test_an_unfinished_comparison_is_reported(tmp_path, capsys) -> None:
     save_comparison(tmp_path / "both")
     content = json.loads((tmp_path / "both/comparison.json").read_text())
     content |= {"folders": ["rapf", "rpf", "lloyd"], "runs": []}
@@ -136,7 +136,7 @@ def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
 
 
 @pytest.mark.slow
-def test_one_damaged_run_is_named_and_the_report_goes_on(run, tmp_path, capsys) -> None:
+def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
     save_comparison(tmp_path / "both")
     (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both")]) == 0
@@ -153,14 +153,14 @@ def test_one_damaged_run_is_named_and_the_report_goes_on(run, tmp_path, capsys) 
     assert "one is left out: " in capsys.readouterr().err
 
 
-def test_where_no_run_is_left_nothing_is_written(run, capsys) -> None:
+def test_without_readable_runs_nothing_is_written(run, capsys) -> None:
     (run / "record.npz").write_bytes(b"PK")
     said = complaint(capsys, "report", str(run))
     assert "no run is left to report" in said and not (run / "report.html").exists()
 
 
 @pytest.mark.slow
-def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypatch, capsys) -> None:
+def test_a_reference_is_searched_for_once_and_then_cached(run, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("robocov_app.report.results.references.RESTARTS", 2)
     page = run / "report.html"

@@ -229,7 +229,7 @@ def test_variants_have_the_same_marks_and_labels_in_tables_pictures_and_the_repl
         assert html.count(cell) >= 3  # gains, results, trajectories
 
 
-def test_a_long_name_is_shortened_and_whole_in_its_tool_tip() -> None:
+def test_a_long_name_is_shortened_with_a_tooltip() -> None:
     name = "<b>" + "ü" * 297
     whole = name.replace("<", "&lt;").replace(">", "&gt;")
     html = build_report(

@@ -50,7 +50,7 @@ def places_of(data: dict, record, name: str = "positions") -> np.ndarray:
     return np.array([low_x, low_y]) + flat * np.array([high_x - low_x, high_y - low_y])
 
 
-def test_speeds_are_there_where_cells_are_by_time() -> None:
+def test_speeds_are_embedded_for_cells_by_travel_time() -> None:
     run = run_of()
     size = len(run.record.team)
     speeds = np.where(np.arange(size) == 0, 1.0, 0.4)
@@ -65,14 +65,14 @@ def test_speeds_are_there_where_cells_are_by_time() -> None:
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=50))
-def test_numbers_come_back_to_within_half_a_step(values) -> None:
+def test_quantized_numbers_are_accurate_to_half_a_step(values) -> None:
     array = np.array(values)
     low, high = float(array.min()), float(array.max())
     back = read_back(quantize(array, low, high), low, high)
     assert np.abs(back - array).max() <= 0.51 * (high - low) / (NO_NUMBER - 1) + 1e-12
 
 
-def test_what_is_not_there_stays_so() -> None:
+def test_missing_numbers_stay_missing() -> None:
     back = read_back(quantize(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
     assert np.isnan(back).tolist() == [False, True, True, False]
 
@@ -129,7 +129,7 @@ def test_a_run_without_goals_cost_or_path() -> None:
     assert np.abs(places_of(data, record) - record.positions[[0, -1]]).max() < 1e-3
 
 
-def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
+def test_missing_goals_are_embedded_as_missing() -> None:
     record = build_record(hz=5.0)
     record.goals[:10] = np.nan
     run = ReplayRun(record, None, "x")
@@ -138,7 +138,7 @@ def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
     assert gone.tolist() == [k < 10 for k in range(data["count"])]
 
 
-def test_it_is_told_when_robots_are_there_and_when_they_fail() -> None:
+def test_lifetimes_of_robots_are_embedded() -> None:
     run = run_of()
     assert "lives" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     bad = Conditions(failures=((2, 2.0), (4, 5.0)), joins=((3, 1.5), (4, 3.0)))
@@ -152,7 +152,7 @@ def test_it_is_told_when_robots_are_there_and_when_they_fail() -> None:
     assert list_lifetimes(late)[0] == (7.0, None)
 
 
-def test_obstacles_that_move_are_apart_from_those_that_stand() -> None:
+def test_moving_obstacles_are_embedded_separately() -> None:
     path = ObstaclePath(((2.0, 3.0), (4.0, 3.0), (4.0, 5.0)), 0.5, "back-and-forth")
     cart = PolygonObstacle(((1.5, 2.5), (2.5, 2.5), (2.5, 3.5)), path=path)
     environment = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
@@ -199,7 +199,7 @@ def test_runs_of_one_map_share_it() -> None:
     assert data["panes"] == [0, 2] and len(data["maps"]) == 2 and data["rate"] == MAX_RATE_HZ
 
 
-def test_what_is_too_much_is_thinned() -> None:
+def test_large_runs_are_thinned() -> None:
     runs = [run_of(60.0) for _ in range(4)]
     sizes = []
     for budget in (1_000_000, 60_000, 20_000, 4_000, 500):
@@ -216,7 +216,7 @@ def test_no_name_ends_its_script_element() -> None:
     assert json.loads(text)["name"] == escape_controls(HOSTILE)
 
 
-def test_headings_come_along_where_robots_turn() -> None:
+def test_headings_of_unicycles_are_embedded() -> None:
     run = run_of()
     assert "headings" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     count, n = run.record.positions.shape[:2]

@@ -118,7 +118,7 @@ def test_only_gains_that_are_used_have_their_meaning() -> None:
     assert list_gain_meanings(result) == [("k_rep", "strength")]
 
 
-def test_titles_of_runs_have_what_distinguishes_them() -> None:
+def test_titles_of_runs_contain_their_differences() -> None:
     runs = [build_run("rapf", seed, start=start) for seed in range(2) for start in ("corner", "spread")]
     assert format_run_title(build_result(runs), runs[0], "RAPF") == "RAPF · corner · seed\u00a00"
     single_run = build_run()

@@ -36,7 +36,7 @@ def test_relative_steps_of_a_path_add_up(points) -> None:
     assert np.abs(walked[-1] - points[-1]).max() <= 0.051 + 1e-6
 
 
-def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
+def test_failed_robots_are_crossed_out_and_absent_ones_not_drawn() -> None:
     record = build_record(robots=5)
     bad = Conditions(failures=((2, 2.0),), joins=((4, 3.0), (5, 99.0)))
     picture = draw_run(replace(record, conditions=bad), None, has_numbers=True)
@@ -49,7 +49,7 @@ def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
     assert "fails" not in draw_run(record, None)
 
 
-def test_a_run_has_its_robots_where_they_ended() -> None:
+def test_robots_are_drawn_at_their_final_positions() -> None:
     record = build_record(robots=5)
     root = drawn(draw_run(record, build_history(record, 2.0), 400, 300, has_numbers=True))
     frame = PictureFrame(ROOMS, 400, 300)
@@ -74,7 +74,7 @@ def test_a_map_fits_into_its_picture(environment, room) -> None:
     assert of_class(root, "blocked") and of_class(root, "region")
 
 
-def test_every_picture_says_what_it_shows() -> None:
+def test_every_picture_has_a_description() -> None:
     record = build_record()
     said = drawn(draw_run(record, build_history(record, 2.345))).get("aria-label")
     assert said == (
@@ -89,7 +89,7 @@ def test_every_picture_says_what_it_shows() -> None:
     assert hidden.get("aria-hidden") == "true" and hidden.get("aria-label") is None
 
 
-def test_names_are_words() -> None:
+def test_names_are_escaped() -> None:
     record = build_record(replace(ROOMS, name=HOSTILE), label=HOSTILE)
     root = drawn(draw_run(record, None))  # is XML in spite of them
     assert HOSTILE in root.get("aria-label")

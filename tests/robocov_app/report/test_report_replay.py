@@ -52,7 +52,7 @@ def test_runs_of_one_controller_with_other_gains_look_different() -> None:
     assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
 
 
-def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
+def test_without_scripts_pictures_with_descriptions_are_shown() -> None:
     page = Page(build_replay_element(runs_of(6)))
     pictures = page.all("svg")
     assert len(pictures) == MAX_PANES
@@ -60,7 +60,7 @@ def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
     assert not page.all("style")
 
 
-def test_no_name_gets_out_of_its_place() -> None:
+def test_no_name_leaves_its_element() -> None:
     record = replace(build_record(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
     html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
@@ -83,7 +83,7 @@ def test_the_same_runs_give_the_same_bytes() -> None:
     assert build_replay_html(runs_of()) == build_replay_html(runs_of())
 
 
-def test_style_and_script_meet_nothing_else() -> None:
+def test_style_and_script_do_not_affect_the_page() -> None:
     css = read_replay_css()
     for selector in re.findall(r"([^{}]+)\{", re.sub(r"@[^{]+\{", "", css)):
         for part in re.sub(r":is\([^)]*\)", "", selector).split(","):

@@ -83,7 +83,7 @@ def test_texts_stay_texts_whatever_they_are() -> None:
         assert not [each for each in root.iter() if each.tag in ("script", "img")]
 
 
-def test_many_dots_are_one_path_at_the_same_places() -> None:
+def test_many_dots_become_one_path() -> None:
     figure = FIGURES["boxes"]()
     axes = figure.axes[0]
     points = axes.lines[0]

@@ -35,7 +35,7 @@ def test_all_that_is_written_can_be_read(theme, ground) -> None:
 
 
 @THEMES
-def test_what_is_written_on_colors_can_be_read(theme) -> None:
+def test_texts_on_colors_are_legible(theme) -> None:
     colors = list_css_colors(theme)
     assert compute_contrast(colors["on-accent"], colors["accent"]) >= 4.5
     assert compute_contrast(colors["on-final"], colors["final"]) >= 4.5

@@ -155,7 +155,7 @@ def write_file(folder: Path, name: str, text: str) -> Path:
         ),
     ],
 )
-def test_the_message_names_what_cannot_be_read(folder, tmp_path, damage, message) -> None:
+def test_the_message_names_the_unreadable_file(folder, tmp_path, damage, message) -> None:
     copy = tmp_path / "copy"
     copy.mkdir()
     for name in ("study.json", "results.csv"):
