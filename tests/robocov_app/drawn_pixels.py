@@ -12,13 +12,13 @@ ONE = np.array([[4.0, 4.0]])
 TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
 
 
-def layer_named(name, layers=None):
+def find_layer(name, layers=None):
     """Return a layer by its name."""
     return next(layer for layer in layers or build_standard_layers() if layer.name == name)
 
 
-def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):
-    """Return the frame that shows these layers alone, and its painter."""
+def render_layers(scene, *names, size=SIZE, theme=LIGHT, layers=None):
+    """Render a frame with only these layers, and return it with its painter."""
     painter = Painter(scene.environment, size, theme, layers)
     painter.show_only(names)
     return painter.render_frame(scene).astype(int), painter
@@ -29,30 +29,30 @@ def list_legend_texts(painter, scene):
     return [entry.text for entry in painter.list_legend_entries(scene)]
 
 
-def changed(scene, *names, size=SIZE):
-    """Return the (x, y) pixels that these layers draw, and the painter."""
-    frame, painter = drawn(scene, *names, size=size)
+def list_pixels(scene, *names, size=SIZE):
+    """List the (x, y) pixels that these layers draw, and return the painter."""
+    frame, painter = render_layers(scene, *names, size=size)
     rows, columns = np.nonzero((frame != np.array(LIGHT.background)).any(axis=2))
     return np.column_stack([columns, rows]), painter
 
 
-def distance(frame, pixel, color):
-    """Return the largest difference of a channel at a pixel from a color."""
+def measure_error(frame, pixel, color):
+    """Return the maximum difference of a channel at a pixel from a color."""
     x, y = np.rint(pixel).astype(int)
     return int(np.abs(frame[y, x] - np.array(color)).max())
 
 
-def nearest(frame, pixel, color, reach=1):
-    """Return the least such difference in the pixels around."""
+def measure_least_error(frame, pixel, color, reach=1):
+    """Return the minimum of `measure_error` over the pixels around a pixel."""
     x, y = np.rint(pixel).astype(int)
     return min(
-        distance(frame, (x + dx, y + dy), color)
+        measure_error(frame, (x + dx, y + dy), color)
         for dx in range(-reach, reach + 1)
         for dy in range(-reach, reach + 1)
     )
 
 
-def inside(geometry, count, seed=0):
+def sample_inside(geometry, count, seed=0):
     """Return random points in a geometry."""
     low_x, low_y, high_x, high_y = geometry.bounds
     points = np.random.default_rng(seed).uniform((low_x, low_y), (high_x, high_y), size=(20 * count, 2))

@@ -38,7 +38,7 @@ CORRIDOR = Environment("corridor", ((0, 0), (40, 0), (40, 4), (0, 4)), (), {"spr
 SHAFT = Environment("shaft", ((0, 0), (4, 0), (4, 40), (0, 40)), (), {"spread": UniformStart()})
 
 
-def run_of(
+def record_walk(
     environment: Environment, n: int, steps: int = 40, seed: int = 0, controller: str = "rapf"
 ) -> Record:
     """Return a record in which every robot walks from its start to another free place.
@@ -75,7 +75,7 @@ def run_of(
     )
 
 
-def scene_of(record: Record, row: int = -1, cost: str = "mean distance 1.234 m") -> Scene:
+def build_row_scene(record: Record, row: int = -1, cost: str = "mean distance 1.234 m") -> Scene:
     """Return the scene of one row of a record."""
     row %= len(record)
     return Scene.from_snapshot(
@@ -90,7 +90,7 @@ def scene_of(record: Record, row: int = -1, cost: str = "mean distance 1.234 m")
     )
 
 
-def explained(
+def build_scene(
     positions: np.ndarray,
     *,
     forces: np.ndarray | None = None,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import SHORT, answer, complaint
-from drawn_run import ROOMS, run_of
+from drawn_run import ROOMS, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -307,6 +307,6 @@ def test_odd_command_lines_end_in_one_short_line(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "run").mkdir()
-    run_of(ROOMS, 2).save(tmp_path / "run")
+    record_walk(ROOMS, 2).save(tmp_path / "run")
     said = complaint(capsys, *words.split())
     assert said.startswith(message) and len(said) < 1100

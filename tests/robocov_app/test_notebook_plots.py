@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import matplotlib
 import numpy as np
 import pytest
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, record_walk
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -34,7 +34,7 @@ def _coarse_pictures(request, monkeypatch):
         monkeypatch.setattr(drawing_backend, "MIN_FIGURE_LATTICE", 32)
 
 
-RUN = run_of(ROOMS, 5)
+RUN = record_walk(ROOMS, 5)
 COST = CoverageCost(ROOMS, 32)
 # made-up runs go through walls: their ends and a few moments that are free will do
 RESULT = COST(RUN.positions[-1])
@@ -303,11 +303,11 @@ class TestNotebook:
         assert ROOMS._repr_png_() == plot_environment(ROOMS).axes[0]._repr_png_()[0]
 
     def test_the_same_run_gives_the_same_bytes(self):
-        assert RUN._repr_html_() == run_of(ROOMS, 5)._repr_html_()
+        assert RUN._repr_html_() == record_walk(ROOMS, 5)._repr_html_()
 
 
 def test_a_comparison_is_shown_for_each_of_its_axes():
-    figure = plot_comparison([RUN, run_of(HALL, 3)])
+    figure = plot_comparison([RUN, record_walk(HALL, 3)])
     shown = [axes._repr_png_() for axes in figure.axes]
     assert shown[0] == shown[1]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from drawn_run import HALL, ROOMS, run_of
+from drawn_run import HALL, ROOMS, record_walk
 
 from robocov.errors import OutputError, ParameterError
 from robocov_app.figures.curves import TimeCurve
@@ -39,7 +39,9 @@ def streams_of(pdf: bytes) -> bytes:
 class TestEveryKind:
     def test_the_same_plot_gives_the_same_bytes(self, tmp_path, kind):
         for name in ("a", "b"):
-            save_figure(plot_trajectories(run_of(ROOMS, 4), size=(500, 400)), tmp_path / f"{name}.{kind}")
+            save_figure(
+                plot_trajectories(record_walk(ROOMS, 4), size=(500, 400)), tmp_path / f"{name}.{kind}"
+            )
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
     def test_the_matplotlib_style_of_the_user_has_no_effect(self, tmp_path, kind):
@@ -54,7 +56,7 @@ class TestEveryKind:
 
     def test_names_are_never_markup(self, tmp_path, kind):
         name = "cost $x^2$ $\\frac$ [/] { a)b(c\\ 倉庫 🤖"
-        record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
+        record = replace(record_walk(HALL, 3), environment=replace(HALL, name=name))
         save_figure(plot_trajectories(record, size=(500, 400)), tmp_path / f"a.{kind}")
         assert (tmp_path / f"a.{kind}").stat().st_size > 5000
 
@@ -78,11 +80,11 @@ class TestEveryKind:
 def test_the_bytes_do_not_depend_on_the_hashes_of_a_process(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from drawn_run import ROOMS, run_of\n"
+        "from drawn_run import ROOMS, record_walk\n"
         "from robocov_app.figures.files import save_figure\n"
         "from robocov_app.figures.runs import plot_trajectories\n"
         "for kind in ('svg', 'pdf'):\n"
-        "    save_figure(plot_trajectories(run_of(ROOMS, 4)), f'{sys.argv[2]}.{kind}')\n"
+        "    save_figure(plot_trajectories(record_walk(ROOMS, 4)), f'{sys.argv[2]}.{kind}')\n"
     )
     for seed in ("1", "2"):
         command = [sys.executable, "-c", script, str(Path(__file__).parents[1]), str(tmp_path / seed)]
@@ -93,7 +95,7 @@ def test_the_bytes_do_not_depend_on_the_hashes_of_a_process(tmp_path):
 
 def test_an_svg_is_the_same_everywhere(tmp_path):
     """Its letters are outlines, and it bears no date."""
-    save_figure(plot_trajectories(run_of(ROOMS, 4)), tmp_path / "a.svg")
+    save_figure(plot_trajectories(record_walk(ROOMS, 4)), tmp_path / "a.svg")
     text = (tmp_path / "a.svg").read_text()
     assert "<text" not in text and "font-family" not in text
     assert "<dc:date>" not in text
@@ -124,7 +126,7 @@ class TestPdf:
         assert b"begincmap" in streams_of(pdf)
 
     def test_its_page_is_the_figures_and_it_bears_no_date(self, tmp_path):
-        figure = plot_trajectories(run_of(ROOMS, 4), size=(900, 600))
+        figure = plot_trajectories(record_walk(ROOMS, 4), size=(900, 600))
         save_figure(figure, tmp_path / "a.pdf")
         pdf = (tmp_path / "a.pdf").read_bytes()
         box = [float(part) for part in re.search(rb"/MediaBox \[ ([^]]+) \]", pdf)[1].split()]

@@ -3,7 +3,7 @@ import pickle
 
 import matplotlib
 import pytest
-from drawn_run import ROOMS, run_of
+from drawn_run import ROOMS, record_walk
 from PIL import Image
 
 from robocov_app.figures.page import FigurePage
@@ -12,7 +12,7 @@ from robocov_app.look.theme import DARK
 
 
 def test_the_page_is_shown_for_its_axes():
-    figure = plot_trajectories(run_of(ROOMS, 3), size=(1300, 900))
+    figure = plot_trajectories(record_walk(ROOMS, 3), size=(1300, 900))
     png, said = figure.axes[0]._repr_png_()
     assert Image.open(io.BytesIO(png)).size == (1300, 900)
     # as large as its texts were meant to be: a page of 960 x 640 has them at 100 dots an inch
@@ -21,7 +21,7 @@ def test_the_page_is_shown_for_its_axes():
 
 
 def test_later_drawing_on_page_axes_is_shown():
-    axes = plot_trajectories(run_of(ROOMS, 3)).axes[0]
+    axes = plot_trajectories(record_walk(ROOMS, 3)).axes[0]
     before, _ = axes._repr_png_()
     axes.plot([2, 8], [1, 9])
     assert axes._repr_png_()[0] != before
@@ -35,6 +35,6 @@ def test_page_axes_do_not_depend_on_the_style_of_the_user():
 
 
 def test_a_page_can_be_pickled_as_other_figures_can():
-    figure = plot_trajectories(run_of(ROOMS, 3))
+    figure = plot_trajectories(record_walk(ROOMS, 3))
     again = pickle.loads(pickle.dumps(figure))
     assert again.axes[0]._repr_png_() == figure.axes[0]._repr_png_()

@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 import pytest
 from clear_pages import all_clear, overlap
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, record_walk
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ def curves(*finals):
     "size", [None, (900, 600), *(pytest.param(size, marks=pytest.mark.slow) for size in SIZES[1:])]
 )
 def test_no_element_covers_or_cuts_another(environment, size):
-    record = run_of(environment, 6)
+    record = record_walk(environment, 6)
     all_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
     all_clear(plot_environment(environment, size=size))
 
@@ -54,7 +54,7 @@ def test_no_element_covers_or_cuts_another(environment, size):
 @pytest.mark.parametrize("size", [None, (900, 600), pytest.param((2560, 1440), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
 def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
-    records = [run_of(environment, 4, seed=k) for k in range(count)]
+    records = [record_walk(environment, 4, seed=k) for k in range(count)]
     figure = plot_comparison(records, size=size, mean_distances=[1.0 + k for k in range(count)])
     assert len(figure.axes) == count
     all_clear(figure)
@@ -67,7 +67,7 @@ def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
 
 
 def test_maps_of_different_sizes_are_compared_at_one_scale():
-    figure = plot_comparison([run_of(ROOMS, 3), run_of(HALL, 3)])
+    figure = plot_comparison([record_walk(ROOMS, 3), record_walk(HALL, 3)])
     first, second = figure.axes
     assert first.get_xlim() == second.get_xlim() == (0.0, 16.0)
     assert first.get_ylim() == second.get_ylim() == (0.0, 11.0)
@@ -75,7 +75,7 @@ def test_maps_of_different_sizes_are_compared_at_one_scale():
 
 @pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
 def test_the_arena_is_not_distorted(environment):
-    axes = plot_trajectories(run_of(environment, 3), size=(1000, 800)).axes[0]
+    axes = plot_trajectories(record_walk(environment, 3), size=(1000, 800)).axes[0]
     box = axes.get_window_extent()
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     assert box.width / (right - left) == pytest.approx(box.height / (high - low))
@@ -84,7 +84,7 @@ def test_the_arena_is_not_distorted(environment):
 @pytest.mark.parametrize("size", [(901, 600), (641, 487), pytest.param((2560, 1440), marks=pytest.mark.slow)])
 def test_a_png_has_the_requested_size(tmp_path, size):
     path = tmp_path / "a.png"
-    for figure in (plot_trajectories(run_of(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
+    for figure in (plot_trajectories(record_walk(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
         save_figure(figure, path)
         assert pygame.image.load(path).get_size() == size
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
@@ -92,7 +92,7 @@ def test_a_png_has_the_requested_size(tmp_path, size):
 
 class TestTrajectories:
     def test_the_papers_colors_and_the_records_positions(self):
-        record = run_of(ROOMS, 5)
+        record = record_walk(ROOMS, 5)
         axes = plot_trajectories(record).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
         assert {to_rgb(c) for c in lines.get_colors()} == {to_plot_color(LIGHT.trajectory)}
@@ -109,7 +109,7 @@ class TestTrajectories:
         assert starts.get_markerfacecolor() == "none"
 
     def test_cells_and_centroids_are_the_final_ones(self):
-        record = run_of(ROOMS, 5)
+        record = record_walk(ROOMS, 5)
         axes = plot_trajectories(record).axes[0]
         cells = partition(record.positions[-1], ROOMS.region)
         (drawn,) = [c for c in axes.collections if isinstance(c, PolyCollection)]
@@ -119,7 +119,7 @@ class TestTrajectories:
         assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroid)
 
     def test_no_centroid_peeps_out_from_under_a_robot(self):
-        record = run_of(ROOMS, 5)
+        record = record_walk(ROOMS, 5)
         last = partition(record.positions[-1], ROOMS.region).centroid
         for _ in range(60):
             last = partition(last, ROOMS.region).centroid
@@ -130,17 +130,17 @@ class TestTrajectories:
         assert len(marks.get_xydata()) == 0
 
     def test_a_controller_without_goals_has_no_centroids(self):
-        figure = plot_trajectories(run_of(ROOMS, 5, controller="rpf"))
+        figure = plot_trajectories(record_walk(ROOMS, 5, controller="rpf"))
         assert not any(line.get_marker() == "+" for line in figure.axes[0].lines)
         (legend,) = figure.legends
         assert "cell centroid" not in [text.get_text() for text in legend.get_texts()]
-        mixed = plot_comparison([run_of(ROOMS, 5, controller="rpf"), run_of(ROOMS, 5)])
+        mixed = plot_comparison([record_walk(ROOMS, 5, controller="rpf"), record_walk(ROOMS, 5)])
         (legend,) = mixed.legends
         words = [text.get_text() for text in legend.get_texts()]
         assert words[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
 
     def test_goals_of_another_kind_are_called_goals(self):
-        record = run_of(ROOMS, 5)
+        record = record_walk(ROOMS, 5)
         goals = record.goals.copy()
         goals[-1] = record.positions[-1] + np.array([0.8, 0.3])
         axes = plot_trajectories(replace(record, goals=goals)).axes[0]
@@ -152,7 +152,7 @@ class TestTrajectories:
         assert {"goal", "cell centroid"} < set(words)
 
     def test_a_crowd_stays_readable(self):
-        record = run_of(ROOMS, 120)
+        record = record_walk(ROOMS, 120)
         last = record.positions[-1].copy()
         last[:100] = 2.0 + 0.12 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
         record = replace(
@@ -169,7 +169,7 @@ class TestTrajectories:
         assert radius[100:].max() > 1.2 * radius[:100].max()
         numbered = {int(text.get_text()) for text in axes.texts}
         assert not numbered & set(range(12, 90)) and numbered & set(range(101, 121))
-        few = plot_trajectories(run_of(ROOMS, 6), size=(1000, 700)).axes[0]
+        few = plot_trajectories(record_walk(ROOMS, 6), size=(1000, 700)).axes[0]
         widths = [
             next(c for c in a.collections if isinstance(c, LineCollection)).get_linewidths()[0]
             for a in (axes, few)
@@ -177,21 +177,21 @@ class TestTrajectories:
         assert widths[0] < 0.7 * widths[1]
 
     def test_every_robot_has_its_number(self):
-        record = run_of(ROOMS, 12, seed=4)
+        record = record_walk(ROOMS, 12, seed=4)
         texts = plot_trajectories(record).axes[0].texts
         assert [text.get_text() for text in texts] == [str(k) for k in range(1, 13)]
         assert [text.get_position() for text in texts] == [tuple(p) for p in record.positions[-1].tolist()]
 
     @pytest.mark.parametrize("n", [5, 40])
     def test_robots_colors(self, n):
-        axes = plot_trajectories(run_of(ROOMS, n), colors="robots", theme=DARK).axes[0]
+        axes = plot_trajectories(record_walk(ROOMS, n), colors="robots", theme=DARK).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
         assert len({to_rgb(c) for c in lines.get_colors()}) == (5 if n == 5 else 1)
         with pytest.raises(ParameterError, match="colors"):
-            plot_trajectories(run_of(ROOMS, 2), colors="rainbow")
+            plot_trajectories(record_walk(ROOMS, 2), colors="rainbow")
 
     def test_title_and_legend(self):
-        figure = plot_trajectories(run_of(ROOMS, 6), mean_distance=1.23456)
+        figure = plot_trajectories(record_walk(ROOMS, 6), mean_distance=1.23456)
         words = [text.get_text() for text in figure.texts]
         assert any("RAPF" in text and "rooms" in text for text in words)
         assert any("t = 3.9 s" in t and "mean distance 1.235 m" in t and "6 robots" in t for t in words)
@@ -199,11 +199,11 @@ class TestTrajectories:
         entries = [text.get_text() for text in legend.get_texts()]
         assert entries[:3] == ["start", "trajectory", "final position"]
         assert "obstacle (unknown to robots)" in entries
-        (legend,) = plot_trajectories(run_of(CORRIDOR, 3)).legends
+        (legend,) = plot_trajectories(record_walk(CORRIDOR, 3)).legends
         assert "obstacle (unknown to robots)" not in [text.get_text() for text in legend.get_texts()]
 
     def test_the_scale_bar_has_the_length_of_its_label(self):
-        figure = plot_trajectories(run_of(ROOMS, 3))
+        figure = plot_trajectories(record_walk(ROOMS, 3))
         box = figure.axes[0].get_window_extent()
         bars = [artist for artist in figure.artists if isinstance(artist, Line2D)]
         bar = max(bars, key=lambda line: np.ptp(line.get_xdata()))
@@ -214,7 +214,7 @@ class TestTrajectories:
     def test_on_axes_of_somebody_else(self):
         figure = Figure()
         axes = figure.subplots()
-        assert plot_trajectories(run_of(ROOMS, 3), axes) is figure
+        assert plot_trajectories(record_walk(ROOMS, 3), axes) is figure
         assert axes.get_xlabel() == "x (m)" and axes.get_ylabel() == "y (m)"
         assert axes.get_aspect() == 1.0
         assert not figure.legends
@@ -230,25 +230,25 @@ class TestText:
         "draw", [plot_trajectories, lambda record, size: plot_comparison([record] * 3, size=size)]
     )
     def test_it_grows_with_the_page(self, draw):
-        small, large = (draw(run_of(ROOMS, 3), size=size) for size in ((960, 640), (2880, 1920)))
+        small, large = (draw(record_walk(ROOMS, 3), size=size) for size in ((960, 640), (2880, 1920)))
         assert min(self.heights(large)) == pytest.approx(3 * min(self.heights(small)), rel=0.35)
 
     def test_a_comparison_is_read_when_it_is_shown_at_half_its_size(self):
-        figure = plot_comparison([run_of(ROOMS, 3)] * 3)
+        figure = plot_comparison([record_walk(ROOMS, 3)] * 3)
         assert figure.bbox.width == pytest.approx(1600, abs=0.1)
         assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
 
     def test_common_facts_are_in_the_heading_only(self):
-        figure = plot_comparison([run_of(ROOMS, 3), run_of(ROOMS, 3, controller="rpf")])
+        figure = plot_comparison([record_walk(ROOMS, 3), record_walk(ROOMS, 3, controller="rpf")])
         words = [text.get_text() for text in figure.texts]
         assert sum("t = 3.9 s" in text for text in words) == 1
-        different = plot_comparison([run_of(ROOMS, 3, steps=40), run_of(ROOMS, 3, steps=21)])
+        different = plot_comparison([record_walk(ROOMS, 3, steps=40), record_walk(ROOMS, 3, steps=21)])
         words = " ".join(text.get_text() for text in different.texts)
         assert "t = 3.9 s" in words and "t = 2.0 s" in words
 
     @pytest.mark.parametrize(("environment", "rows"), [(ROOMS, 1), (CORRIDOR, 3)])
     def test_wide_maps_are_stacked(self, environment, rows):
-        figure = plot_comparison([run_of(environment, 3)] * 3)
+        figure = plot_comparison([record_walk(environment, 3)] * 3)
         assert len({round(axes.get_position().y0, 6) for axes in figure.axes}) == rows
 
 
@@ -341,8 +341,8 @@ assert "matplotlib" not in sys.modules
 import robocov_app.figures.runs
 sys.path.insert(0, sys.argv[1])
 from clear_pages import all_clear, boxes, overlap
-from drawn_run import ROOMS, run_of
-robocov_app.figures.runs.plot_trajectories(run_of(ROOMS, 3))
+from drawn_run import ROOMS, record_walk
+robocov_app.figures.runs.plot_trajectories(record_walk(ROOMS, 3))
 assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
 """
 
@@ -361,7 +361,7 @@ def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
 def test_names_are_never_markup(tmp_path):
     """No formula, and no warning (an error here) of letters that the font has not."""
     name = "cost $x^2$ and $y$ $\\frac$ [/] { 倉庫 🤖"
-    record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
+    record = replace(record_walk(HALL, 3), environment=replace(HALL, name=name))
     figure = plot_trajectories(record, size=(640, 480))
     save_figure(figure, tmp_path / "a.png")
     assert any(name in text.get_text() for text in figure.texts)

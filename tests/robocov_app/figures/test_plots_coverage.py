@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from clear_pages import overlap
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, record_walk
 from PIL import Image
 
 from robocov.cost import CoverageCost
@@ -23,7 +23,7 @@ COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, S
 
 def build_snapshot(environment, n=5, seed=0):
     cost = COSTS[environment.name]
-    record = run_of(environment, n, seed=seed)
+    record = record_walk(environment, n, seed=seed)
     positions = environment.start("spread").sample(n, seed)
     return DistanceSnapshot.build_final(
         record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import TWO, changed, drawn, list_legend_texts, nearest
-from drawn_run import SQUARE, explained
+from drawn_pixels import TWO, list_legend_texts, list_pixels, measure_least_error, render_layers
+from drawn_run import SQUARE, build_scene
 
 from robocov.observation import Decision, Snapshot
 from robocov.voronoi import partition
@@ -18,9 +18,9 @@ ACROSS = np.array([[0.0, 0.0], [3.0, 3.0], [-3.0, 3.0]])
 
 
 def test_centroids_are_plus_signs() -> None:
-    frame, painter = drawn(explained(TWO, goals=CENTROIDS), "centroids")
+    frame, painter = render_layers(build_scene(TWO, goals=CENTROIDS), "centroids")
     for center in painter.camera.to_pixels(CENTROIDS):
-        assert all(nearest(frame, center + arm, LIGHT.ink) < 60 for arm in UPRIGHT)
+        assert all(measure_least_error(frame, center + arm, LIGHT.ink) < 60 for arm in UPRIGHT)
 
 
 @pytest.mark.parametrize("layer", ["centroids", "goals"])
@@ -28,23 +28,23 @@ def test_goals_of_another_kind_are_times_signs(layer: str) -> None:
     """A controller that does not head for centroids does not know of them."""
     goals = CENTROIDS + (0.0, 2.0 * CENTROID_TOLERANCE_M)
     goals[1] += 1.0
-    frame, painter = drawn(explained(TWO, goals=goals), layer)
+    frame, painter = render_layers(build_scene(TWO, goals=goals), layer)
     for center in painter.camera.to_pixels(goals):
-        assert all(nearest(frame, center + arm, LIGHT.final) < 90 for arm in ACROSS)
+        assert all(measure_least_error(frame, center + arm, LIGHT.final) < 90 for arm in ACROSS)
 
 
 def test_the_legend_distinguishes_centroids_and_goals() -> None:
     """RPF has no goals: neither crosses nor their entry in the legend."""
     for goals, words in ((CENTROIDS, ["cell centroid"]), (TWO + 1, ["goal"]), (None, [])):
-        scene = explained(TWO, goals=goals)
-        pixels, painter = changed(scene, "centroids")
+        scene = build_scene(TWO, goals=goals)
+        pixels, painter = list_pixels(scene, "centroids")
         assert bool(len(pixels)) == bool(words)
         assert list_legend_texts(painter, scene) == words
 
 
 def test_goals_are_centroids_with_limited_communication() -> None:
     """That of what it takes for its cell; the word does not change with each message that is lost."""
-    scene = explained(TWO, goals=CENTROIDS)
+    scene = build_scene(TWO, goals=CENTROIDS)
     alone = partition(TWO[:1], SQUARE.region)
     heard = replace(alone, centroid=np.repeat(alone.centroid, 2, axis=0))
     decision = Decision(np.zeros((2, 2)), heard.centroid, cells=heard)
@@ -53,24 +53,24 @@ def test_goals_are_centroids_with_limited_communication() -> None:
         SQUARE, replace(scene.team, communication_range=np.ones(2)), Snapshot(scene.snapshot.seen, decision)
     )
     assert not are_centroids(heard.centroid, CENTROIDS)
-    _, painter = changed(limited, "centroids")
+    _, painter = list_pixels(limited, "centroids")
     assert list_legend_texts(painter, limited) == ["cell centroid"]
 
 
 @pytest.mark.parametrize("goals", [CENTROIDS, TWO + 1])
 def test_a_robot_that_has_arrived_has_no_cross(goals: np.ndarray) -> None:
     arrived = goals if goals is not CENTROIDS else partition(CENTROIDS, SQUARE.region).centroid
-    pixels, _ = changed(explained(arrived, goals=arrived), "centroids")
+    pixels, _ = list_pixels(build_scene(arrived, goals=arrived), "centroids")
     assert len(pixels) == 0
 
 
 def test_a_robot_without_a_goal_has_no_cross() -> None:
     goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
     for layer in ("centroids", "goals"):
-        scene = explained(TWO, goals=goals)
-        frame, painter = drawn(scene, layer)
-        assert nearest(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 90
-        pixels, _ = changed(scene, layer)
+        scene = build_scene(TWO, goals=goals)
+        frame, painter = render_layers(scene, layer)
+        assert measure_least_error(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 90
+        pixels, _ = list_pixels(scene, layer)
         assert (painter.camera.to_world(pixels.astype(float))[:, 0] < 4.0).all()
 
 

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import SIZE, TWO, changed, drawn, list_legend_texts
-from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+from drawn_pixels import SIZE, TWO, list_legend_texts, list_pixels, render_layers
+from drawn_run import HALL, ROOMS, SQUARE, build_row_scene, build_scene, record_walk
 
 from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
@@ -18,7 +18,7 @@ from robocov_app.render.painter import Painter
 def test_the_scale_bar_has_the_length_of_its_label(environment, size):
     from robocov_app.look.lengths import round_down
 
-    pixels, painter = changed(scene_of(run_of(environment, 2)), "scale_bar", size=size)
+    pixels, painter = list_pixels(build_row_scene(record_walk(environment, 2)), "scale_bar", size=size)
     rows, counts = np.unique(pixels[:, 1], return_counts=True)
     bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
     run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
@@ -27,8 +27,11 @@ def test_the_scale_bar_has_the_length_of_its_label(environment, size):
 
 
 def test_the_status_line_contains_the_cost():
-    record = run_of(SQUARE, 3)
-    frames = [drawn(scene_of(record, cost=cost), "status")[0] for cost in ("mean 1.23 m", "mean 1.24 m")]
+    record = record_walk(SQUARE, 3)
+    frames = [
+        render_layers(build_row_scene(record, cost=cost), "status")[0]
+        for cost in ("mean 1.23 m", "mean 1.24 m")
+    ]
     rows, columns = np.nonzero((frames[0] != frames[1]).any(axis=2))
     assert len(rows) > 3
     assert rows.min() > SIZE[1] - 34
@@ -36,7 +39,7 @@ def test_the_status_line_contains_the_cost():
 
 
 def test_a_narrow_status_omits_the_least_important_facts():
-    scene = scene_of(run_of(SQUARE, 3), cost="mean distance 1.234 m")
+    scene = build_row_scene(record_walk(SQUARE, 3), cost="mean distance 1.234 m")
     size = 14
     found = []
     for room in range(600, 0, -5):
@@ -58,11 +61,11 @@ def test_measured_texts_have_the_width_of_rendered_ones():
 
 def test_a_caption_contains_the_facts_that_the_status_omits():
     """In a pane, controller and cost stand above the arena, and nothing of them below it."""
-    record = run_of(SQUARE, 3)
+    record = record_walk(SQUARE, 3)
     frames = []
     for cost, label_ in (("1.23 m", "RAPF"), ("9.87 m", "RAPF"), ("1.23 m", "RPF")):
-        scene = replace(scene_of(record, cost=cost), label=label_)
-        frames.append(drawn(scene, "caption", "status", layers=build_pane_layers())[0])
+        scene = replace(build_row_scene(record, cost=cost), label=label_)
+        frames.append(render_layers(scene, "caption", "status", layers=build_pane_layers())[0])
     for frame, side in ((frames[1], slice(SIZE[0] // 2, None)), (frames[2], slice(0, SIZE[0] // 2))):
         rows, columns = np.nonzero((frame != frames[0]).any(axis=2))
         assert len(rows) > 5 and rows.max() < 34
@@ -70,16 +73,16 @@ def test_a_caption_contains_the_facts_that_the_status_omits():
 
 
 def test_a_long_status_ends_before_the_scale_bar():
-    scene = scene_of(run_of(SQUARE, 3), cost="word " * 60)
-    pixels, _ = changed(scene, "status", "scale_bar")
-    alone, _ = changed(scene, "scale_bar")
+    scene = build_row_scene(record_walk(SQUARE, 3), cost="word " * 60)
+    pixels, _ = list_pixels(scene, "status", "scale_bar")
+    alone, _ = list_pixels(scene, "scale_bar")
     assert pixels[:, 0].max() < SIZE[0]
     status = np.array(sorted({tuple(p) for p in pixels.tolist()} - {tuple(p) for p in alone.tolist()}))
     assert status[:, 0].min() > alone[:, 0].max() + 8
 
 
 def test_the_legend_lists_the_visible_elements():
-    scene = explained(
+    scene = build_scene(
         TWO,
         forces=np.ones((2, 2)),
         goals=partition(TWO, SQUARE.region).centroid,
@@ -110,12 +113,12 @@ def test_the_legend_lists_the_visible_elements():
     # The scene has no obstacles, starts or trail.
     assert sorted(list_legend_texts(painter, scene)) == sorted(words.values())
     painter.show_only({"obstacles", "starts", "trajectories"})
-    rooms = scene_of(run_of(ROOMS, 2))
+    rooms = build_row_scene(record_walk(ROOMS, 2))
     assert list_legend_texts(painter, rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
 
 
 def test_the_legend_is_above_the_arena_in_enough_rows():
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     names = [layer.name for layer in build_standard_layers()]
     for size in (SIZE, (1920, 1080)):
         painter = Painter(ROOMS, size)

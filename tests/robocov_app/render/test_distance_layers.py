@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 from drawn_pixels import list_legend_texts
-from drawn_run import HALL, ROOMS, run_of, scene_of
+from drawn_run import HALL, ROOMS, build_row_scene, record_walk
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
@@ -20,11 +20,11 @@ SIZE = (560, 364)
 
 
 def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
-    record = run_of(environment, n, seed=seed)
+    record = record_walk(environment, n, seed=seed)
     cost = CoverageCost(environment, 128)
     positions = environment.start("spread").sample(n, seed + 1000)
     field = DistanceField(FieldLattice(cost.sites), cost(positions))
-    return cost, replace(scene_of(record), field=field, field_limit=limit)
+    return cost, replace(build_row_scene(record), field=field, field_limit=limit)
 
 
 def painted(what, *names, theme=LIGHT, size=SIZE):

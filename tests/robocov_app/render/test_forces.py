@@ -2,8 +2,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, TWO, changed, drawn, layer_named, list_legend_texts, nearest
-from drawn_run import explained
+from drawn_pixels import (
+    ONE,
+    TWO,
+    find_layer,
+    list_legend_texts,
+    list_pixels,
+    measure_least_error,
+    render_layers,
+)
+from drawn_run import build_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from written_words import check_glyph, glyphs
@@ -16,8 +24,8 @@ from robocov_app.look.theme import DARK, LIGHT
 @given(st.floats(0, 2 * np.pi), st.sampled_from(["velocities", "force_attraction", "force_resultant"]))
 def test_arrows_have_the_direction_of_their_vectors(angle, name):
     direction = np.array([np.cos(angle), np.sin(angle)])
-    scene = explained(ONE, forces=1.5 * direction[None], velocities=0.9 * direction[None])
-    pixels, painter = changed(scene, name)
+    scene = build_scene(ONE, forces=1.5 * direction[None], velocities=0.9 * direction[None])
+    pixels, painter = list_pixels(scene, name)
     away = painter.camera.to_world(pixels.astype(float)) - ONE[0]
     middle = away.mean(axis=0) / np.linalg.norm(away.mean(axis=0))
     assert middle @ direction > 0.98
@@ -28,7 +36,7 @@ def test_arrows_have_the_direction_of_their_vectors(angle, name):
 def test_stronger_forces_have_longer_arrows_within_limits(term):
     reach = []
     for force in (0.0, 0.5, 2.0, 1e3, 1e9):
-        pixels, painter = changed(explained(ONE, forces=np.array([[force, 0.0]])), f"force_{term}")
+        pixels, painter = list_pixels(build_scene(ONE, forces=np.array([[force, 0.0]])), f"force_{term}")
         center = painter.camera.to_pixels(ONE)[0]
         reach.append((pixels[:, 0] - center[0]).max() if len(pixels) else 0.0)
     assert reach[0] == 0.0
@@ -40,16 +48,16 @@ def test_stronger_forces_have_longer_arrows_within_limits(term):
 def test_terms_differ_by_more_than_hue():
     shapes = set()
     for term in ("attraction", "repulsion_robots", "repulsion_obstacle"):
-        pixels, _ = changed(explained(ONE, forces=np.array([[1.0, 0.0]])), f"force_{term}")
+        pixels, _ = list_pixels(build_scene(ONE, forces=np.array([[1.0, 0.0]])), f"force_{term}")
         shapes.add(tuple(map(tuple, pixels.tolist())))
-    pixels, _ = changed(explained(ONE, velocities=np.array([[-1.0, 0.0]])), "force_viscosity")
+    pixels, _ = list_pixels(build_scene(ONE, velocities=np.array([[-1.0, 0.0]])), "force_viscosity")
     shapes.add(tuple(map(tuple, pixels.tolist())))
     assert len(shapes) == 4
 
 
 def gliding(*velocity, viscosity=1.0, positions=ONE):
     """Return a scene of robots of one velocity in a world of a viscosity."""
-    scene = explained(positions, velocities=np.tile(np.array(velocity, dtype=float), (len(positions), 1)))
+    scene = build_scene(positions, velocities=np.tile(np.array(velocity, dtype=float), (len(positions), 1)))
     return replace(scene, team=Team.homogeneous(len(positions), viscosity=viscosity))
 
 
@@ -57,7 +65,7 @@ def gliding(*velocity, viscosity=1.0, positions=ONE):
 @given(st.floats(0, 2 * np.pi))
 def test_viscosity_points_against_the_velocity(angle):
     direction = np.array([np.cos(angle), np.sin(angle)])
-    pixels, painter = changed(gliding(*0.8 * direction), "force_viscosity")
+    pixels, painter = list_pixels(gliding(*0.8 * direction), "force_viscosity")
     away = painter.camera.to_world(pixels.astype(float)) - ONE[0]
     middle = away.mean(axis=0) / np.linalg.norm(away.mean(axis=0))
     assert middle @ -direction > 0.98
@@ -66,7 +74,7 @@ def test_viscosity_points_against_the_velocity(angle):
 
 def test_viscosity_ends_in_a_bar_across():
     """It is no arrow: it pulls nowhere, it only slows down."""
-    pixels, painter = changed(gliding(-0.8, 0.0), "force_viscosity")
+    pixels, painter = list_pixels(gliding(-0.8, 0.0), "force_viscosity")
     center = painter.camera.to_pixels(ONE)[0]
     heights = [np.ptp(pixels[pixels[:, 0] == x][:, 1]) for x in range(pixels[:, 0].min(), pixels[:, 0].max())]
     assert max(heights[:-6]) <= 4 * painter.scale
@@ -77,7 +85,7 @@ def test_viscosity_ends_in_a_bar_across():
 def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
     reach = []
     for speed, viscosity in ((0.0, 1.0), (0.3, 1.0), (0.9, 1.0), (0.9, 3.0), (0.9, 1e5), (0.9, 0.0)):
-        pixels, painter = changed(gliding(speed, 0.0, viscosity=viscosity), "force_viscosity")
+        pixels, painter = list_pixels(gliding(speed, 0.0, viscosity=viscosity), "force_viscosity")
         center = painter.camera.to_pixels(ONE)[0]
         reach.append((center[0] - pixels[:, 0]).max() if len(pixels) else 0.0)
     assert reach[0] == reach[5] == 0.0
@@ -87,16 +95,16 @@ def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_viscosity_has_its_own_color_and_legend(theme):
     scene = gliding(-0.9, 0.0)
-    frame, painter = drawn(scene, "force_viscosity", theme=theme)
+    frame, painter = render_layers(scene, "force_viscosity", theme=theme)
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
-    assert nearest(frame, start, theme.forces["viscosity"]) < 25
+    assert measure_least_error(frame, start, theme.forces["viscosity"]) < 25
     assert list_legend_texts(painter, scene) == ["viscosity"]
-    (picture,) = glyphs(layer_named("force_viscosity"), scene, theme)
+    (picture,) = glyphs(find_layer("force_viscosity"), scene, theme)
     check_glyph(picture, theme, theme.forces["viscosity"])
 
 
 def test_viscosity_of_robots_out_of_sight_is_left_out():
-    pixels, _ = changed(
+    pixels, _ = list_pixels(
         gliding(0.9, 0.0, positions=np.array([[500.0, 4.0], [4.0, -900.0]])), "force_viscosity"
     )
     assert len(pixels) == 0
@@ -104,8 +112,8 @@ def test_viscosity_of_robots_out_of_sight_is_left_out():
 
 @pytest.mark.parametrize("kind", ["sensing", "communication"])
 def test_ranges_are_circles_of_their_radius(kind):
-    scene = explained(ONE, sensing_range=2.5, communication_range=2.5)
-    pixels, painter = changed(scene, kind)
+    scene = build_scene(ONE, sensing_range=2.5, communication_range=2.5)
+    pixels, painter = list_pixels(scene, kind)
     radius = np.linalg.norm(pixels - painter.camera.to_pixels(ONE)[0], axis=1)
     assert np.abs(radius - 2.5 * painter.camera.zoom).max() < 2.5
     angle = np.arctan2(*(pixels - painter.camera.to_pixels(ONE)[0]).T)
@@ -113,27 +121,30 @@ def test_ranges_are_circles_of_their_radius(kind):
 
 
 def test_unlimited_ranges_are_not_drawn():
-    scene = explained(ONE, communication_range=np.inf)
-    pixels, painter = changed(scene, "communication")
+    scene = build_scene(ONE, communication_range=np.inf)
+    pixels, painter = list_pixels(scene, "communication")
     assert len(pixels) == 0
     assert list_legend_texts(painter, scene) == []
 
 
 def test_links_are_those_of_the_graph():
     three = np.array([[1.0, 4.0], [3.0, 4.0], [7.0, 4.0]])
-    near = explained(three, communication_range=2.5)
-    frame, painter = drawn(near, "links")
+    near = build_scene(three, communication_range=2.5)
+    frame, painter = render_layers(near, "links")
     link, none = painter.camera.to_pixels(np.array([[2.0, 4.0], [5.0, 4.0]]))
-    assert nearest(frame, link, LIGHT.final) < 120
-    assert nearest(frame, none, LIGHT.background) == 0
-    frame, _ = drawn(explained(three), "links")  # all hear all: cells that share an edge
-    assert nearest(frame, none, LIGHT.final) < 120
+    assert measure_least_error(frame, link, LIGHT.final) < 120
+    assert measure_least_error(frame, none, LIGHT.background) == 0
+    frame, _ = render_layers(build_scene(three), "links")  # all hear all: cells that share an edge
+    assert measure_least_error(frame, none, LIGHT.final) < 120
 
 
 def test_sensed_obstacle_points_are_marked():
     points = np.array([[np.nan, np.nan], [7.0, 1.0]])
-    scene = explained(TWO, obstacle_points=points)
-    frame, painter = drawn(scene, "obstacle_points")
-    assert nearest(frame, painter.camera.to_pixels(points[1]), LIGHT.forces["repulsion_obstacle"]) < 30
-    pixels, _ = changed(scene, "obstacle_points")
+    scene = build_scene(TWO, obstacle_points=points)
+    frame, painter = render_layers(scene, "obstacle_points")
+    assert (
+        measure_least_error(frame, painter.camera.to_pixels(points[1]), LIGHT.forces["repulsion_obstacle"])
+        < 30
+    )
+    pixels, _ = list_pixels(scene, "obstacle_points")
     assert (painter.camera.to_world(pixels.astype(float))[:, 0] > 5.0).all()  # robot 1 senses none

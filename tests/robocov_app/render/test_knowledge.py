@@ -8,15 +8,15 @@ from drawn_pixels import (
     ONE,
     SIZE,
     TWO,
-    changed,
-    distance,
-    drawn,
-    inside,
-    layer_named,
+    find_layer,
     list_legend_texts,
-    nearest,
+    list_pixels,
+    measure_error,
+    measure_least_error,
+    render_layers,
+    sample_inside,
 )
-from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+from drawn_run import HALL, ROOMS, SQUARE, build_row_scene, build_scene, record_walk
 from written_words import check_glyph, glyphs, places
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
@@ -41,37 +41,37 @@ def scan(place=(4.0, 4.0), rays=120, reach=3.0, wall=5.4):
 
 
 def scanned(*scans):
-    return replace(explained(ONE), scans=scans)
+    return replace(build_scene(ONE), scans=scans)
 
 
 class TestRayScan:
     @THEMES
     def test_only_the_scanned_area_is_tinted(self, theme):
         place, ends = scan()
-        frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
+        frame, painter = render_layers(scanned((place, ends)), "scan", theme=theme)
         area = shapely.Polygon(ends)
         away = [
-            distance(frame, p, theme.background)
-            for p in painter.camera.to_pixels(inside(area.buffer(-0.1), 300))
+            measure_error(frame, p, theme.background)
+            for p in painter.camera.to_pixels(sample_inside(area.buffer(-0.1), 300))
         ]
         assert min(away) > 8
         assert max(away) < 90
-        around = inside(SQUARE.boundary_polygon.difference(area.buffer(0.15)), 200)
+        around = sample_inside(SQUARE.boundary_polygon.difference(area.buffer(0.15)), 200)
         for pixel in painter.camera.to_pixels(around):
-            assert distance(frame, pixel, theme.background) == 0
+            assert measure_error(frame, pixel, theme.background) == 0
 
     @THEMES
     def test_only_rays_that_hit_end_in_dots(self, theme):
         place, ends = scan()
-        frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
+        frame, painter = render_layers(scanned((place, ends)), "scan", theme=theme)
         for pixel, end in zip(painter.camera.to_pixels(ends), ends, strict=True):
-            far = nearest(frame, pixel, theme.final)
+            far = measure_least_error(frame, pixel, theme.final)
             assert far < 40 if end[0] > 5.39 else far > 60
 
     def test_rays_are_sparse_near_the_robot(self):
         """They are seen far out, and near the robot there is no more ink than there."""
         place, ends = scan(wall=8.0)
-        frame, painter = drawn(scanned((place, ends)), "scan")
+        frame, painter = render_layers(scanned((place, ends)), "scan")
         rows, columns = np.indices(frame.shape[:2])
         x, y = painter.camera.to_pixels(place)
         away = np.hypot(columns - x, rows - y) / painter.scale
@@ -84,8 +84,8 @@ class TestRayScan:
         assert (rim > np.median(ink[(away > 3) & (away < 10)]) + 5).sum() >= 100
 
     def test_overlapping_scans_are_not_darker(self):
-        alone, painter = drawn(scanned(scan(wall=9.0)), "scan")
-        both, _ = drawn(scanned(scan(wall=9.0), scan((4.5, 4.0), wall=9.0)), "scan")
+        alone, painter = render_layers(scanned(scan(wall=9.0)), "scan")
+        both, _ = render_layers(scanned(scan(wall=9.0), scan((4.5, 4.0), wall=9.0)), "scan")
         fills = []
         for frame in (alone, both):
             x, y = np.rint(painter.camera.to_pixels(np.array([4.25, 4.0]))).astype(int)
@@ -101,16 +101,16 @@ class TestRayScan:
         painter.show_only({"scan"})
         painter.camera = Camera((5.4, 4.0), 2e4, painter.camera.view)
         frame = painter.render_frame(scene).astype(int)
-        assert nearest(frame, painter.camera.to_pixels(np.array([5.4, 4.0])), LIGHT.final) < 10
-        assert distance(frame, (SIZE[0] // 2 + 60, SIZE[1] // 2), LIGHT.background) == 0
-        assert distance(frame, (SIZE[0] // 2 - 60, SIZE[1] // 2 - 40), LIGHT.background) > 8
+        assert measure_least_error(frame, painter.camera.to_pixels(np.array([5.4, 4.0])), LIGHT.final) < 10
+        assert measure_error(frame, (SIZE[0] // 2 + 60, SIZE[1] // 2), LIGHT.background) == 0
+        assert measure_error(frame, (SIZE[0] // 2 - 60, SIZE[1] // 2 - 40), LIGHT.background) > 8
         painter.camera = Camera((400.0, 4.0), 100.0, painter.camera.view)
         assert (painter.render_frame(scene) == 255).all()
 
     def test_without_scans_nothing_is_drawn(self):
-        pixels, painter = changed(explained(ONE), "scan")
+        pixels, painter = list_pixels(build_scene(ONE), "scan")
         assert len(pixels) == 0
-        assert list_legend_texts(painter, explained(ONE)) == []
+        assert list_legend_texts(painter, build_scene(ONE)) == []
         assert list_legend_texts(painter, scanned(scan())) == ["ray scan"]
 
 
@@ -122,34 +122,34 @@ def knowing(points=SEEN, numbers=(1, 2, 3), time=0.0, n=4, **more):
     """Return a scene in which robots have sensed points."""
     sensed = SensedPoints()
     sensed.add(time, numbers, np.asarray(points))
-    return replace(scene_of(run_of(ROOMS, n)), sensed=sensed, **more)
+    return replace(build_row_scene(record_walk(ROOMS, n)), sensed=sensed, **more)
 
 
 def dots(frame, painter, theme=LIGHT, points=SEEN):
     """Return which points are drawn."""
     color = theme.forces["repulsion_obstacle"]
-    return [nearest(frame, pixel, color) < 25 for pixel in painter.camera.to_pixels(points)]
+    return [measure_least_error(frame, pixel, color) < 25 for pixel in painter.camera.to_pixels(points)]
 
 
 class TestSensedObstacles:
     @THEMES
     def test_sensed_points_contrast_with_pale_obstacles(self, theme):
-        frame, painter = drawn(knowing(), "obstacles", "sensed", theme=theme)
+        frame, painter = render_layers(knowing(), "obstacles", "sensed", theme=theme)
         assert dots(frame, painter, theme) == [True, True, True]
         pale = mix(theme.background, theme.obstacle, 0.3)
-        solid = inside(ROOMS.blocked.buffer(-0.12), 150)
+        solid = sample_inside(ROOMS.blocked.buffer(-0.12), 150)
         solid = solid[np.linalg.norm(solid[:, None] - SEEN, axis=2).min(axis=1) > 0.15]
         for pixel in painter.camera.to_pixels(solid):
-            assert distance(frame, pixel, pale) == 0
+            assert measure_error(frame, pixel, pale) == 0
         assert compute_contrast(theme.forces["repulsion_obstacle"], pale) > 4
-        for pixel in painter.camera.to_pixels(inside(ROOMS.free.buffer(-0.12), 200)):
-            assert distance(frame, pixel, theme.background) == 0  # that of the courtyard too
+        for pixel in painter.camera.to_pixels(sample_inside(ROOMS.free.buffer(-0.12), 200)):
+            assert measure_error(frame, pixel, theme.background) == 0  # that of the courtyard too
 
     def test_pale_obstacles_keep_their_outline(self):
-        frame, painter = drawn(knowing(), "obstacles", "sensed")
+        frame, painter = render_layers(knowing(), "obstacles", "sensed")
         edge = painter.camera.to_pixels(np.array([[4.0, 4.0], [2.5, 7.0], [2.5, 7.6], [10.05, 2.8]]))
         for pixel in edge:
-            assert nearest(frame, pixel, mix(LIGHT.background, LIGHT.obstacle_edge, 0.6)) < 40
+            assert measure_least_error(frame, pixel, mix(LIGHT.background, LIGHT.obstacle_edge, 0.6)) < 40
 
     def test_an_obstacle_in_a_courtyard_is_pale_as_well(self):
         ring = PolygonObstacle(
@@ -157,27 +157,27 @@ class TestSensedObstacles:
         )
         island = PolygonObstacle(((1.5, 1.5), (6.5, 1.5), (6.5, 6.5), (1.5, 6.5)))
         yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
-        frame, painter = drawn(
-            replace(scene_of(run_of(yard, 2)), sensed=SensedPoints()), "obstacles", "sensed"
+        frame, painter = render_layers(
+            replace(build_row_scene(record_walk(yard, 2)), sensed=SensedPoints()), "obstacles", "sensed"
         )
         pale = mix(LIGHT.background, LIGHT.obstacle, 0.3)
         for point, color in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
-            assert distance(frame, painter.camera.to_pixels(np.array(point)), color) == 0
+            assert measure_error(frame, painter.camera.to_pixels(np.array(point)), color) == 0
 
     def test_the_boundary_does_not_change(self):
-        scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
-        plain, painter = drawn(scene, "obstacles", "boundary")
-        frame, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "boundary", "sensed")
+        scene = build_row_scene(record_walk(HALL, 2))  # a third of it lies along what is outside
+        plain, painter = render_layers(scene, "obstacles", "boundary")
+        frame, _ = render_layers(replace(scene, sensed=SensedPoints()), "obstacles", "boundary", "sensed")
         corners = HALL.region.vertices
         for part in np.linspace(0.01, 0.99, 60):
             for pixel in painter.camera.to_pixels(corners + part * (np.roll(corners, -1, axis=0) - corners)):
                 x, y = np.rint(pixel).astype(int)
                 assert np.abs(frame[y, x] - plain[y, x]).max() < 50
-        pale, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "sensed")
+        pale, _ = render_layers(replace(scene, sensed=SensedPoints()), "obstacles", "sensed")
         assert (pale != frame).any()
 
     def test_points_are_drawn_without_the_obstacle_layer(self):
-        pixels, painter = changed(knowing(), "sensed")
+        pixels, painter = list_pixels(knowing(), "sensed")
         away = np.linalg.norm(pixels[:, None] - painter.camera.to_pixels(SEEN), axis=2)
         assert len(pixels) >= 3 * 9
         assert away.min(axis=1).max() < 2.1 * painter.scale + 1.5
@@ -185,7 +185,7 @@ class TestSensedObstacles:
     def test_only_points_of_the_selected_robot_are_drawn(self):
         scene = knowing(selected=1, numbers=(1, 7, 3))
         scene = replace(scene, numbers=(1, 7, 3, 9))
-        frame, painter = drawn(scene, "obstacles", "sensed")
+        frame, painter = render_layers(scene, "obstacles", "sensed")
         assert dots(frame, painter) == [False, True, False]
         assert list_legend_texts(painter, scene)[-1] == "known obstacles"
         frame = painter.render_frame(replace(scene, selected=None)).astype(int)
@@ -193,14 +193,14 @@ class TestSensedObstacles:
         assert list_legend_texts(painter, replace(scene, selected=None))[-1] == "known obstacles"
 
     def test_points_depend_on_the_time(self):
-        record = run_of(ROOMS, 4)
+        record = record_walk(ROOMS, 4)
         sensed = SensedPoints()
         for time, point in zip((0.0, 1.0, 2.0), SEEN, strict=True):
             sensed.add(time, (1,), point[None])
         painter = Painter(ROOMS, SIZE)
         painter.show_only({"obstacles", "sensed"})
         for row, known in ((0, 1), (10, 2), (15, 2), (20, 3), (39, 3), (12, 2), (0, 1)):
-            frame = painter.render_frame(replace(scene_of(record, row), sensed=sensed)).astype(int)
+            frame = painter.render_frame(replace(build_row_scene(record, row), sensed=sensed)).astype(int)
             assert dots(frame, painter) == [True] * known + [False] * (3 - known)
 
     def test_another_history_replaces_all_points(self):
@@ -228,7 +228,7 @@ class TestSensedObstacles:
         scene = knowing(environment=Environment("empty", ROOMS.boundary, (), {"spread": UniformStart()}))
         frame = painter.render_frame(scene).astype(int)
         at = painter.camera.to_pixels(np.array([4.4, 5.5]))
-        assert distance(frame, at, DARK.background) == 0
+        assert measure_error(frame, at, DARK.background) == 0
 
     def test_known_points_are_not_redrawn(self, monkeypatch):
         counts = []
@@ -240,15 +240,15 @@ class TestSensedObstacles:
 
         monkeypatch.setattr(known_obstacles, "draw_dots", count_dots)
         sensed = SensedPoints()
-        layer = layer_named("sensed")
+        layer = find_layer("sensed")
         painter = Painter(ROOMS, SIZE, layers=[layer])
         painter.show_only({"sensed"})
-        record = run_of(ROOMS, 4)
+        record = record_walk(ROOMS, 4)
         pages = set()
         for row in range(9):
             if row in (0, 5):
                 sensed.add(0.1 * row, (1, 2), SEEN[:2] + 0.1 * row)
-            painter.render_frame(replace(scene_of(record, row), sensed=sensed))
+            painter.render_frame(replace(build_row_scene(record, row), sensed=sensed))
             pages.add(id(layer.draw.__self__._page))
         assert counts == [2, 2]
         assert len(pages) == 1
@@ -260,23 +260,23 @@ class TestSensedObstacles:
         )
         carts = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
         scene = replace(knowing(), environment=carts.at(1.0), moving=list_moving_obstacles(carts, 1.0))
-        frame, painter = drawn(scene, "sensed", "obstacles", theme=theme)
+        frame, painter = render_layers(scene, "sensed", "obstacles", theme=theme)
         middle = painter.camera.to_pixels(np.array([13.0, 7.0]))
-        assert nearest(frame, middle, theme.ink) < 30
+        assert measure_least_error(frame, middle, theme.ink) < 30
         pale = mix(theme.background, theme.obstacle, 0.3)
-        assert nearest(frame, painter.camera.to_pixels(np.array([13.0, 7.5])), pale) < 5
+        assert measure_least_error(frame, painter.camera.to_pixels(np.array([13.0, 7.5])), pale) < 5
 
     def test_without_knowledge_nothing_is_drawn(self):
-        scene = scene_of(run_of(ROOMS, 4))
-        assert len(changed(scene, "sensed")[0]) == 0
-        assert not layer_named("sensed").can_draw(scene)
+        scene = build_row_scene(record_walk(ROOMS, 4))
+        assert len(list_pixels(scene, "sensed")[0]) == 0
+        assert not find_layer("sensed").can_draw(scene)
 
 
 WAY = np.array([[1.0, 1.0], [4.0, 2.0], [6.0, 6.0]])
 
 
 def pathed(*corners, positions=TWO):
-    return replace(explained(positions), path=np.array(corners or WAY, dtype=float))
+    return replace(build_scene(positions), path=np.array(corners or WAY, dtype=float))
 
 
 def tags(frame, painter, words, theme=LIGHT):
@@ -286,15 +286,17 @@ def tags(frame, painter, words, theme=LIGHT):
 class TestCursorPath:
     @THEMES
     def test_leads_along_its_corners(self, theme):
-        frame, painter = drawn(pathed(), "path", theme=theme)
+        frame, painter = render_layers(pathed(), "path", theme=theme)
         for start, end in pairwise(WAY):
             for part in np.linspace(0.15, 0.95, 9):
                 pixel = painter.camera.to_pixels(start + part * (end - start))
-                assert nearest(frame, pixel, theme.final) < 50
-        assert nearest(frame, painter.camera.to_pixels(WAY[0]), theme.final) < 5  # a dot at the cursor
+                assert measure_least_error(frame, pixel, theme.final) < 50
+        assert (
+            measure_least_error(frame, painter.camera.to_pixels(WAY[0]), theme.final) < 5
+        )  # a dot at the cursor
 
     def test_only_the_path_is_drawn(self):
-        pixels, painter = changed(pathed(), "path")
+        pixels, painter = list_pixels(pathed(), "path")
         line = shapely.LineString(painter.camera.to_pixels(WAY)).buffer(3 * painter.scale)
         begin = shapely.Point(painter.camera.to_pixels(WAY[0])).buffer(75 * painter.scale)
         assert shapely.contains_xy(line.union(begin), pixels).all()
@@ -302,7 +304,7 @@ class TestCursorPath:
     @THEMES
     def test_the_path_has_a_halo(self, theme):
         scene = pathed((1.0, 4.0), (7.0, 4.0))
-        frame, painter = drawn(scene, "cells", "path", theme=theme)
+        frame, painter = render_layers(scene, "cells", "path", theme=theme)
         pixel = painter.camera.to_pixels(np.array([5.5, 4.0]))
         column = frame[int(pixel[1]) - 5 : int(pixel[1]) + 6, int(pixel[0])]
         away = np.abs(column - np.array(theme.background)).max(axis=1)
@@ -319,7 +321,7 @@ class TestCursorPath:
         ],
     )
     def test_its_length_is_written_at_the_cursor(self, theme, corners, words):
-        frame, painter = drawn(pathed(*corners), "path", theme=theme)
+        frame, painter = render_layers(pathed(*corners), "path", theme=theme)
         found = tags(frame, painter, words, theme)
         assert len(found) == 1
         away = found[0] - painter.camera.to_pixels(np.array(corners[0]))
@@ -347,12 +349,15 @@ class TestCursorPath:
         heading = np.array([np.cos(angle), np.sin(angle)])
         end = 4.0 + 0.6 * heading
         scene = pathed((4.0, 4.0), end, positions=np.array([end]))
-        frame, painter = drawn(scene, "path")
+        frame, painter = render_layers(scene, "path")
         assert len(tags(frame, painter, "0.60 m")) == 1
         for part in (0.3, 0.45, 0.6, 0.8):
-            assert nearest(frame, painter.camera.to_pixels(4.0 + 0.6 * part * heading), LIGHT.final) < 50
-        both, _ = drawn(scene, "path", "robots")
-        alone, _ = drawn(scene, "robots")
+            assert (
+                measure_least_error(frame, painter.camera.to_pixels(4.0 + 0.6 * part * heading), LIGHT.final)
+                < 50
+            )
+        both, _ = render_layers(scene, "path", "robots")
+        alone, _ = render_layers(scene, "robots")
         disc = (alone != 255).any(axis=2)
         free = (frame == 255).all(axis=2)
         assert (both[disc & free] == alone[disc & free]).all()
@@ -362,15 +367,15 @@ class TestCursorPath:
     def test_the_tag_hides_no_other_robot(self, side):
         positions = 4.0 + np.array([[0.4 * side[0], 0.35 * side[1]], [0.0, -2.0]])
         scene = pathed((4.0, 4.0), (4.0, 2.0), positions=positions)
-        frame, painter = drawn(scene, "path")
+        frame, painter = render_layers(scene, "path")
         assert len(tags(frame, painter, "2.00 m")) == 1
         x, y = np.rint(painter.camera.to_pixels(positions[0])).astype(int)
         assert (frame[y - 4 : y + 5, x - 4 : x + 5] == 255).all()
 
     @pytest.mark.parametrize("path", [None, np.empty((0, 2)), np.array([[1.0, 1.0]])])
     def test_without_a_path_nothing_is_drawn(self, path):
-        scene = replace(explained(TWO), path=path)
-        pixels, painter = changed(scene, "path")
+        scene = replace(build_scene(TWO), path=path)
+        pixels, painter = list_pixels(scene, "path")
         assert len(pixels) == 0
         assert list_legend_texts(painter, scene) == []
 
@@ -382,6 +387,6 @@ def test_glyphs_of_the_legend(theme):
         ("sensed", knowing(), theme.forces["repulsion_obstacle"]),
         ("path", pathed(), theme.final),
     ):
-        pictures = glyphs(layer_named(layer), scene, theme)
+        pictures = glyphs(find_layer(layer), scene, theme)
         assert len(pictures) == 1
         check_glyph(pictures[0], theme, color)

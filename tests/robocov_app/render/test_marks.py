@@ -2,8 +2,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, layer_named, list_legend_texts, nearest
-from drawn_run import SQUARE, explained
+from drawn_pixels import (
+    ONE,
+    SIZE,
+    TWO,
+    find_layer,
+    list_legend_texts,
+    list_pixels,
+    measure_error,
+    measure_least_error,
+    render_layers,
+)
+from drawn_run import SQUARE, build_scene
 from written_words import check_glyph, glyphs, places
 
 from robocov.team import Team
@@ -15,7 +25,7 @@ THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
 
 def broken(failed, positions=TWO, **more):
-    return replace(explained(positions), failed=failed, **more)
+    return replace(build_scene(positions), failed=failed, **more)
 
 
 def numbers(frame, painter, text, theme=LIGHT):
@@ -32,18 +42,18 @@ def around(frame, painter, place, radius):
 class TestFailed:
     @THEMES
     def test_a_failed_robot_is_gray_and_crossed_out(self, theme):
-        frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
+        frame, painter = render_layers(broken({3: (4.0, 5.0)}), "failed", theme=theme)
         center = painter.camera.to_pixels(np.array([4.0, 5.0]))
-        assert distance(frame, center, theme.ink) < 8
+        assert measure_error(frame, center, theme.ink) < 8
         for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-            assert nearest(frame, center + 3.0 * painter.scale * np.array(side), theme.ink) < 40
+            assert measure_least_error(frame, center + 3.0 * painter.scale * np.array(side), theme.ink) < 40
         for side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             at = center + 5.0 * painter.scale * np.array(side)
-            assert nearest(frame, at, mix(theme.background, theme.ink, 0.3)) < 12
+            assert measure_least_error(frame, at, mix(theme.background, theme.ink, 0.3)) < 12
 
     @THEMES
     def test_a_failed_robot_differs_from_a_working_one(self, theme):
-        frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
+        frame, painter = render_layers(broken({3: (4.0, 5.0)}), "failed", theme=theme)
         disc = around(frame, painter, (4.0, 5.0), 9)
         assert np.ptp(disc, axis=1).max() < 32  # no hue
         for robot in theme.robots:
@@ -53,7 +63,7 @@ class TestFailed:
     @THEMES
     def test_a_failed_robot_has_its_number_next_to_it(self, theme):
         failed = {12: (2.0, 6.0), 3: (6.0, 2.0)}
-        frame, painter = drawn(broken(failed), "failed", theme=theme)
+        frame, painter = render_layers(broken(failed), "failed", theme=theme)
         for number, place in failed.items():
             found = numbers(frame, painter, str(number), theme)
             assert len(found) == 1
@@ -75,7 +85,7 @@ class TestFailed:
         """Robots at the right, left and above (y up) push it left, above and below (y down)."""
         near = 4.0 + 0.4 * np.array(robots).reshape(-1, 2)
         positions = np.vstack([near, [[1.0, 1.0]]])
-        frame, painter = drawn(broken({8: (4.0, 4.0)}, positions), "failed", "robots")
+        frame, painter = render_layers(broken({8: (4.0, 4.0)}, positions), "failed", "robots")
         found = numbers(frame, painter, "8")
         assert len(found) == 1
         away = found[0] - painter.camera.to_pixels(np.array([4.0, 4.0]))
@@ -83,7 +93,7 @@ class TestFailed:
 
     def test_numbers_of_two_that_failed_side_by_side_can_both_be_read(self):
         scene = broken({4: (4.0, 4.0), 5: (4.3, 4.0)})
-        frame, painter = drawn(scene, "failed")
+        frame, painter = render_layers(scene, "failed")
         assert len(numbers(frame, painter, "4")) == 1
         assert len(numbers(frame, painter, "5")) == 1
 
@@ -92,39 +102,42 @@ class TestFailed:
         for apart in (0.15, 2.0):
             scene = broken({4: (4.0, 4.0)}, np.array([[4.0 + apart, 4.0], [1.0, 1.0]]))
             scene = replace(scene, team=Team.homogeneous(2, radius=0.02))
-            pixels, painter = changed(scene, "failed")
+            pixels, painter = list_pixels(scene, "failed")
             away = painter.camera.to_pixels(np.array([4.0, 4.0])) - pixels
             sizes.append(away[:, 1].max() / painter.scale)
         assert sizes[0] < 6 < 7 < sizes[1] < 10
 
     def test_a_large_one_is_drawn_in_true_size(self):
         scene = replace(broken({4: (4.0, 4.0)}), team=Team.homogeneous(2, radius=1.0))
-        frame, painter = drawn(scene, "failed")
+        frame, painter = render_layers(scene, "failed")
         center = painter.camera.to_pixels(np.array([4.0, 4.0]))
         fill = mix(LIGHT.background, LIGHT.ink, 0.3)
-        assert distance(frame, center + np.array([0.9 * painter.camera.zoom, 0.0]), fill) == 0
-        assert nearest(frame, center + np.array([0.0, 1.2 * painter.camera.zoom]), LIGHT.background) == 0
+        assert measure_error(frame, center + np.array([0.9 * painter.camera.zoom, 0.0]), fill) == 0
+        assert (
+            measure_least_error(frame, center + np.array([0.0, 1.2 * painter.camera.zoom]), LIGHT.background)
+            == 0
+        )
 
     def test_working_robots_are_above_it(self):
         scene = broken({3: (4.05, 4.0)}, ONE)
-        frame, painter = drawn(scene, "failed", "robots")
-        alone, _ = drawn(explained(ONE), "robots")
+        frame, painter = render_layers(scene, "failed", "robots")
+        alone, _ = render_layers(build_scene(ONE), "robots")
         disc = (around(alone, painter, (4.0, 4.0), 7), around(frame, painter, (4.0, 4.0), 7))
         assert (disc[0] == disc[1]).all()
 
     def test_without_failed_robots_nothing_is_drawn(self):
-        pixels, painter = changed(broken({}), "failed")
+        pixels, painter = list_pixels(broken({}), "failed")
         assert len(pixels) == 0
         assert list_legend_texts(painter, broken({})) == []
         assert list_legend_texts(painter, broken({3: (4.0, 5.0)})) == ["failed robot"]
 
     def test_failed_robots_are_drawn_before_the_first_step(self):
-        frame, painter = drawn(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
+        frame, painter = render_layers(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
         assert len(numbers(frame, painter, "3")) == 1
 
     @THEMES
     def test_its_glyph_in_the_legend(self, theme):
-        (picture,) = glyphs(layer_named("failed"), broken({3: (4.0, 5.0)}), theme)
+        (picture,) = glyphs(find_layer("failed"), broken({3: (4.0, 5.0)}), theme)
         check_glyph(picture, theme, theme.ink)
         check_glyph(picture, theme, mix(theme.background, theme.ink, 0.3))
 
@@ -133,8 +146,8 @@ class TestSelection:
     @THEMES
     @pytest.mark.parametrize("selected", [0, 1])
     def test_is_a_ring_around_the_robot_and_no_other(self, theme, selected):
-        scene = replace(explained(TWO), selected=selected)
-        frame, painter = drawn(scene, "selection", theme=theme)
+        scene = replace(build_scene(TWO), selected=selected)
+        frame, painter = render_layers(scene, "selection", theme=theme)
         rows, columns = np.nonzero((frame != np.array(theme.background)).any(axis=2))
         away = np.hypot(*(np.column_stack([columns, rows]) - painter.camera.to_pixels(TWO[selected])).T)
         away /= painter.scale
@@ -143,25 +156,25 @@ class TestSelection:
         for angle in np.arange(12) * np.pi / 6:
             at = painter.camera.to_pixels(TWO[selected])
             at = at + 13 * painter.scale * np.array([np.cos(angle), np.sin(angle)])
-            assert nearest(frame, at, theme.ink) < 30
+            assert measure_least_error(frame, at, theme.ink) < 30
 
     def test_leaves_the_robot_and_its_number_as_they_are(self):
-        frame, painter = drawn(replace(explained(TWO), selected=1), "selection", "robots")
-        alone, _ = drawn(explained(TWO), "robots")
+        frame, painter = render_layers(replace(build_scene(TWO), selected=1), "selection", "robots")
+        alone, _ = render_layers(build_scene(TWO), "robots")
         assert (around(frame, painter, TWO[1], 9) == around(alone, painter, TWO[1], 9)).all()
         assert (around(frame, painter, TWO[0], 20) == around(alone, painter, TWO[0], 20)).all()
         assert (around(frame, painter, TWO[1], 15) != around(alone, painter, TWO[1], 15)).any()
 
     def test_fits_a_large_robot(self):
         team = Team.homogeneous(2)
-        scene = replace(explained(TWO), selected=1, team=replace(team, radius=np.array([0.1, 1.0])))
-        pixels, painter = changed(scene, "selection")
+        scene = replace(build_scene(TWO), selected=1, team=replace(team, radius=np.array([0.1, 1.0])))
+        pixels, painter = list_pixels(scene, "selection")
         away = np.hypot(*(pixels - painter.camera.to_pixels(TWO[1])).T)
         assert painter.camera.zoom < away.min() < away.max() < 1.15 * painter.camera.zoom
 
     def test_without_a_selected_robot_nothing_is_drawn(self):
-        assert len(changed(explained(TWO), "selection")[0]) == 0
-        assert len(changed(replace(explained(TWO), selected=0, snapshot=None), "selection")[0]) == 0
+        assert len(list_pixels(build_scene(TWO), "selection")[0]) == 0
+        assert len(list_pixels(replace(build_scene(TWO), selected=0, snapshot=None), "selection")[0]) == 0
 
 
 def test_marks_stay_inside_the_picture_of_the_map():
@@ -171,7 +184,7 @@ def test_marks_stay_inside_the_picture_of_the_map():
     painter.show_only({"failed", "selection", "status"})
     painter.camera = painter.camera.pan(0, 4)
     frame = painter.render_frame(scene).astype(int)
-    alone, _ = drawn(explained(TWO), "status")
+    alone, _ = render_layers(build_scene(TWO), "status")
     strip = int(painter.camera.view[1] + painter.camera.view[3]) + 1
     assert SIZE[1] - strip > 20
     assert (frame[strip:] == alone[strip:]).all()
@@ -180,7 +193,7 @@ def test_marks_stay_inside_the_picture_of_the_map():
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_unicycles_have_a_nose_in_their_heading(theme):
-    plain = explained(TWO)
+    plain = build_scene(TWO)
     team = replace(plain.team, track_width=np.array([0.0, 0.16]))
     painter = Painter(SQUARE, SIZE, theme)
     without = painter.render_frame(plain).astype(int)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, explained, run_of, scene_of
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, build_row_scene, build_scene, record_walk
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -19,14 +19,14 @@ from robocov_app.render.painter import Painter, choose_scale
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
 def test_a_frame_has_the_requested_size(size):
-    frame = Painter(ROOMS, size).render_frame(scene_of(run_of(ROOMS, 6)))
+    frame = Painter(ROOMS, size).render_frame(build_row_scene(record_walk(ROOMS, 6)))
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_the_same_scene_gives_the_same_bytes(theme):
-    scene = scene_of(run_of(ROOMS, 12))
+    scene = build_row_scene(record_walk(ROOMS, 12))
     first, second = Painter(ROOMS, (800, 600), theme), Painter(ROOMS, (800, 600), theme)
     assert (
         first.render_frame(scene).tobytes()
@@ -36,11 +36,11 @@ def test_the_same_scene_gives_the_same_bytes(theme):
 
 
 def test_a_frame_is_not_overwritten_by_the_next():
-    record = run_of(SQUARE, 4)
+    record = record_walk(SQUARE, 4)
     painter = Painter(SQUARE, (320, 240))
-    first = painter.render_frame(scene_of(record, 5))
+    first = painter.render_frame(build_row_scene(record, 5))
     kept = first.copy()
-    second = painter.render_frame(scene_of(record, 30))
+    second = painter.render_frame(build_row_scene(record, 30))
     assert (first == kept).all()
     assert (first != second).any()
 
@@ -49,7 +49,7 @@ def test_a_frame_is_not_overwritten_by_the_next():
 @pytest.mark.parametrize("size", [(480, 360), (1280, 720), (400, 900)])
 def test_the_whole_region_is_visible(environment, size):
     painter = Painter(environment, size)
-    painter.render_frame(scene_of(run_of(environment, 3)))
+    painter.render_frame(build_row_scene(record_walk(environment, 3)))
     corners = painter.camera.to_pixels(environment.region.vertices)
     left, top, width, height = painter.camera.view
     assert (corners[:, 0] >= left + 1).all() and (corners[:, 0] <= left + width - 1).all()
@@ -57,7 +57,7 @@ def test_the_whole_region_is_visible(environment, size):
 
 
 def test_zoomed_world_stays_in_its_view_and_fit_brings_it_back():
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     painter = Painter(ROOMS, (640, 480))
     before = painter.render_frame(scene)
     strip = int(painter.camera.view[1])
@@ -77,7 +77,7 @@ def test_zoomed_world_stays_in_its_view_and_fit_brings_it_back():
 )
 @example(2.0**40, (0.0, 0.0), (100.0, 100.0))
 def test_any_zoom_can_be_drawn(factor, pan, at):
-    scene = explained(
+    scene = build_scene(
         np.array([[2.0, 2.0], [6.0, 6.0]]),
         forces=np.ones((2, 2)),
         velocities=np.ones((2, 2)),
@@ -99,7 +99,7 @@ def test_any_zoom_can_be_drawn(factor, pan, at):
 @given(st.floats(20, 5000), st.floats(0.5, 7.5), st.floats(0.5, 7.5))
 def test_magnified_pictures_are_exact(factor, x, y):
     """Cells seen through a strong lens: edges that end far outside do not turn."""
-    scene = explained(np.array([[1.0, 2.0], [6.0, 7.0], [5.0, 1.0]]))
+    scene = build_scene(np.array([[1.0, 2.0], [6.0, 7.0], [5.0, 1.0]]))
     painter = Painter(SQUARE, (320, 240))
     painter.show_only({"cells"})
     painter.render_frame(scene)
@@ -119,7 +119,7 @@ def test_magnified_pictures_are_exact(factor, x, y):
 
 
 def test_the_legend_follows_the_colors_of_the_trajectories():
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     tops = []
     for colors in ("robots", "paper"):
         painter = Painter(ROOMS, (640, 480), layers=build_standard_layers(colors))
@@ -129,7 +129,7 @@ def test_the_legend_follows_the_colors_of_the_trajectories():
 
 
 def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     window = pygame.Surface((900, 600), 0, 32)
     window.fill((1, 2, 3))
     painter = Painter(ROOMS, (640, 480))
@@ -143,7 +143,7 @@ def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():
 
 def test_a_surface_of_another_size_is_filled():
     painter = Painter(ROOMS, (640, 480))
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     painter.render_frame(scene)
     painter.draw(pygame.Surface((800, 500), 0, 32), scene)
     assert painter.size == (800, 500)
@@ -156,18 +156,18 @@ def test_static_layers_are_drawn_once():
     at = [layer.name for layer in layers].index("obstacles")
     draw = layers[at].draw
     layers[at] = replace(layers[at], draw=lambda *given: (calls.append(1), draw(*given)))
-    record = run_of(ROOMS, 6)
+    record = record_walk(ROOMS, 6)
     painter = Painter(ROOMS, (640, 480), layers=layers)
     for row in range(10):
-        painter.render_frame(scene_of(record, row))
+        painter.render_frame(build_row_scene(record, row))
     assert len(calls) == 1
     painter.camera = painter.camera.pan(3, 0)
-    painter.render_frame(scene_of(record, 10))
+    painter.render_frame(build_row_scene(record, 10))
     assert len(calls) == 2
 
 
 def test_cached_pages_depend_on_the_visible_layers():
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     painter = Painter(ROOMS, (640, 480))
     with_grid = painter.render_frame(scene)
     painter.visible -= {"grid"}
@@ -218,13 +218,13 @@ _HEADLESS = """
 import os, sys
 os.environ["SDL_VIDEODRIVER"] = "no such driver"
 sys.path.insert(0, sys.argv[1])
-from drawn_run import ROOMS, run_of, scene_of
+from drawn_run import ROOMS, record_walk, build_row_scene
 for module in ("pygame", "matplotlib"):
     assert module not in sys.modules, module
 import robocov_app.look.theme, robocov_app.render.camera, robocov_app.runs.encoding
 assert "pygame" not in sys.modules and "matplotlib" not in sys.modules
 from robocov_app.render.painter import Painter
-frame = Painter(ROOMS, (320, 240)).render_frame(scene_of(run_of(ROOMS, 3)))
+frame = Painter(ROOMS, (320, 240)).render_frame(build_row_scene(record_walk(ROOMS, 3)))
 assert frame.std() > 10
 import pygame
 assert not pygame.display.get_init()
@@ -245,7 +245,7 @@ def test_frames_need_no_display_and_no_matplotlib():
 
 
 def test_the_map_does_not_jump_when_the_legend_changes() -> None:
-    scene = scene_of(run_of(ROOMS, 6))
+    scene = build_row_scene(record_walk(ROOMS, 6))
     there = replace(scene, path=np.array([[1.0, 4.5], [2.0, 4.5]]), failed={9: (3.0, 4.0)})
     painter = Painter(ROOMS, (420, 320))
     painter.visible |= {"path", "links", "velocities"}

@@ -5,8 +5,8 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from drawn_pixels import SIZE, distance, drawn, layer_named, nearest
-from drawn_run import SQUARE, explained, run_of, scene_of
+from drawn_pixels import SIZE, find_layer, measure_error, measure_least_error, render_layers
+from drawn_run import SQUARE, build_row_scene, build_scene, record_walk
 
 from robocov_app.look.hues import choose_trail_color
 from robocov_app.look.theme import DARK, LIGHT
@@ -43,7 +43,7 @@ def straight(rows, n=1):
 def walked(trail, time=None, **more):
     time = np.arange(len(trail)) / RATE if time is None else time
     known = np.nan_to_num(trail[-1], nan=1.0)
-    return replace(explained(known), trail=trail, trail_time=time, **more)
+    return replace(build_scene(known), trail=trail, trail_time=time, **more)
 
 
 class FadingPainter(Painter):
@@ -58,7 +58,7 @@ def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
     painter = FadingPainter(SQUARE, size, theme)
     painter.show_only({"trajectories", *also})
     painter.fade = fade
-    return painter, layer_named("trajectories", painter.layers).draw.__self__
+    return painter, find_layer("trajectories", painter.layers).draw.__self__
 
 
 def frame_of(painter, *scene, **more):
@@ -146,7 +146,7 @@ class TestGaps:
             assert off_the_paths(painter, trail, each, theme) == 0
             for row in (60, 70, 78):
                 pixel = painter.camera.to_pixels(trail[row, 1])
-                assert nearest(each, pixel, choose_trail_color(theme, 1)) < 120
+                assert measure_least_error(each, pixel, choose_trail_color(theme, 1)) < 120
             first = painter.camera.to_pixels(trail[40, 1])
             assert ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max() == 0
 
@@ -164,7 +164,7 @@ class TestGaps:
         for each in (frame, at_once):
             for row in (26, 44, 55):
                 pixel = painter.camera.to_pixels(trail[row, 1])
-                assert nearest(each, pixel, choose_trail_color(LIGHT, 1)) < 150
+                assert measure_least_error(each, pixel, choose_trail_color(LIGHT, 1)) < 150
 
     @FADES
     def test_slow_ones_leave_none_either(self, fade):
@@ -183,7 +183,10 @@ class TestGaps:
         for count in range(1, 51):
             frame = frame_of(painter, trail[:count])
         assert off_the_paths(painter, trail, frame) == 0
-        assert nearest(frame, painter.camera.to_pixels(trail[30, 1]), choose_trail_color(LIGHT, 1)) < 200
+        assert (
+            measure_least_error(frame, painter.camera.to_pixels(trail[30, 1]), choose_trail_color(LIGHT, 1))
+            < 200
+        )
 
     @FADES
     def test_an_absent_robot_has_no_path(self, fade):
@@ -257,7 +260,7 @@ class TestFading:
             assert (column >= low).all()
             assert (column <= high).all()
         x, y = np.rint(painter.camera.to_pixels(trail[14, 0])).astype(int)
-        assert 0 < nearest(frame, (x, y), theme.get_cell_color(0), reach=0) < 60
+        assert 0 < measure_least_error(frame, (x, y), theme.get_cell_color(0), reach=0) < 60
 
     def test_newer_paths_are_on_top(self):
         rows = 61
@@ -268,11 +271,11 @@ class TestFading:
         painter, _ = painter_of(3.0)
         pixel = painter.camera.to_pixels(np.array([4.0, 4.0]))
         frame = frame_of(painter, trail)
-        assert nearest(frame, pixel, choose_trail_color(LIGHT, 0), reach=0) < nearest(
+        assert measure_least_error(frame, pixel, choose_trail_color(LIGHT, 0), reach=0) < measure_least_error(
             frame, pixel, choose_trail_color(LIGHT, 1), reach=0
         )
         swapped = frame_of(painter, trail[:, ::-1])
-        assert nearest(swapped, pixel, choose_trail_color(LIGHT, 1), reach=0) < 110
+        assert measure_least_error(swapped, pixel, choose_trail_color(LIGHT, 1), reach=0) < 110
 
     def test_slow_robots_have_trails_without_gaps(self):
         trail = np.empty((400, 2, 2))
@@ -325,7 +328,7 @@ class TestFading:
                 assert (frame == frame_of(painter_of(fade)[0], trail, numbers=numbers)).all()
                 for row, number in enumerate(numbers):
                     for place in painter.camera.to_pixels(trail[[30, 36], row]):
-                        assert nearest(frame, place, choose_trail_color(LIGHT, number - 1)) < 90
+                        assert measure_least_error(frame, place, choose_trail_color(LIGHT, number - 1)) < 90
 
     def test_it_may_be_switched_on_and_off(self):
         trail = walks(90)
@@ -355,7 +358,9 @@ class TestFading:
         painter.camera = replace(painter.camera, center=(x, y), zoom=2e4)
         frame = frame_of(painter, trail)
         assert (
-            nearest(frame, painter.camera.to_pixels(trail[-5, 0]), choose_trail_color(LIGHT, 0), reach=3)
+            measure_least_error(
+                frame, painter.camera.to_pixels(trail[-5, 0]), choose_trail_color(LIGHT, 0), reach=3
+            )
             < 110
         )
 
@@ -363,7 +368,10 @@ class TestFading:
         trail = straight(40, 12) * np.array([1.0, 0.55])
         frame = frame_of(painter_of(4.0)[0], trail)
         painter, _ = painter_of(4.0)
-        red = [nearest(frame, painter.camera.to_pixels(trail[37, k]), LIGHT.trajectory) for k in range(12)]
+        red = [
+            measure_least_error(frame, painter.camera.to_pixels(trail[37, k]), LIGHT.trajectory)
+            for k in range(12)
+        ]
         assert max(red) < 150
 
 
@@ -371,16 +379,19 @@ class TestFading:
 @pytest.mark.slow
 def test_pieces_on_the_page_and_new_ones_are_alike(size):
     """Where a section begins or ends, the line is neither thicker nor broken."""
-    record = run_of(SQUARE, 3, steps=80)
+    record = record_walk(SQUARE, 3, steps=80)
     painter, _ = painter_of(size=size)
     for row in range(1, 80):
-        frame = painter.render_frame(scene_of(record, row)).astype(int)
-    at_once, _ = drawn(scene_of(record), "trajectories", size=size)
+        frame = painter.render_frame(build_row_scene(record, row)).astype(int)
+    at_once, _ = render_layers(build_row_scene(record), "trajectories", size=size)
     for row in range(4, 74, 2):
         for pixel in painter.camera.to_pixels(record.positions[row]):
-            assert nearest(frame, pixel, LIGHT.background, reach=0) > 0
+            assert measure_least_error(frame, pixel, LIGHT.background, reach=0) > 0
             assert (
-                abs(distance(frame, pixel, LIGHT.background) - distance(at_once, pixel, LIGHT.background))
+                abs(
+                    measure_error(frame, pixel, LIGHT.background)
+                    - measure_error(at_once, pixel, LIGHT.background)
+                )
                 < 130
             )
 

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, distance, drawn
-from drawn_run import SQUARE, explained
+from drawn_pixels import ONE, measure_error, render_layers
+from drawn_run import SQUARE, build_scene
 
 from robocov.controllers.atlas import Atlas
 from robocov.planning.discovered_map import FREE, PRESUMED_WALL, WALL, DiscoveredMap
@@ -24,7 +24,7 @@ def scene(selected: int | None = 0):
     state[20:25, 10:20] = WALL
     state[30:35, 10:20] = PRESUMED_WALL
     known = DiscoveredMap(raster, state)
-    plain = explained(ONE)
+    plain = build_scene(ONE)
     memory = Atlas().begin(SQUARE.region, Team.homogeneous(len(plain.team)))
     memory = replace(memory, states=(replace(memory.states[0], known_map=known), *memory.states[1:]))
     snapshot = replace(plain.snapshot, decision=replace(plain.snapshot.decision, memory=memory))
@@ -35,7 +35,7 @@ def scene(selected: int | None = 0):
 def test_walls_and_unknown_cells_are_visible(theme):
     known, shown = scene()
     assert get_discovered_map(shown) is known
-    frame, painter = drawn(shown, "sensed", theme=theme)
+    frame, painter = render_layers(shown, "sensed", theme=theme)
     at = {
         name: painter.camera.to_pixels(known.raster.compute_centers(np.array(row), np.array(column)))
         for name, (row, column) in {
@@ -46,14 +46,14 @@ def test_walls_and_unknown_cells_are_visible(theme):
         }.items()
     }
     color = theme.forces["repulsion_obstacle"]
-    assert distance(frame, at["free"], theme.background) == 0
-    assert distance(frame, at["wall"], mix(theme.background, color, 0.85)) < 6
-    assert distance(frame, at["presumed"], mix(theme.background, color, 0.45)) < 6
-    assert distance(frame, at["unknown"], mix(theme.background, theme.obstacle, 0.28)) < 6
+    assert measure_error(frame, at["free"], theme.background) == 0
+    assert measure_error(frame, at["wall"], mix(theme.background, color, 0.85)) < 6
+    assert measure_error(frame, at["presumed"], mix(theme.background, color, 0.45)) < 6
+    assert measure_error(frame, at["unknown"], mix(theme.background, theme.obstacle, 0.28)) < 6
 
 
 def test_without_a_selected_robot_or_map_nothing_is_drawn():
     _, shown = scene(selected=None)
     assert get_discovered_map(shown) is None
-    assert get_discovered_map(replace(explained(ONE), selected=0)) is None
+    assert get_discovered_map(replace(build_scene(ONE), selected=0)) is None
     assert get_discovered_map(replace(shown, snapshot=None, selected=0)) is None

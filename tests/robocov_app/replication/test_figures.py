@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from clear_pages import all_clear
-from drawn_run import HALL, ROOMS, SQUARE, run_of
+from drawn_run import HALL, ROOMS, SQUARE, record_walk
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
 
@@ -19,7 +19,7 @@ from robocov_app.replication.results.study_results import FigureRun
 def build_figure_run(environment, controller: str, final: float, seed: int = 0) -> FigureRun:
     time = np.linspace(0.0, 60.0, 121)
     cost = final + 3.0 * np.exp(-time / 8)
-    record = replace(run_of(environment, 6, seed=seed, controller=controller), label=controller.upper())
+    record = replace(record_walk(environment, 6, seed=seed, controller=controller), label=controller.upper())
     return FigureRun(record, CostHistory(time, cost, 80.0 * cost, np.zeros_like(time)))
 
 
@@ -33,7 +33,7 @@ RUNS = {
     "other/rapf": build_figure_run(HALL, "rapf", 2.0, 2),
     "other/rpf": build_figure_run(HALL, "rpf", 4.3, 3),
 }
-PARTITION = run_of(SQUARE, 6)
+PARTITION = record_walk(SQUARE, 6)
 
 
 @pytest.mark.parametrize("number", range(1, 9))

@@ -10,7 +10,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from drawn_run import ROOMS, SQUARE, run_of
+from drawn_run import ROOMS, SQUARE, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -62,19 +62,19 @@ class TestRows:
 
 class TestFrames:
     def test_as_many_as_the_run_lasts_and_lazily(self):
-        record = run_of(ROOMS, 3, steps=31)  # 3 s
+        record = record_walk(ROOMS, 3, steps=31)  # 3 s
         frames = draw_frames(record, VideoSettings(fps=5, speed=2), size=(160, 120))
         assert next(frames).shape == (120, 160, 3)
         assert 1 + sum(1 for _ in frames) == 9
 
     def test_each_shows_its_moment(self):
-        record = run_of(SQUARE, 3, steps=21)
+        record = record_walk(SQUARE, 3, steps=21)
         frames = list(draw_frames(record, VideoSettings(), size=(320, 240), rows=np.array([0, 10, 20, 20])))
         assert (frames[0] != frames[1]).any() and (frames[1] != frames[2]).any()
         assert (frames[2] == frames[3]).all()
 
     def test_the_cost_is_the_latest_known(self):
-        record = run_of(SQUARE, 3, steps=21)
+        record = record_walk(SQUARE, 3, steps=21)
         rows = np.array([10])
 
         def shown(times, values):
@@ -88,7 +88,7 @@ class TestFrames:
         assert shown([1.5], [1.0]) == shown([], []) == shown([0.0], [np.nan])
 
     def test_the_mean_time_is_told_with_it(self):
-        record = run_of(SQUARE, 3, steps=21)
+        record = record_walk(SQUARE, 3, steps=21)
         options = {"size": (480, 240), "rows": np.array([10])}
         time, mean = np.array([0.0]), np.array([3.0])
         histories = [CostHistory(time, mean, mean, mean, other) for other in (None, mean, 2.0 * mean)]
@@ -98,7 +98,7 @@ class TestFrames:
         assert len(set(frames)) == 3
 
     def test_options_are_checked(self):
-        record = run_of(SQUARE, 3, steps=5)
+        record = record_walk(SQUARE, 3, steps=5)
         with pytest.raises(ParameterError, match="theme"):
             next(draw_frames(record, VideoSettings(theme="pink")))
 
@@ -171,7 +171,7 @@ class TestSaveFilm:
         assert np.nonzero(bright)[0].tolist() == [*range(0, width, 8), *range(width - 1, width + width % 2)]
 
     def test_same_frames_same_bytes(self, tmp_path):
-        record = run_of(ROOMS, 5, steps=12)
+        record = record_walk(ROOMS, 5, steps=12)
         for name in ("a.mp4", "b.mp4"):
             save_video(
                 tmp_path / name, draw_frames(record, VideoSettings(fps=10, speed=1.0), size=(320, 180))

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
+from drawn_run import CORRIDOR, ROOMS, SHAFT, record_walk
 
 from robocov.metrics import CostHistory
 from robocov_app.look.theme import DARK, LIGHT
@@ -43,13 +43,13 @@ class TestLayout:
         [(ROOMS, 1, 1), (ROOMS, 2, 2), (ROOMS, 3, 3), (ROOMS, 4, 2), (CORRIDOR, 3, 1), (SHAFT, 4, 4)],
     )
     def test_wide_maps_stand_below_each_other(self, environment, count, columns):
-        layout = build_pane_layout([run_of(environment, 3)] * count, VideoSettings())
+        layout = build_pane_layout([record_walk(environment, 3)] * count, VideoSettings())
         assert layout.columns == columns
         assert layout.size[0] <= 1920 and layout.size[1] <= 1090
         assert layout.size[0] % 2 == layout.size[1] % 2 == 0
 
     def test_a_wide_map_is_drawn_nearly_as_wide_as_the_film(self):
-        layout, frames = film([run_of(CORRIDOR, 3)] * 3)
+        layout, frames = film([record_walk(CORRIDOR, 3)] * 3)
         frame = next(frames)
         assert layout.pane[0] == 1920
         obstacles_or_boundary = (frame == np.array(LIGHT.boundary)).all(axis=2)
@@ -58,13 +58,13 @@ class TestLayout:
     @pytest.mark.parametrize("size", [(1281, 719), (320, 240)])
     @pytest.mark.parametrize("count", [1, 5])
     def test_frames_have_exactly_the_size_asked_for(self, size, count):
-        _, frames = film([run_of(ROOMS, 3)] * count, size=size)
+        _, frames = film([record_walk(ROOMS, 3)] * count, size=size)
         assert next(frames).shape == (size[1], size[0], 3)
 
     @pytest.mark.parametrize("count", [1, 3, 5])
     @pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
     def test_without_a_size_it_is_what_the_layout_says(self, environment, count):
-        layout, frames = film([run_of(environment, 2)] * count, theme="dark")
+        layout, frames = film([record_walk(environment, 2)] * count, theme="dark")
         frame = next(frames)
         assert frame.shape == (layout.size[1], layout.size[0], 3)
         rows = -(-count // layout.columns)
@@ -74,12 +74,12 @@ class TestLayout:
 
 class TestFrames:
     def test_the_longest_run_ends_it(self):
-        short, long = run_of(ROOMS, 2, steps=11), run_of(ROOMS, 2, steps=41)
+        short, long = record_walk(ROOMS, 2, steps=11), record_walk(ROOMS, 2, steps=41)
         _, frames = film([short, long], size=(640, 300), speed=1.0)
         assert sum(1 for _ in frames) == len(select_frame_rows(long.time, 5))
 
     def test_each_pane_is_the_film_of_its_own_run(self):
-        first = run_of(ROOMS, 3, steps=21)
+        first = record_walk(ROOMS, 3, steps=21)
         second = replace(first, positions=first.positions[:, ::-1] + 0.4)
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
@@ -93,7 +93,7 @@ class TestFrames:
                 assert (frame[top : top + wanted.shape[0], -wanted.shape[1] :] == wanted).all()
 
     def test_one_legend_explains_what_any_of_them_shows(self):
-        without = run_of(ROOMS, 3, controller="rpf")
+        without = record_walk(ROOMS, 3, controller="rpf")
         with_goals = replace(without, goals=without.positions + 0.1)
         plain_header = build_pane_layout([without, without], VideoSettings()).header
         both = build_pane_layout([without, with_goals], VideoSettings()).header
@@ -105,7 +105,7 @@ class TestFrames:
 
     @pytest.mark.slow
     def test_trajectories_have_the_colors_asked_for(self):
-        record = run_of(ROOMS, 4)
+        record = record_walk(ROOMS, 4)
         reds = []
         for colors in ("paper", "robots"):
             _, frames = film([record, record], colors=colors, size=(1280, 640))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_run import run_of
+from drawn_run import record_walk
 from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, get_positions, start_session
 from session_records import COUNTING, build_record, build_records, have_same_arrays
 
@@ -471,7 +471,7 @@ def test_only_gains_that_differ_from_their_defaults_are_chosen(record: Record) -
 
 def test_records_of_any_origin_are_displayed() -> None:
     """The record ends where no simulation can start, because robots walk through walls."""
-    record = replace(run_of(HALL, 3, steps=20), team=Team.homogeneous(3))
+    record = replace(record_walk(HALL, 3, steps=20), team=Team.homogeneous(3))
     assert build_roster(record).numbers == (1, 2, 3)
     session = replay(record)
     session.show_time(1.0)
