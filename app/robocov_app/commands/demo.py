@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import ParameterError, require_number
+from robocov.errors import ParameterError, StartError, require_number
 from robocov_app.commands.options import LayerOptions, ScenarioOptions, WindowOptions, get_robot_count
 from robocov_app.terminal.arguments import parse_gains, parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -199,7 +199,16 @@ def build_session(options: Arguments) -> Session:
         dt=options.dt,
         conditions=conditions,
     )
-    session = Session(scenario)
+    try:
+        session = Session(scenario)
+    except StartError:
+        if options.start is not None:
+            raise
+        start_name = scenario.start_name
+        scenario = replace(scenario, start="uniform")
+        session = Session(scenario)
+        text = f"no space for {robots} robots at start '{start_name}': they start uniformly"
+        echo(f"robocov: {text} (as with --start uniform)", to_stderr=True)
     session.playback.clock.speed = options.speed
     session.playback.is_playing = not options.paused
     return session

@@ -12,7 +12,9 @@ from driven_window import Driver, build_key_event, open_viewer
 from sample_sessions import HALL, advance_session
 
 from robocov.environment import WallObstacle
+from robocov.errors import StartError
 from robocov.mapfile import save_map
+from robocov_app.commands import demo
 from robocov_app.toolkit.window.input import drop_late_repeats
 from robocov_app.viewer.panel.parameters import list_limit_parameters
 from robocov_app.viewer.session.files.session_file import MAX_FILE_SAMPLES
@@ -181,3 +183,24 @@ def test_a_dropped_file_of_another_kind_is_rejected_with_a_way_out(
     driver.settle()
     assert driver.viewer.has_error_message
     assert "expected a session (.robocov) or a map (.json)" in driver.viewer.message
+
+
+def test_more_robots_than_fit_at_the_start_start_uniformly(driver: Driver) -> None:
+    driver.viewer.attempt(lambda: driver.viewer.playback.restart(start="far"))
+    driver.viewer.attempt(lambda: driver.viewer.playback.restart(robots=40))
+    assert len(driver.session.displayed.numbers) == 40
+    assert driver.session.timeline.scenario.start_name == "uniform"
+    assert driver.viewer.message == "no space for 40 robots at start “far”: they start uniformly"
+    driver.press_key("ctrl+z")
+    assert driver.session.timeline.scenario.start_name == "far"
+    driver.viewer.attempt(lambda: driver.viewer.playback.restart(robots=40, start="far"))
+    assert driver.viewer.has_error_message, "a start that was asked for is not replaced"
+
+
+def test_the_command_starts_more_robots_than_fit_uniformly(capsys: pytest.CaptureFixture[str]) -> None:
+    options = demo.Arguments(map="city", robots=200)
+    session = demo.build_session(options)
+    assert len(session.displayed.numbers) == 200
+    assert "no space for 200 robots at start 'market': they start uniformly" in capsys.readouterr().err
+    with pytest.raises(StartError, match="room for about"):
+        demo.build_session(replace(options, start="market"))

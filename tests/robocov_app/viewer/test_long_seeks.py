@@ -133,10 +133,10 @@ def test_the_window_shows_the_progress(slow_computer: None, tmp_path: Path) -> N
         driver.settle()
         assert viewer.session.timeline.is_seeking
         viewer.clear_message()
-        driver.frames(1)
-        during = driver.picture()
+        driver.run_frames(1)
+        during = driver.copy_frame()
         assert viewer.files.map_name == "hall"
-        driver.frames(400)
+        driver.run_frames(400)
         assert not viewer.session.timeline.is_seeking
         assert viewer.session.displayed.time == pytest.approx(3.0)
-        assert not driver.same(during)
+        assert not driver.shows_frame(during)

@@ -1,7 +1,11 @@
 """Actions on time: play, speed, restart, looking back, branches."""
 
+from robocov.errors import StartError
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
+
+UNIFORM = "uniform"
+"""Name of the start that every map has: anywhere in the free space."""
 
 
 class PlaybackActions:
@@ -38,8 +42,21 @@ class PlaybackActions:
     def restart(
         self, *, robots: int | None = None, start: str | None = None, seed: int | None = None
     ) -> None:
-        """Restart at time 0, with another number of robots, start or seed if they are given."""
-        self._viewer.session.restart(robots=robots, start=start, seed=seed)
+        """Restart at time 0, with another number of robots, start or seed if they are given.
+
+        If there is no space for that many robots at the present start, they start uniformly.
+        """
+        session = self._viewer.session
+        try:
+            session.restart(robots=robots, start=start, seed=seed)
+        except StartError:
+            start_before = session.timeline.scenario.start_name
+            if robots is None or start is not None or start_before == UNIFORM:
+                raise
+            session.restart(robots=robots, start=UNIFORM, seed=seed)
+            self._viewer.show_message(
+                f"no space for {robots} robots at start “{start_before}”: they start uniformly"
+            )
 
     def restart_with_next_seed(self) -> None:
         """Restart from other starting positions."""
@@ -51,7 +68,7 @@ class PlaybackActions:
 
     def list_starts(self) -> list[str]:
         """Return the names of the starts of the map."""
-        return list(dict.fromkeys([*self._viewer.session.displayed.environment.starts, "uniform"]))
+        return list(dict.fromkeys([*self._viewer.session.displayed.environment.starts, UNIFORM]))
 
     def restart_at_next_start(self) -> None:
         """Restart from the next start of the map."""
