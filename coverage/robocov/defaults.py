@@ -21,5 +21,5 @@ DEFAULT_VISCOSITY_N_S_M = 2.0
 DEFAULT_SENSING_RANGE_M = 3.0
 DEFAULT_COMMUNICATION_RANGE_M = math.inf
 DEFAULT_TRACK_WIDTH_M = 0.0
-"""Stands for robots without wheels, which move in any direction."""
+"""Zero means that robots have no wheels, and move in any direction."""
 DEFAULT_TURNING_RATE_RAD_S = 4.0

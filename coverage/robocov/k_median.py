@@ -288,18 +288,18 @@ def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
     """Return the nearest source of each target, and the distances of the nearest two."""
     target_count = len(table)
     owner = np.zeros(target_count, dtype=np.intp)
-    nearest = np.full(target_count, np.inf)
-    second = np.full(target_count, np.inf)
+    nearest_distance = np.full(target_count, np.inf)
+    second_distance = np.full(target_count, np.inf)
     for t in range(target_count):
         for k in range(len(sources)):
             distance = table[t, sources[k]]
-            if distance < nearest[t]:
-                second[t] = nearest[t]
-                nearest[t] = distance
+            if distance < nearest_distance[t]:
+                second_distance[t] = nearest_distance[t]
+                nearest_distance[t] = distance
                 owner[t] = k
-            elif distance < second[t]:
-                second[t] = distance
-    return _NearestSources(owner, nearest, second)
+            elif distance < second_distance[t]:
+                second_distance[t] = distance
+    return _NearestSources(owner, nearest_distance, second_distance)
 
 
 @kernel

@@ -49,6 +49,8 @@ _UNTIL_STDIN_CLOSES = "--until-stdin-closes"
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
+_FORCES_INTO_WALL = np.full((4, 2), -1000.0)
+"""Forces, N, that push four robots against the boundary."""
 
 
 def call_cost_kernels() -> None:
@@ -63,7 +65,7 @@ def call_step_kernels() -> None:
     for controller in (Rapf(), Lloyd()):
         simulation = Simulation(_MAP, controller, _place_robots(4))
         simulation.step()
-        simulation.step(np.full((4, 2), -1000.0))  # into a wall
+        simulation.step(_FORCES_INTO_WALL)
         simulation.step()
 
 
@@ -92,7 +94,7 @@ def call_team_kernels() -> None:
     ):
         simulation = Simulation(_MAP, controller, _place_robots(4), team, conditions=conditions)
         simulation.step()
-        simulation.step(np.full((4, 2), -1000.0))
+        simulation.step(_FORCES_INTO_WALL)
         simulation.step()
 
 

@@ -65,7 +65,7 @@ class TeamParameter(NamedTuple):
         Parameters
         ----------
         infinity : str
-            Text that stands for no limit.
+            Text for no limit.
 
         Returns
         -------
@@ -121,7 +121,7 @@ class Team:
     communication_range : m
         Two robots are neighbors if each is within the range of the other. Infinity: no limit.
     track_width : m
-        Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, stands for
+        Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, means
         a point robot, which moves in any direction. Each wheel is limited to `max_speed` and
         `max_acceleration`; see `robocov.world.unicycles`.
     turning_rate : rad/s
@@ -300,7 +300,7 @@ class Team:
         Returns
         -------
         dict
-            None stands for no limit, and a value that all robots share is written once.
+            None means no limit, and a value that all robots share is written once.
         """
         data: dict[str, Any] = {"robots": len(self)}
         for name in self._list_relevant_parameters():

@@ -32,10 +32,10 @@ from robocov.files.strictjson import parse_json, parse_toml, read_bytes
 from robocov.team import KINEMATICS, MAX_ROBOTS, PARAMETERS, Team
 
 TeamDefaults: TypeAlias = Mapping[str, float | str | None]
-"""Arguments of `Team.homogeneous` for groups that do not set them; None stands for an unlimited range."""
+"""Arguments of `Team.homogeneous` for groups that do not set them; None means an unlimited range."""
 
 _NO_LIMIT = "null"
-"""Stands for an unlimited range in TOML, which has no null."""
+"""Value for an unlimited range in TOML, which has no null."""
 _GROUP_KEYS = ["count", "kinematics", *PARAMETERS]
 
 
@@ -48,7 +48,7 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
         A TOML file, or a JSON file of the same structure if its name ends in .json.
     defaults : mapping or None
         Parameters for groups that do not set them. Any other parameter has the default of
-        `Team.homogeneous`. None as a value stands for an unlimited range.
+        `Team.homogeneous`. None as a value means an unlimited range.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def _read_count(group: Mapping[str, object], path: JsonPath) -> int:
 
 
 def _read_value(name: str, value: object, key: str) -> float | None:
-    """Return the value of a parameter of a group; None stands for an unlimited range."""
+    """Return the value of a parameter of a group; None means an unlimited range."""
     if PARAMETERS[name].may_be_infinite and value in (None, _NO_LIMIT):
         return None
     if not is_number(value):

@@ -356,7 +356,7 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
             candidate_count = _list_nearest_candidates(
                 boxes, leaf, robots, search.all_robots, len(robots), leaf_robots
             )
-        # No path to the corner is known yet.
+        # No path to the corner is known yet; its source is the index of no robot.
         paths.length[corner] = np.inf
         paths.source[corner] = len(robots)
         search.queue.is_waiting[corner] = False

@@ -189,7 +189,7 @@ def sample_density(density: Density | None, extent: Iterable[float], columns: in
     Parameters
     ----------
     density : Density or None
-        None stands for 1 everywhere.
+        None means 1 everywhere.
     extent : (x_min, y_min, x_max, y_max), m
     columns, rows : int
 

@@ -311,6 +311,7 @@ def _choose_center_disc(
     distances = np.hypot(offsets[:, 0], offsets[:, 1])
     scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
     best = int(np.round(scores, _SCORE_DIGITS).argmax())
+    # Where there is little clearance, the disc extends into obstacles. Robots start in the free part of it.
     radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)
     center = (float(points[best, 0]), float(points[best, 1]))
     return DiscStart(center, request.round_down(min(radius, max_radius)))

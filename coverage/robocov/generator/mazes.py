@@ -81,10 +81,10 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         if _compute_corridor_width(request, shape, thickness) < request.gap - _GAP_TOLERANCE_M:
             return None
         obstacles = _build_walls(request, shape, trails, thickness)
-        area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if _clear_disc(request, shape, walls, thickness, corner_disc):
             # There are fewer walls now, so their thickness must be chosen again.
             continue
+        area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if area_error <= max_area_error:
             return [*obstacles]
         _remove_wall(walls, rng)

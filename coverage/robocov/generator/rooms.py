@@ -27,6 +27,8 @@ _MAX_CORRIDOR_WIDTH_GAPS = 2.2
 _MIN_CORRIDOR_OFFSET = 0.38
 _MAX_CORRIDOR_OFFSET = 0.62
 """Smallest and largest part of the space beside a corridor that is on its left or below it."""
+_MIN_CORRIDOR_DEPTH_GAPS = 3.0
+"""Smallest depth of the rooms on either side of a corridor."""
 _MIN_ROOM_SIDE_GAPS = 1.5
 """Smallest side of a room."""
 _MAX_UNEVENNESS = 0.3
@@ -345,7 +347,7 @@ def _divide_by_corridor(
     offset = (extent - corridor_width) * rng.uniform(_MIN_CORRIDOR_OFFSET, _MAX_CORRIDOR_OFFSET)
     start = round(offset, request.digits)
     end = round(offset + corridor_width, request.digits)
-    if min(start, extent - end) < 2.0 * _MIN_ROOM_SIDE_GAPS * request.gap:
+    if min(start, extent - end) < _MIN_CORRIDOR_DEPTH_GAPS * request.gap:
         return [(box, count)]
     wall_range = box.get_range(1 - axis)
     plan.walls.append(Wall(axis, start, *wall_range))

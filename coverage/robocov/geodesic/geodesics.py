@@ -136,7 +136,7 @@ class Geodesics:
         compute : callable
             See `CornerComputation`. The index that it is called with has space for one source.
         index_columns, length_columns : int
-            Number of whole numbers and of lengths in each row that it writes.
+            Number of columns of `indices` and of `lengths`.
         progress : callable, optional
             Called with the completed fraction. It may raise an exception to stop.
 
@@ -257,7 +257,7 @@ class Geodesics:
         return nearest
 
     def count_windings(self, grid_positions: Array) -> IntArray:
-        """Count how often the components of the free space wind around points.
+        """Count how often the boundary of each component of the free space winds around points.
 
         Parameters
         ----------

@@ -308,6 +308,7 @@ def _compute_descent_step(
 
     This step always descends.
     """
+    # The eigenvalues are mean + radius and mean - radius.
     mean = 0.5 * (xx + yy)
     half_difference = 0.5 * (xx - yy)
     radius = np.sqrt(half_difference * half_difference + xy * xy)

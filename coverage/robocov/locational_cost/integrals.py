@@ -219,8 +219,8 @@ def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float)
     normal_x = along_y * inverse
     normal_y = -along_x * inverse
     distance = start[k, 0] * normal_x + start[k, 1] * normal_y - (x * normal_x + y * normal_y)
-    along = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
-    return _RelativeEdge(normal_x, normal_y, length, distance, start=along)
+    s1 = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
+    return _RelativeEdge(normal_x, normal_y, length, distance, start=s1)
 
 
 @kernel

@@ -69,8 +69,8 @@ def compute_weighted_derivatives(
     # Offsets of the nodes from the point, by edge, node along it and node outward: (e, 16, 12, 2).
     on_edge = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
     offset = on_edge[:, :, None, :] * u_nodes[:, None, :, None]
-    double_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
-    weight = double_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
+    doubled_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
+    weight = doubled_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
     positions = offset + (cells.generators + points)[cell][:, None, None]
     weight = weight * density.evaluate(positions.reshape(-1, 2)).reshape(weight.shape)
     dx = offset[..., 0]

@@ -45,7 +45,7 @@ class VoronoiPartition(Cells):
     centroid : (n, 2) array, m
         C of equation (2). The centroid of an empty cell is its generator.
     density : Density or None
-        φ of mass, centroid and moments; None stands for 1 everywhere.
+        φ of mass, centroid and moments; None means 1 everywhere.
     triangulation : (2, 8 n + 4) int32 array or None
         Triangulation from which the partition of slightly moved generators can start.
 
@@ -227,7 +227,7 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     cells : Cells
         Cells computed for a density of 1. They are changed in place, and their arrays become read-only.
     density : Density or None
-        None stands for 1 everywhere.
+        None means 1 everywhere.
 
     Returns
     -------

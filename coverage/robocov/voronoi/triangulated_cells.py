@@ -63,7 +63,7 @@ class _Fan(NamedTuple):
     """Number of neighbors, and of Voronoi vertices."""
     half_edge_to_lowest: int
     """Half-edge to the neighbor with the lowest number."""
-    lowest: int
+    lowest_index: int
     """Index of that neighbor among the neighbors."""
     squared_reach: float
     """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
@@ -133,7 +133,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 
 @inlined_kernel
 def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
-    """Write the three sentinels, the corners of a large triangle around the center (x, y) of the region."""
+    """Write the sentinels, a large triangle around the region's center (x, y); see `_MAX_OFFSET_SIZES`."""
     sentinels[0, 0] = x - 8.0 * size
     sentinels[0, 1] = y - 5.0 * size
     sentinels[1, 0] = x + 8.0 * size
@@ -191,7 +191,7 @@ def _find_cell(
     # cell starts at the neighbor with the lowest number, so that it does not depend on the order of the
     # triangles.
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
-        return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest)
+        return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest_index)
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
 
@@ -209,17 +209,17 @@ def _walk_around(
     count = 0
     lowest_robot = n
     half_edge_to_lowest = first_half_edge
-    lowest = 0
+    lowest_index = 0
     squared_reach = 0.0
     h = first_half_edge
     while True:
-        back = get_previous_half_edge(h)
+        previous = get_previous_half_edge(h)
         j = mesh[CORNER, get_next_half_edge(h)]
         if j < n:
             if j < lowest_robot:
                 lowest_robot = j
                 half_edge_to_lowest = h
-                lowest = count
+                lowest_index = count
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
             # The Voronoi vertex lies on the bisector. Its offset to the left of the line from i to j is half
@@ -234,17 +234,17 @@ def _walk_around(
             rings[0, count, X] = x
             rings[0, count, Y] = y
             # The edge from here to the next Voronoi vertex borders on the third corner of the triangle.
-            rings[0, count, OTHER_CELL] = mesh[CORNER, back]
+            rings[0, count, OTHER_CELL] = mesh[CORNER, previous]
             count += 1
         else:
             # Robot i is connected to a sentinel: its cell is not bounded by robots alone.
             squared_reach = np.inf
         # Turn to the next triangle counter-clockwise.
-        h = mesh[TWIN, back]
+        h = mesh[TWIN, previous]
         if h == first_half_edge:
             return _Fan(
                 neighbor_count=count,
                 half_edge_to_lowest=half_edge_to_lowest,
-                lowest=lowest,
+                lowest_index=lowest_index,
                 squared_reach=squared_reach,
             )

@@ -58,7 +58,7 @@ class WeightedCells(Cells):
     centroid : (n, 2) array, m
         C of equation (2). The centroid of an empty cell is its generator.
     density : Density or None
-        φ of mass, centroid and moments; None stands for 1 everywhere.
+        φ of mass, centroid and moments; None means 1 everywhere.
     triangulation : None
         There is none.
     speeds : (n,) array, m/s
