@@ -11,6 +11,7 @@ import shapely
 from robocov.arrays import Array, BoolArray
 from robocov.cost.coverage_cost import CoverageCost
 from robocov.cost.result import CoverageResult
+from robocov.cost.site_paths import NO_ROBOT
 
 _MAX_CACHED_MAPS = 64
 """Maximum number of maps whose costs are cached. The maps recur if obstacles move periodically."""
@@ -142,7 +143,7 @@ class TimeVaryingCost:
         if result is None or len(result.positions) == len(positions):
             return result
         available = np.flatnonzero(self.find_available_robots(time, positions, working))
-        owner = np.where(result.owner >= 0, available[result.owner], -1)
+        owner = np.where(result.owner != NO_ROBOT, available[result.owner], NO_ROBOT)
         return replace(result, positions=np.array(positions), owner=owner)
 
     def compute_summary(

@@ -311,6 +311,7 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
     # The wall covers the bins from `covered_first` up to `covered_end` completely.
     covered_first = int(np.ceil((start + _PADDING) * bins_per_unit))
     covered_end = int(np.floor((stop - _PADDING) * bins_per_unit))
+    # Bins beyond a full turn wrap around. No bin is visited twice.
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
         k = unwrapped_bin & (bin_count - 1)
         if squared_near > index.squared_horizon[source, k]:

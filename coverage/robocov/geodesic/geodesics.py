@@ -280,7 +280,8 @@ class Geodesics:
         steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         free = around[(self.count_windings(around) > 0).any(axis=1)]
-        if not len(free):
+        if len(free) == 0:
+            # The vertices of walls are grid points of the closed free space in any case.
             free = self.walls.vertices
         distance = compute_lengths(free - grid_position)
         return np.asarray(free[distance.argmin()])
