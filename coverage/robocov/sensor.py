@@ -159,7 +159,9 @@ class RangeSensor:
         ----------
         position : (2,) array, m
         rays : int
+            Number of rays.
         sensing_range : float, m
+            May be infinite.
 
         Returns
         -------

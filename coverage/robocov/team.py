@@ -316,6 +316,7 @@ class Team:
         Parameters
         ----------
         data : mapping
+            As `to_dict` returns it.
 
         Returns
         -------

@@ -121,6 +121,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         Parameters
         ----------
         action : (n, 2) array_like, N or m/s
+            One row for each robot.
 
         Returns
         -------
@@ -231,6 +232,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         Parameters
         ----------
         actions : (num_envs, n, 2) array_like, N or m/s
+            One row for each robot of each environment.
 
         Returns
         -------

@@ -53,8 +53,11 @@ class ObservationLayout:
     Parameters
     ----------
     neighbors : int
+        Number of the nearest robots.
     rays : int
+        Number of rays of the range sensor; 0 for none.
     centroid : bool
+        Whether the centroid is included.
 
     Raises
     ------

@@ -96,6 +96,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         Parameters
         ----------
         agent : str
+            Such as ``robot_1``.
 
         Returns
         -------
@@ -109,6 +110,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         Parameters
         ----------
         agent : str
+            Such as ``robot_1``.
 
         Returns
         -------

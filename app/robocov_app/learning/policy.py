@@ -58,6 +58,7 @@ class PolicyController:
         Returns an action, (2,) in N or m/s, for an observation, (size,) float32. A subclass with a method
         `act` needs none.
     layout : ObservationLayout
+        Layout of the observations in training.
     action : str
         Kind of the actions.
     period : float
@@ -194,6 +195,7 @@ class ControllerPolicy:
     Parameters
     ----------
     controller : Controller
+        Decides instead of a policy.
 
     See Also
     --------

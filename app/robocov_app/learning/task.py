@@ -75,6 +75,7 @@ class CoverageTask:
         Number of actions after which the cost is evaluated and rewarded. The last action is always rewarded.
         The exact cost takes about as long as ten control periods of six robots.
     observation : ObservationLayout
+        Numbers of each observation.
     conditions : Conditions, optional
         Their seed is drawn for each episode.
     recording : bool

@@ -307,6 +307,7 @@ class Conditions:
         Parameters
         ----------
         data : mapping
+            As `to_dict` returns it.
 
         Returns
         -------

@@ -26,6 +26,7 @@ class Failure(NamedTuple):
     robot : int
         Number of the robot, from 1.
     time : float, s
+        Simulation time of the failure.
 
     See Also
     --------
@@ -55,6 +56,7 @@ class Join(NamedTuple):
     robot : int
         Number of the robot, from 1.
     time : float, s
+        Simulation time of the arrival.
     place : (x, y) or None, m
         Requested position; the robot joins at the nearest one where it fits. By default, the
         position at which it would have started.

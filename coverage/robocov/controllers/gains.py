@@ -138,6 +138,7 @@ def gain(
     Parameters
     ----------
     default : float or None
+        Default value, within the range.
     unit : str
         "1" if there is none.
     meaning : str
@@ -191,7 +192,9 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     Parameters
     ----------
     default : str
+        One of the choices.
     choices : sequence of str
+        All values that are allowed.
     meaning : str
         Description on one line.
 

@@ -27,7 +27,9 @@ class OwnView:
     number : int
         Its own number, from 0.
     position : (2,) array, m
+        Its own position, as it knows it.
     velocity : (2,) array, m/s
+        Its own velocity.
     neighbors : (k, 2) array, m
         Positions of the robots within communication range, by their last messages.
     obstacle_point : (2,) array or None, m
@@ -157,6 +159,7 @@ class IndividualControllerAdapter:
     Parameters
     ----------
     controller : IndividualController
+        It is called for each robot in turn.
 
     Attributes
     ----------
@@ -165,6 +168,7 @@ class IndividualControllerAdapter:
         Those of the individual controller. By default, they are its class name and the first line of its
         docstring.
     information : Information
+        Information that it uses; "own" by default.
 
     See Also
     --------

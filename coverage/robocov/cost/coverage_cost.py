@@ -41,6 +41,7 @@ class CoverageCost:
     Parameters
     ----------
     environment : Environment
+        The map, with its obstacles and its density.
     lattice : int
         Number of cells along a side.
     progress : callable, optional
@@ -131,6 +132,7 @@ class CoverageCost:
         Parameters
         ----------
         environment : Environment
+            The same map with another density.
 
         Returns
         -------
@@ -329,6 +331,7 @@ class CoverageCost:
         Parameters
         ----------
         values : (m,) array
+            One value for each site.
 
         Returns
         -------

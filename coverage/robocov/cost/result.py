@@ -37,6 +37,7 @@ class CoverageResult(Drawable):
         Rows of `corners` where the path from the owner to the site bends first and last; -1 if it is
         straight.
     positions : (n, 2) array, m
+        Positions of the robots.
     points : (m, 2) array, m
         The sites.
     corners : (k, 2) array, m

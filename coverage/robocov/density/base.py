@@ -102,6 +102,7 @@ class Density(ABC):
         edges, origins
             See `compute_moments`.
         area : (n,) array, m²
+            Areas of the cells.
         centroid : (n, 2) array, m
             Centroids for density 1. Cells without area or mass keep them. If the mean density of a cell is
             below 1e-9 of the maximum, uniform mass is added to make up the difference, because rounding

@@ -58,6 +58,7 @@ class Gaussian:
     Parameters
     ----------
     center : (x, y), m
+        c, the position of the maximum.
     weight : float
         Value at the center, at least 0.
     sigma : float or None, m
@@ -185,6 +186,7 @@ class Gaussians(Density):
     Parameters
     ----------
     peaks : tuple of Gaussian
+        The Gaussians that are added.
     floor : float
         The constant, at least 0.
 

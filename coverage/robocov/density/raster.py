@@ -51,6 +51,7 @@ class Raster(Density):
     extent : (x_min, y_min, x_max, y_max), m
         Extent of the image. Points outside have the value of the nearest border pixel.
     interpolation : {"bilinear", "cells"}
+        Between the centers of pixels, or constant within each pixel.
 
     Raises
     ------

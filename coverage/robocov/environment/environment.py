@@ -38,6 +38,7 @@ class Environment(Drawable):
     Attributes
     ----------
     name : str
+        Title in figures and in the window.
     boundary : (k, 2) sequence, m
         Clockwise or counter-clockwise, convex or not.
     obstacles : tuple of Obstacle
@@ -46,6 +47,7 @@ class Environment(Drawable):
     starts : mapping of str to DiscStart, UniformStart or PointsStart
         Named starts; the first is the default.
     description : str
+        One or more sentences about the map.
     extra : mapping
         Additional keys of the map file, kept unchanged.
     schema : str or None
@@ -177,6 +179,7 @@ class Environment(Drawable):
         Parameters
         ----------
         density : Density or None
+            None: all points count equally.
 
         Returns
         -------

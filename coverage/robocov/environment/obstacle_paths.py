@@ -32,8 +32,11 @@ class ObstaclePath:
     Attributes
     ----------
     points : (k, 2) sequence, m
+        Corners of the polyline.
     speed : float, m/s
+        Constant speed, above 0.
     repeat : {"loop", "back-and-forth"}
+        Behavior at the end: straight to the first point, or back along the path.
 
     See Also
     --------

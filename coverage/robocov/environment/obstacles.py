@@ -29,8 +29,11 @@ class PolygonObstacle:
     Attributes
     ----------
     vertices : (k, 2) sequence, m
+        Outer ring, in either direction. The first vertex is not repeated.
     holes : sequence of (k, 2) sequences, m
+        Rings like `vertices`.
     name : str or None
+        Name of the obstacle, for people.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 
@@ -67,6 +70,7 @@ class CircleObstacle:
     center : (2,) sequence, m
     radius : float, m
     name : str or None
+        Name of the obstacle, for people.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 
@@ -111,8 +115,11 @@ class WallObstacle:
     Attributes
     ----------
     points : (k, 2) sequence, m
+        Axis of the wall, from end to end.
     width : float, m
+        Thickness of the wall.
     name : str or None
+        Name of the obstacle, for people.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 

@@ -40,6 +40,7 @@ class DiscStart:
     ----------
     center : (2,) sequence, m
     radius : float, m
+        The disc contains the centers of the robots.
 
     See Also
     --------
@@ -86,6 +87,7 @@ class PointsStart:
     Attributes
     ----------
     positions : (k, 2) sequence, m
+        Position of each robot. A team of n robots uses the first n.
 
     See Also
     --------

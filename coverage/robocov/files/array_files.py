@@ -191,6 +191,7 @@ class ArrayCache:
         Parameters
         ----------
         key : str
+            See `compute_key`.
 
         Returns
         -------
@@ -222,7 +223,9 @@ class ArrayCache:
         Parameters
         ----------
         key : str
+            See `compute_key`.
         arrays : mapping of str to array
+            Arrays by name.
         """
         buffer = io.BytesIO()
         np.savez(buffer, **arrays)  # type: ignore[arg-type]

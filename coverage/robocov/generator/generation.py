@@ -153,6 +153,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     Parameters
     ----------
     seed : int
+        At least 0.
     kind : str
         One of `GENERATORS`.
     obstacles : int or None

@@ -142,6 +142,7 @@ def compute_lower_bound(
     Parameters
     ----------
     environment : Environment
+        The map.
     positions : (n, 2) array, m
         A placement of low cost, such as that of `find_optimum`. The lower its cost, the smaller the gap.
     radius : float, m

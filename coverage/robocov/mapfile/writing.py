@@ -62,7 +62,9 @@ def save_map(environment: Environment, path: str | Path) -> None:
     Parameters
     ----------
     environment : Environment
+        The map to save.
     path : str or Path
+        File to write, which usually ends in ``.json``.
 
     Raises
     ------

@@ -62,6 +62,7 @@ def compute_cost_history(
     Parameters
     ----------
     record : Record
+        The run.
     cost : CoverageCost
         Cost of the record's environment.
     rate : float, Hz

@@ -58,6 +58,7 @@ class Results:
     Attributes
     ----------
     folder : Path
+        The folder of the sweep.
     columns : tuple of str
         Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), results
         whose names end in their units, the name of the run's folder (``run``), and its ``error``.
@@ -251,6 +252,7 @@ def read_results(folder: Path | str) -> Results:
     Parameters
     ----------
     folder : Path or str
+        Folder that `robocov sweep` wrote.
 
     Returns
     -------

@@ -145,6 +145,7 @@ def compute_run_metrics(
     Parameters
     ----------
     record : Record
+        The run.
     rate : float, Hz
         Moments per simulated second at which the metrics are evaluated. The last moment is always included.
         Energy and path lengths are integrated over all moments of the record.

@@ -50,8 +50,11 @@ def find_settling_time(
     time : (T,) array, s
         Evenly spaced.
     positions : (T, n, 2) array, m
+        Positions of the robots over time.
     window : float, s
+        Time over which the net displacement is measured.
     distance : float, m
+        Net displacement below which a robot is at rest.
 
     Returns
     -------

@@ -21,6 +21,7 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     Parameters
     ----------
     record : Record
+        The run.
     history : CostHistory
         The coverage cost along the run.
 

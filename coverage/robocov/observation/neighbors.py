@@ -89,6 +89,7 @@ class Neighbors:
         robot, neighbor : (m,) int arrays
             Sorted by robot, then neighbor.
         ranges : (n,) array or None, m
+            Communication ranges, which the graph stores.
 
         Returns
         -------

@@ -35,6 +35,7 @@ class Observations:
     Attributes
     ----------
     positions : (n, 2) array, m
+        Positions as the robots know them, with any localization noise.
     velocities : (n, 2) array, m/s
         A robot knows its own velocity, not those of others.
     neighbors : Neighbors

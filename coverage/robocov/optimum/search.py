@@ -65,6 +65,7 @@ class Optimum:
     mean_distance : float, m
         See `CoverageResult`.
     value : float, m³
+        See `CoverageResult`.
     uncovered_area : float, m²
         Area of the components of the free space without a robot.
     costs : (r,) array, m
@@ -116,6 +117,7 @@ class Optimum:
         Parameters
         ----------
         mean_distance : float, m
+            Mean distance of another placement on the same map and lattice.
 
         Returns
         -------
@@ -139,6 +141,7 @@ def find_optimum(
     Parameters
     ----------
     environment : Environment
+        The map, which the team knows.
     robots : int
         Number of robots.
     radius : float, m
@@ -149,6 +152,7 @@ def find_optimum(
         Number of restarts. Each depends only on the seed and its own number, so more restarts never give a
         higher cost.
     seed : int
+        Seed of all restarts.
     progress : callable, optional
         Called regularly with the fraction that is done. It may raise an exception to stop.
 

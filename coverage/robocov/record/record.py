@@ -46,10 +46,13 @@ class Record(Drawable):
     Attributes
     ----------
     environment : Environment
+        The map of the run.
     team : Team
+        The robots.
     controller, label : str
         Name of the controller, as `make_controller` accepts it, and its label in figures.
     gains : mapping of str to float, str or None
+        Gains of the controller by name.
     start : str or None
         Name of the start from which the initial positions were sampled.
     seed : int or None
@@ -57,6 +60,7 @@ class Record(Drawable):
     dt : float, s
         Control period; also the time between moments, unless the record was thinned.
     time : (T,) s
+        Simulation time of each moment.
     positions, velocities : (T, n, 2) m, m/s
     forces : (T, n, 2) N
         The controller's force, before any limit and without viscosity.

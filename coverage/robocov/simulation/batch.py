@@ -58,6 +58,7 @@ class SimulationBatch:
     environment : Environment
         Without moving obstacles.
     controller : Controller or IndividualController
+        The same in all runs. A controller for one robot is called for every robot in turn.
     starts : (runs, n, 2) array, m
         Positions of the robots of each run, which are at rest.
     team : Team or None
@@ -243,6 +244,7 @@ class SimulationBatch:
         Parameters
         ----------
         run : int
+            Index of the run, from 0.
 
         Returns
         -------
@@ -350,6 +352,7 @@ class SimulationBatch:
         Parameters
         ----------
         duration : float, s
+            Time to simulate.
         start : str or None
             Name of the start from which the positions were sampled, for the records.
         seeds : sequence of int, or None

@@ -55,6 +55,7 @@ class Simulation:
     Parameters
     ----------
     environment : Environment
+        The map.
     controller : Controller or IndividualController
         A controller for one robot is called for every robot in turn.
     starts : (n, 2) array, m, or TeamState
@@ -372,6 +373,7 @@ class Simulation:
         Parameters
         ----------
         duration : float, s
+            Time to simulate.
         start : str or None
             Name of the start from which the positions were sampled, for the record.
         seed : int or None

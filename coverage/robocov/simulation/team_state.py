@@ -18,6 +18,7 @@ class TeamState:
     Parameters
     ----------
     positions : (n, 2) array, m
+        Centers of the robots.
     velocities : (n, 2) array or None, m/s
         By default robots are at rest.
     steering : (n, 2) array or None, rad and rad/s

@@ -100,6 +100,7 @@ def partition(
         They may lie on the region's boundary or outside. Generators at the same position do not cut
         each other's cells.
     region : Region
+        The cells divide it.
     neighbors : Neighbors or None
         Communication graph. Cell i is cut only by the bisectors to the neighbors of robot i, and depends, to
         the last bit, on nothing else. By default each robot is a neighbor of all others.

@@ -62,9 +62,11 @@ class WeightedCells(Cells):
     triangulation : None
         There is none.
     speeds : (n,) array, m/s
+        Speeds of the robots.
     pieces : (p, 7) array
         The pieces of the boundaries, by cell; for the columns see `robocov.voronoi.arcs`.
     region : Region
+        The region that the cells divide.
 
     See Also
     --------

@@ -52,9 +52,11 @@ class World:
     Parameters
     ----------
     obstacles : Obstacles
+        See `robocov.world.obstacle_pieces.build_obstacles`.
     team : Team
         The n robots.
     positions : (n, 2) array, m
+        Centers of the robots.
     velocities : (n, 2) array or None, m/s
         By default robots are at rest.
     steering : (n, 2) array or None, rad and rad/s
@@ -152,6 +154,7 @@ class World:
         Parameters
         ----------
         run : int
+            Index of the run, from 0.
         positions : (n / runs, 2) array, m
         """
         rows = self._get_rows(run)
@@ -193,6 +196,7 @@ class World:
         forces : (n, 2) array, N
             The controllers' forces.
         dt : float, s
+            Duration; the physics takes substeps if it needs them.
         external_forces : (n, 2) array or None, N
             Further forces to which no limits apply, such as those of a pointer that drags a robot. A robot
             that they have pushed beyond its maximum speed brakes as hard as it can.
