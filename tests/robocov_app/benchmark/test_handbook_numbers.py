@@ -10,6 +10,7 @@ import pytest
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.ratings import Rating
 from robocov_app.benchmark.results import ENTRIES, read_result
+from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_AT_REST
 
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
 
@@ -41,3 +42,14 @@ ROWS = [
 @pytest.mark.parametrize(("law", "track"), ROWS)
 def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
     assert f"| {suite.format_heading(track)} {line(law, track)}\n" in PAGE.read_text(encoding="utf-8")
+
+
+def test_the_study_of_the_paper_has_the_goals_of_the_handbook() -> None:
+    expected = {}
+    for row in PAGE.read_text(encoding="utf-8").split("## The goals of atlas")[1].splitlines():
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        if len(cells) == 4:
+            expected[cells[0]] = cells[1]
+    assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g} %"
+    assert f"median above {100 * MAX_MAP_GAP:g} % on no map" in expected
+    assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g} %"

@@ -266,6 +266,60 @@ def test_only_honest_controllers_are_verified(
         assert any(expected in difference for difference in verification.differences)
 
 
+KNOWS_THE_SUITE = """
+from dataclasses import replace
+import numpy as np
+import robocov as rc
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.oracle import Oracle
+
+STARTS = {name: suite.build_map(name).start().sample(6, seed=0, radius=0.1) for name in PLACEMENTS}
+
+@dataclass(frozen=True)
+class Mine:
+    scanning = Oracle.scanning
+
+    def begin(self, region, team):
+        return region, team, None, None
+
+    def decide(self, seen, memory):
+        region, team, oracle, inner = memory
+        if seen.time == 0.0:
+            for name, starts in STARTS.items():
+                if starts.shape == seen.positions.shape and np.allclose(starts, seen.positions):
+                    environment = suite.build_map(name)
+                    extra = {"oracle": [[0.0, list(range(6)), PLACEMENTS[name]]]}
+                    oracle = Oracle(environment=replace(environment, extra=extra))
+                    inner = oracle.begin(region, team)
+        if oracle is None:
+            return rc.Decision(np.zeros_like(seen.positions), memory=memory)
+        decision = oracle.decide(seen, inner)
+        return replace(decision, memory=(region, team, oracle, decision.memory))
+"""
+"""Recognizes maps by their starts, and moves to the best placements of the suite."""
+
+
+@pytest.mark.slow
+def test_a_controller_that_knows_the_suite_is_not_verified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [name for kind in ("polygons", "blocks", "homes", "plants") for name in suite.FAMILIES[kind]]
+    track = replace(suite.TRACKS["ideal"], maps=tuple(names), duration=8.0)
+    monkeypatch.setitem(suite.TRACKS, "ideal", track)  # type: ignore[arg-type]
+    frozen_maps = suite.load_frozen_maps()
+    placements = {name: frozen_maps[name]["references"]["6"]["positions_m"] for name in names}
+    (tmp_path / "mine.py").write_text(f"{IMPORTS}PLACEMENTS = {placements}\n{KNOWS_THE_SUITE}")
+    name = f"{tmp_path / 'mine.py'}:Mine"
+    with Interruption() as stop:
+        rated = RatedController(name, {})
+        run_benchmark(rated, Selection(tracks=("ideal",)), tmp_path / "out", stop=stop, workers=2, quiet=True)
+    options = VerificationOptions(sample=0, robots=0, new_maps=4, workers=2)
+    verification = verify(tmp_path / "out", name, options)
+    assert verification.comparison is not None and verification.comparison.is_worse
+    expected = "the controller or its gains are fitted to the maps of the suite"
+    assert any(expected in difference for difference in verification.differences)
+
+
 def test_an_entry_with_other_information_is_not_verified(tmp_path: Path) -> None:
     folder, name = rate(tmp_path, HEAD.removeprefix(IMPORTS) + PULL, "ideal")
     result = json.loads((folder / RESULT_FILE).read_text())

@@ -1,7 +1,7 @@
 """Thresholds of the criteria, with their reasons.
 
-They were set before the study was run, those of the goals of our own controller before it was written, and
-are the same for every run.
+They were set before the study was run and are the same for every run. The goals of our own controller are
+those of the handbook, which states them once, on the page about controllers.
 """
 
 from robocov_app.replication.design.plan import CONVEX_KINDS
@@ -37,14 +37,15 @@ CLUSTERED = CONVEX_KINDS[:-1]
 """Starts in convex regions in which the robots are close together."""
 
 # The goals of our own controller. Its gains were tuned on other generated maps, but its outcomes on those of
-# the study were inspected while its rules were made. The claim "goal-unseen" is on maps of other kinds.
-MAX_GAP = 0.014
-"""Maximum median of J / J_ref - 1. RAPF at its best gains had about 5 % at that time."""
-MAX_MAP_GAP = 0.03
+# the study were inspected while its rules were made. The claim "goal-unseen" is on maps of other kinds. They
+# are also kinds of the benchmark, whose results were inspected, too.
+MAX_GAP = 0.01
+"""Maximum median of J / J_ref - 1."""
+MAX_MAP_GAP = 0.05
 """Maximum median on every single map."""
 NEVER_WORSE = 1.01
 """Maximum ratio of its median on a map to that of RAPF or Lloyd on the same map."""
-MIN_AT_REST = 0.97
+MIN_AT_REST = 0.95
 """Minimum fraction of its runs that come to rest."""
 RARELY = 0.1
 """Maximum fraction of runs with a contact. No number of runs can show that none has any."""
