@@ -18,7 +18,7 @@ MAX_QUEUED_FRAMES = 4
 MAX_FRAME_BYTES = 1 << 27
 
 
-async def relay_messages(connection: ServerConnection, window: WindowProcess, page_id: str) -> None:
+async def relay_messages(connection: ServerConnection, window: WindowProcess, page_id: str) -> bool:
     """Copy messages between a page and a window until either closes its socket; then close the page's.
 
     Parameters
@@ -28,6 +28,11 @@ async def relay_messages(connection: ServerConnection, window: WindowProcess, pa
     window : WindowProcess
     page_id : str
         Identity of the page.
+
+    Returns
+    -------
+    bool
+        Whether the window was closed by its user.
     """
     from websockets.asyncio.client import connect
     from websockets.exceptions import WebSocketException
@@ -51,6 +56,7 @@ async def relay_messages(connection: ServerConnection, window: WindowProcess, pa
     if code is None or (code < NOT_UNDERSTOOD and code != WINDOW_CLOSED):
         code = WINDOW_ENDED
     await connection.close(code, reason)
+    return code == WINDOW_CLOSED
 
 
 async def _copy_both_ways(first: Connection, second: Connection) -> None:

@@ -68,12 +68,15 @@ class VisitorWindow:
         Time at which the last page was closed, on the monotonic clock, s.
     ending : asyncio.Task or None
         The task that ends it.
+    has_closed : bool
+        Whether its user has closed it. Its process then takes some seconds to end, but no place any more.
     """
 
     opening: asyncio.Task[WindowProcess]
     page_count: int = 0
     idle_since: float = field(default_factory=monotonic)
     ending: asyncio.Task[None] | None = None
+    has_closed: bool = False
 
     @property
     def process(self) -> WindowProcess | None:
@@ -86,7 +89,9 @@ class VisitorWindow:
     def has_ended(self) -> bool:
         """Whether its process has ended, or is about to end."""
         process = self.process
-        return self.ending is not None or (process is not None and not process.is_alive)
+        if self.has_closed or self.ending is not None:
+            return True
+        return process is not None and not process.is_alive
 
     @property
     def idle_time(self) -> float:
@@ -242,7 +247,9 @@ class VisitorServer:
         window.page_count += 1
         try:
             process = await asyncio.shield(window.opening)
-            await relay_messages(connection, process, parse_query(request.path).get("page", ""))
+            page_id = parse_query(request.path).get("page", "")
+            if await relay_messages(connection, process, page_id):
+                window.has_closed = True
         except RobocovError as error:
             if self._windows.get(visitor) is window and not self._is_ending:
                 del self._windows[visitor]
@@ -319,7 +326,10 @@ class VisitorServer:
         removed, or the one that has been idle for longest is ended.
         """
         spare = self._spare
-        if len(self._windows) + (spare is not None) < self._max_windows:
+        taken = sum(not window.has_closed for window in self._windows.values())
+        if spare is not None:
+            taken += 1
+        if taken < self._max_windows:
             return True
         if spare is not None:
             self._spare = None
@@ -335,7 +345,7 @@ class VisitorServer:
     def _choose_window_to_end(self) -> str | None:
         """Return the visitor whose window can be ended for another one; None if all are in use."""
         for visitor, window in self._windows.items():
-            if window.has_ended:
+            if window.has_ended and not window.has_closed:
                 return visitor
         idle = [visitor for visitor, window in self._windows.items() if window.idle_time >= MIN_IDLE_S]
         return max(idle, key=lambda visitor: self._windows[visitor].idle_time, default=None)
