@@ -15,7 +15,7 @@ from robocov_app.formats import IMPORTERS
 GRID = "type octile\nheight 4\nwidth 5\nmap\n@@@@@\n@..T@\n@...@\n@@@@@\n"
 
 
-def said(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
+def run_command(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
     assert main(list(words)) == 0
     out = capsys.readouterr()
     assert out.err == ""
@@ -25,7 +25,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
 def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     out, picture = tmp_path / "out.json", tmp_path / "seen.png"
-    lines = said(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
+    lines = run_command(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
     assert lines == [
         "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",
         "3 x 1.5 m, 0 obstacles",
@@ -56,7 +56,7 @@ def test_the_name_of_the_map_is_that_of_the_file(
     (tmp_path / "maps").mkdir()
     monkeypatch.chdir(tmp_path)
     (tmp_path / "maps" / "grid.map").write_text(GRID)
-    assert said(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
+    assert run_command(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
     assert load_map(Path("grid.json")).free_area == 1.25
     assert "grid.json: exists already; choose another -o or pass --overwrite" in complaint(
         capsys, "import", "maps/grid.map"

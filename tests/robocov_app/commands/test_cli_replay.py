@@ -32,9 +32,9 @@ def write_history(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a run and a comparison, in which a robot failed."""
-    folder = tmp_path_factory.mktemp("made")
+    folder = tmp_path_factory.mktemp("saved")
     (record,) = build_records(advance_session(start_session(), 60))
     (folder / "run").mkdir()
     record.save(folder / "run")
@@ -52,13 +52,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def run(made: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(made / "run", tmp_path / "run"))
+def run(saved_results: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(saved_results / "run", tmp_path / "run"))
 
 
 @pytest.fixture
-def both(made: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(made / "both", tmp_path / "both"))
+def both(saved_results: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(saved_results / "both", tmp_path / "both"))
 
 
 def pictures(folder: Path) -> list[np.ndarray]:
@@ -68,12 +68,12 @@ def pictures(folder: Path) -> list[np.ndarray]:
 # frames and films
 
 
-def test_frames_of_a_run_are_those_of_run(made: Path, tmp_path: Path, capsys) -> None:
+def test_frames_of_a_run_are_those_of_run(saved_results: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "film"
-    assert main(["replay", str(made / "run"), "--frames", "--video", *SMALL, "--out", str(out)]) == 0
-    said = capsys.readouterr()
-    assert said.out == f"saved in {out}/: frames, replay.json, run.mp4\n"
-    assert "video: 21 of 21" in said.err
+    assert main(["replay", str(saved_results / "run"), "--frames", "--video", *SMALL, "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == f"saved in {out}/: frames, replay.json, run.mp4\n"
+    assert "video: 21 of 21" in printed.err
     frames = pictures(out)
     assert len(frames) == 11 + 10
     assert frames[0].shape == (320, 480, 3)
@@ -82,28 +82,32 @@ def test_frames_of_a_run_are_those_of_run(made: Path, tmp_path: Path, capsys) ->
     assert (out / "run.mp4").stat().st_size > 1000
 
 
-def test_a_comparison_is_shown_side_by_side_with_distances(made: Path, tmp_path: Path, capsys) -> None:
+def test_a_comparison_is_shown_side_by_side_with_distances(
+    saved_results: Path, tmp_path: Path, capsys
+) -> None:
     """On one map, although a robot failed at another place in each run."""
     out = tmp_path / "film"
     words = ("--frames", *SMALL, "--show", "distances", "--fps", "5", "--theme", "dark")
-    said = answer(capsys, "replay", str(made / "both"), *words, "--out", str(out))
-    assert said == {"out": str(out), "interrupted": False}
+    printed = answer(capsys, "replay", str(saved_results / "both"), *words, "--out", str(out))
+    assert printed == {"out": str(out), "interrupted": False}
     frames = pictures(out)
     assert len(frames) == 6 + 5
     left, right = np.array_split(frames[5].astype(int), 2, axis=1)
     assert (left != right).mean() > 0.05
 
 
-def test_the_json_file_does_as_well_as_its_folder(made: Path, tmp_path: Path, capsys) -> None:
+def test_the_json_file_does_as_well_as_its_folder(saved_results: Path, tmp_path: Path, capsys) -> None:
     for name, source in (("one", "run/run.json"), ("two", "both/comparison.json")):
         words = ("--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / name))
-        answer(capsys, "replay", str(made / source), *words)
+        answer(capsys, "replay", str(saved_results / source), *words)
         assert len(pictures(tmp_path / name)) == 3
 
 
-def test_an_earlier_video_is_replaced_only_with_overwrite(made: Path, tmp_path: Path, capsys) -> None:
+def test_an_earlier_video_is_replaced_only_with_overwrite(
+    saved_results: Path, tmp_path: Path, capsys
+) -> None:
     out = tmp_path / "film"
-    words = ("replay", str(made / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
+    words = ("replay", str(saved_results / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
     answer(capsys, *words)
     (out / "notes.txt").write_text("mine")
     assert "is not empty" in complaint(capsys, *words)
@@ -144,7 +148,7 @@ def test_the_finished_runs_of_a_killed_comparison_can_be_replayed(both: Path, tm
 
 
 @pytest.fixture
-def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
+def opened_sessions(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     """Windows on a display that nobody sees, closed after some frames; the sessions in them."""
     sessions: list[Session] = []
 
@@ -160,16 +164,16 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     return sessions
 
 
-def test_the_window_shows_a_run(run: Path, shown: list[Session]) -> None:
+def test_the_window_shows_a_run(run: Path, opened_sessions: list[Session]) -> None:
     assert main(["replay", str(run), "--size", "900x600", "--theme", "dark", "--hide", "cells"]) == 0
-    (session,) = shown
+    (session,) = opened_sessions
     assert 0.0 < session.displayed.time < session.timeline.end_time == 1.0
     assert len(session.timeline.panes[0].distance_curve) == 11
 
 
-def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None:
+def test_the_window_shows_a_comparison(both: Path, opened_sessions: list[Session]) -> None:
     assert main(["replay", str(both), "--size", "900x600"]) == 0
-    (session,) = shown
+    (session,) = opened_sessions
     assert [pane.controller.name for pane in session.timeline.panes] == ["rpf", "lloyd"]
     assert session.displayed.numbers == (2, 3)
     assert len(session.timeline.panes[1].distance_curve) == 11
@@ -179,8 +183,8 @@ def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None
 def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
-    said = complaint(capsys, "replay", str(run))
-    assert said.startswith(
+    printed = complaint(capsys, "replay", str(run))
+    assert printed.startswith(
         "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR"
     )
 
@@ -209,11 +213,11 @@ def test_inapplicable_options_are_rejected(run: Path, capsys, words: str, messag
     assert complaint(capsys, "replay", str(run), *words.split()).startswith(message)
 
 
-def edited(path: Path, **changes) -> None:
+def edit_json(path: Path, **changes) -> None:
     path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
 
 
-def arrays(folder: Path, **changes) -> None:
+def edit_arrays(folder: Path, **changes) -> None:
     with np.load(folder / "record.npz") as found:
         content = {**found, **changes}
     np.savez(folder / "record.npz", **content)
@@ -229,16 +233,19 @@ def arrays(folder: Path, **changes) -> None:
             "{run}: not the folder of a run (there is no record.npz)",
         ),
         (
-            lambda run: edited(run / "run.json", session=[1]),
+            lambda run: edit_json(run / "run.json", session=[1]),
             "{run}/run.json: session: expected an object, got [1]",
         ),
-        (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: expected ascending numbers"),
         (
-            lambda run: arrays(run, velocities=np.full((61, 3, 2), np.nan)),
+            lambda run: edit_arrays(run, time=np.zeros(61)),
+            "{run}/record.npz: time: expected ascending numbers",
+        ),
+        (
+            lambda run: edit_arrays(run, velocities=np.full((61, 3, 2), np.nan)),
             "{run}/record.npz: velocities: expected finite numbers up to 1e+300, got nan",
         ),
         (
-            lambda run: arrays(
+            lambda run: edit_arrays(
                 run,
                 time=np.zeros(0),
                 **{
@@ -266,7 +273,7 @@ def arrays(folder: Path, **changes) -> None:
         ),
         (lambda run: (run / "cost.csv").write_bytes(b"\xff\xfe"), "{run}/cost.csv: cannot be read"),
         (
-            lambda run: edited(run / "run.json", dt_s=0.1),
+            lambda run: edit_json(run / "run.json", dt_s=0.1),
             "{run}/record.npz: time: expected times 0.1 s apart",
         ),
     ],
@@ -288,23 +295,23 @@ def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message
             "{both}/comparison.json: expected a JSON object with a comparison, got []",
         ),
         (
-            lambda both: edited(both / "comparison.json", folders=["rpf", "../run"]),
+            lambda both: edit_json(both / "comparison.json", folders=["rpf", "../run"]),
             '{both}/comparison.json: folders[1]: expected the name of a folder, got "../run"',
         ),
         (
-            lambda both: edited(both / "comparison.json", folders=[".."]),
+            lambda both: edit_json(both / "comparison.json", folders=[".."]),
             '{both}/comparison.json: folders[0]: expected the name of a folder, got ".."',
         ),
         (
-            lambda both: edited(both / "comparison.json", version=99),
+            lambda both: edit_json(both / "comparison.json", version=99),
             "{both}/comparison.json: version: expected 1, got 99; it was written by a newer robocov",
         ),
         (
-            lambda both: edited(both / "comparison.json", folders=["gone"]),
+            lambda both: edit_json(both / "comparison.json", folders=["gone"]),
             "{both}/comparison.json: expected at least one run, got none",
         ),
         (
-            lambda both: edited(both / "comparison.json", folders=["gone"], runs=[{}]),
+            lambda both: edit_json(both / "comparison.json", folders=["gone"], runs=[{}]),
             "{both}/gone: not the folder of a run (there is no run.json)",
         ),
         (

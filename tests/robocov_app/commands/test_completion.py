@@ -25,7 +25,7 @@ def script() -> str:
     return out.getvalue()
 
 
-def offered(script: str, *words: str) -> list[str]:
+def complete_words(script: str, *words: str) -> list[str]:
     assert BASH is not None
     line = " ".join(f"'{word}'" for word in words)
     ask = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _robocov; echo ${{COMPREPLY[@]}}"
@@ -61,7 +61,7 @@ def test_the_options_of_a_command_are_those_of_its_help(
     ],
 )
 def test_the_shell_completes(script: str, words: tuple[str, ...], wanted: list[str]) -> None:
-    assert offered(script, *words) == wanted
+    assert complete_words(script, *words) == wanted
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])

@@ -21,13 +21,13 @@ T = np.linspace(0.0, 60.0, 121)
 CURVES = [TimeCurve("RAPF", "rapf", T, 1 + np.exp(-T / 10)), TimeCurve("RPF", "rpf", T, 2 + np.exp(-T / 10))]
 
 
-def objects_of(pdf: bytes) -> dict[int, bytes]:
+def parse_objects(pdf: bytes) -> dict[int, bytes]:
     """Return the dictionaries of a PDF's objects by their numbers, without their streams."""
     found = re.findall(rb"(\d+) 0 obj\n(.*?)(?:\nstream\n|\nendobj)", pdf, flags=re.DOTALL)
     return {int(number): body for number, body in found}
 
 
-def streams_of(pdf: bytes) -> bytes:
+def read_streams(pdf: bytes) -> bytes:
     """Return all that is compressed in a PDF."""
     return b"\n".join(
         zlib.decompress(part)
@@ -105,7 +105,7 @@ class TestPdf:
     def test_every_font_is_in_it_as_truetype(self, tmp_path):
         save_figure(plot_cost(CURVES, size=(500, 300)), tmp_path / "a.pdf")
         pdf = (tmp_path / "a.pdf").read_bytes()
-        objects = objects_of(pdf)
+        objects = parse_objects(pdf)
         fonts = [body for body in objects.values() if re.search(rb"/Type /Font\b(?!Desc)", body)]
         kinds = {re.search(rb"/Subtype /(\w+)", body)[1] for body in fonts}
         assert kinds == {b"Type0", b"CIDFontType2"}, "Type 3 is what publishers refuse"
@@ -121,9 +121,9 @@ class TestPdf:
         """Every font says which letters its glyphs are."""
         save_figure(plot_cost(CURVES, size=(500, 300)), tmp_path / "a.pdf")
         pdf = (tmp_path / "a.pdf").read_bytes()
-        fonts = [body for body in objects_of(pdf).values() if b"/Subtype /Type0" in body]
+        fonts = [body for body in parse_objects(pdf).values() if b"/Subtype /Type0" in body]
         assert fonts and all(b"/ToUnicode" in body for body in fonts)
-        assert b"begincmap" in streams_of(pdf)
+        assert b"begincmap" in read_streams(pdf)
 
     def test_its_page_is_the_figures_and_it_bears_no_date(self, tmp_path):
         figure = plot_trajectories(record_walk(ROOMS, 4), size=(900, 600))

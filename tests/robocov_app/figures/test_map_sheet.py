@@ -6,7 +6,7 @@ from robocov.environment import Environment
 from robocov_app.figures.runs import MAX_MAPS, plot_maps
 
 
-def words(figure) -> list[str]:  # type: ignore[no-untyped-def]
+def list_texts(figure) -> list[str]:  # type: ignore[no-untyped-def]
     return [text.get_text() for text in figure.texts]
 
 
@@ -22,7 +22,7 @@ def test_maps_are_side_by_side_at_one_scale(empty: Environment, cluttered: Envir
         assert box.height / (axes.get_ylim()[1] - axes.get_ylim()[0]) == pytest.approx(zoom)
     assert panels[2].get_xlim() == (5.0, 25.0)
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
-    assert words(figure)[:3] == ["empty", "cluttered", "wide"]
+    assert list_texts(figure)[:3] == ["empty", "cluttered", "wide"]
     assert round(figure.bbox.width) == 1600
 
 
@@ -38,4 +38,4 @@ def test_all_is_on_the_page_and_the_dark_is_dark(empty: Environment) -> None:
 def test_only_the_first_of_many_maps_are_drawn(empty: Environment) -> None:
     figure = plot_maps([empty] * (MAX_MAPS + 5))
     assert len(figure.axes) == MAX_MAPS
-    assert f"{MAX_MAPS} of {MAX_MAPS + 5}" in words(figure)
+    assert f"{MAX_MAPS} of {MAX_MAPS + 5}" in list_texts(figure)

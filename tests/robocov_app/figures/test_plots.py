@@ -30,7 +30,7 @@ MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]
 T = np.linspace(0.0, 60.0, 121)
 
 
-def curves(*finals):
+def build_curves(*finals):
     names = ["rapf", "rpf", "lloyd", "other"]
     return [
         TimeCurve(name.upper(), name, T, final + 2 * np.exp(-T / 10))
@@ -84,7 +84,10 @@ def test_the_arena_is_not_distorted(environment):
 @pytest.mark.parametrize("size", [(901, 600), (641, 487), pytest.param((2560, 1440), marks=pytest.mark.slow)])
 def test_a_png_has_the_requested_size(tmp_path, size):
     path = tmp_path / "a.png"
-    for figure in (plot_trajectories(record_walk(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
+    for figure in (
+        plot_trajectories(record_walk(ROOMS, 3), size=size),
+        plot_cost(build_curves(1.0), size=size),
+    ):
         save_figure(figure, path)
         assert pygame.image.load(path).get_size() == size
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
@@ -255,7 +258,7 @@ class TestText:
 class TestCost:
     def test_equal_curves_are_all_visible(self):
         """Each is wider than the next, which lies on it, and has dashes and a mark of its own."""
-        figure = plot_cost(curves(1.0, 1.0, 1.0, 1.0))
+        figure = plot_cost(build_curves(1.0, 1.0, 1.0, 1.0))
         long = [line for line in figure.axes[0].lines if len(line.get_xdata()) == len(T)]
         widths = [line.get_linewidth() for line in long]
         assert (np.diff(widths) < -0.5).all()
@@ -287,7 +290,7 @@ class TestCost:
         assert all(re.fullmatch(r"\d+|0\.\d", word) for word in words)
 
     def test_values_units_and_the_papers_colors(self):
-        given_curves = curves(1.0, 1.4)
+        given_curves = build_curves(1.0, 1.4)
         figure = plot_cost(given_curves)
         axes = figure.axes[0]
         assert "(s)" in axes.get_xlabel() and "(m)" in axes.get_ylabel()
@@ -302,7 +305,7 @@ class TestCost:
     @pytest.mark.parametrize("finals", [(1.0,), (1.0, 1.0, 1.0, 1.0), (1.0, 1.01, 3.0), (0.0, 0.001, 0.002)])
     @pytest.mark.parametrize("size", [(900, 600), (2560, 1440), (500, 320)])
     def test_labels_are_separate_ordered_and_on_the_page(self, finals, size):
-        figure = plot_cost(curves(*finals), size=size)
+        figure = plot_cost(build_curves(*finals), size=size)
         figure.canvas.draw()
         renderer = figure.canvas.get_renderer()
         axes = figure.axes[0]

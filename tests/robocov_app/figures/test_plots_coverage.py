@@ -30,11 +30,11 @@ def build_snapshot(environment, n=5, seed=0):
     )
 
 
-def curves(count):
+def build_curves(count):
     return [TimeCurve(f"Controller {k}", "rapf", T, 1.0 + k + np.exp(-T / 9)) for k in range(count)]
 
 
-def written(figure):
+def list_extents(figure):
     """Return the extents of all words, whole axes with the words that belong to them, and legends."""
     renderer = figure.canvas.get_renderer()
     words = [text for text in figure.texts if text.get_text()]
@@ -65,8 +65,8 @@ def written(figure):
 )
 def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
     snapshots = [build_snapshot(environment, seed=k) for k in range(count)]
-    figure = plot_coverage(curves(count if with_curves else 0), snapshots, size=size)
-    extents = written(figure)
+    figure = plot_coverage(build_curves(count if with_curves else 0), snapshots, size=size)
+    extents = list_extents(figure)
     page = figure.bbox
     for k, box in enumerate(extents):
         assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= page.x1 + 1 and box.y1 <= page.y1 + 1
@@ -85,11 +85,14 @@ def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
 @pytest.mark.slow
 def test_mean_times_are_next_to_or_below_the_mean_distances(size, count):
     figure = plot_coverage(
-        curves(count), [build_snapshot(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
+        build_curves(count),
+        [build_snapshot(HALL, seed=k) for k in range(count)],
+        size=size,
+        times=build_curves(count),
     )
     labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
     assert labels == [DISTANCE, TIME]
-    extents = written(figure)
+    extents = list_extents(figure)
     for k, box in enumerate(extents):
         assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1
         for other in extents[:k]:
@@ -132,7 +135,7 @@ def test_all_maps_are_in_one_scale_of_colors():
 
 
 def test_the_texts_describe_the_coverage():
-    figure = plot_coverage(curves(1), [build_snapshot(ROOMS)], title="Coverage cost  ·  rooms")
+    figure = plot_coverage(build_curves(1), [build_snapshot(ROOMS)], title="Coverage cost  ·  rooms")
     words = [text.get_text() for text in figure.texts]
     assert "Coverage cost  ·  rooms" in words
     assert "distance to the nearest robot" in words
@@ -140,21 +143,21 @@ def test_the_texts_describe_the_coverage():
     (legend,) = figure.legends
     said = [text.get_text() for text in legend.get_texts()]
     assert said == ["robot", "geodesic cell border", "obstacle", "no robot can come"]
-    (legend,) = plot_coverage(curves(1), [build_snapshot(SHAFT)]).legends
+    (legend,) = plot_coverage(build_curves(1), [build_snapshot(SHAFT)]).legends
     assert [text.get_text() for text in legend.get_texts()] == ["robot", "geodesic cell border"]
 
 
 @pytest.mark.slow
 def test_the_same_plot_gives_the_same_bytes(tmp_path):
     for name in ("a.svg", "b.svg", "a.png", "b.png"):
-        save_figure(plot_coverage(curves(1), [build_snapshot(HALL)]), tmp_path / name)
+        save_figure(plot_coverage(build_curves(1), [build_snapshot(HALL)]), tmp_path / name)
     for suffix in (".svg", ".png"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
 @pytest.mark.parametrize("size", [(320, 240), (719, 900), (1200, 399)])
 def test_a_small_page_has_the_curves_alone(size):
-    figure = plot_coverage(curves(2), [build_snapshot(HALL)], size=size)
+    figure = plot_coverage(build_curves(2), [build_snapshot(HALL)], size=size)
     (axes,) = figure.axes
     assert axes.get_xlabel() == "time (s)"
     assert tuple(figure.canvas.get_width_height()) == size
@@ -162,7 +165,7 @@ def test_a_small_page_has_the_curves_alone(size):
 
 def test_no_snapshots_are_refused():
     with pytest.raises(ParameterError, match="snapshots: expected at least one, got none"):
-        plot_coverage(curves(1), [])
+        plot_coverage(build_curves(1), [])
 
 
 def test_moving_obstacles_have_a_path_and_a_legend_entry_of_their_own():

@@ -5,7 +5,7 @@ from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.figures.runs import METRIC_PANELS, MeasuredRun, plot_metrics
 
 
-def measured(controller: str, seed: int) -> MeasuredRun:
+def measure_run(controller: str, seed: int) -> MeasuredRun:
     rng = np.random.default_rng(seed)
     rising = np.cumsum(rng.uniform(0, 1, (8, 11)), axis=1)
     metrics = RunMetrics(
@@ -16,7 +16,7 @@ def measured(controller: str, seed: int) -> MeasuredRun:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_every_panel_has_a_curve_of_each_run(theme: str) -> None:
-    runs = [measured("rapf", 1), measured("rpf", 2)]
+    runs = [measure_run("rapf", 1), measure_run("rpf", 2)]
     figure = plot_metrics(runs, theme, "Two runs")
     assert len(figure.axes) == len(METRIC_PANELS)
     for axes, (label, _, of) in zip(figure.axes, METRIC_PANELS, strict=True):

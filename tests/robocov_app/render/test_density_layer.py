@@ -26,12 +26,12 @@ HEAVY = PLAIN.with_density(GAUSSIANS["one"])
 STARTS = np.array([[3.0, 1.0], [6.0, 2.0], [4.0, 6.0]])
 
 
-def scene_of(environment: Environment, **more) -> Scene:
+def build_density_scene(environment: Environment, **more) -> Scene:
     simulation = Simulation(environment, Rapf(), STARTS)
     return replace(Scene.from_snapshot(environment, simulation.team, simulation.observe_and_decide()), **more)
 
 
-def pixel(painter: Painter, frame, x: float, y: float):
+def get_pixel_color(painter: Painter, frame, x: float, y: float):
     column, row = np.rint(painter.camera.to_pixels(np.array([x, y]))).astype(int)
     return frame[row, column].astype(int)
 
@@ -42,28 +42,31 @@ def test_the_shading_covers_the_region(theme):
     for environment in (PLAIN, HEAVY):
         painter = Painter(environment, (500, 460), theme)
         painter.show_only({"density", "obstacles", "boundary"})
-        frames[environment.name, environment is HEAVY] = painter.render_frame(scene_of(environment))
+        frames[environment.name, environment is HEAVY] = painter.render_frame(
+            build_density_scene(environment)
+        )
     plain, heavy = frames.values()
-    peak, edge = pixel(painter, heavy, 3.0, 3.0), pixel(painter, heavy, 7.8, 7.8)
+    peak, edge = get_pixel_color(painter, heavy, 3.0, 3.0), get_pixel_color(painter, heavy, 7.8, 7.8)
     background = np.array(theme.background)
     assert np.abs(peak - background).max() > 60
     assert np.abs(edge - background).max() <= 3
     wanted = background + (np.array(theme.density) - background) * theme.density_strength
     assert np.abs(peak - wanted).max() < 12
     # outside the region, and on an obstacle, all is as it was
-    assert (pixel(painter, heavy, 0.2, 7.0) == pixel(painter, plain, 0.2, 7.0)).all()
-    assert (pixel(painter, heavy, 5.0, 5.0) == pixel(painter, plain, 5.0, 5.0)).all()
+    assert (get_pixel_color(painter, heavy, 0.2, 7.0) == get_pixel_color(painter, plain, 0.2, 7.0)).all()
+    assert (get_pixel_color(painter, heavy, 5.0, 5.0) == get_pixel_color(painter, plain, 5.0, 5.0)).all()
 
 
 def test_the_legend_contains_the_density():
     painter = Painter(HEAVY, (500, 460))
-    assert "density φ, 0.1 to 2.1" in list_legend_texts(painter, scene_of(HEAVY))
-    assert not any("φ" in words for words in list_legend_texts(painter, scene_of(PLAIN)))
+    assert "density φ, 0.1 to 2.1" in list_legend_texts(painter, build_density_scene(HEAVY))
+    assert not any("φ" in words for words in list_legend_texts(painter, build_density_scene(PLAIN)))
     assert not any(
-        "φ" in words for words in list_legend_texts(painter, scene_of(PLAIN.with_density(Uniform(2.0))))
+        "φ" in words
+        for words in list_legend_texts(painter, build_density_scene(PLAIN.with_density(Uniform(2.0))))
     )
     painter.visible.discard("density")
-    assert not any("φ" in words for words in list_legend_texts(painter, scene_of(HEAVY)))
+    assert not any("φ" in words for words in list_legend_texts(painter, build_density_scene(HEAVY)))
 
 
 def test_colors_of_distances_hide_it():
@@ -71,27 +74,29 @@ def test_colors_of_distances_hide_it():
     painter.show_only({"density", "distances", "obstacles"})
     cost = CoverageCost(HEAVY, 32)
     field = DistanceField(FieldLattice(cost.sites), cost(STARTS))
-    with_both = painter.render_frame(scene_of(HEAVY, field=field, field_limit=5.0))
+    with_both = painter.render_frame(build_density_scene(HEAVY, field=field, field_limit=5.0))
     painter.show_only({"distances", "obstacles"})
-    assert np.array_equal(painter.render_frame(scene_of(HEAVY, field=field, field_limit=5.0)), with_both)
+    assert np.array_equal(
+        painter.render_frame(build_density_scene(HEAVY, field=field, field_limit=5.0)), with_both
+    )
     painter.show_only({"density", "distances", "obstacles"})
-    assert not np.array_equal(painter.render_frame(scene_of(HEAVY)), with_both)
+    assert not np.array_equal(painter.render_frame(build_density_scene(HEAVY)), with_both)
 
 
 def test_another_density_is_redrawn():
     painter = Painter(PLAIN, (400, 380))
-    first = painter.render_frame(scene_of(HEAVY))
+    first = painter.render_frame(build_density_scene(HEAVY))
     other = PLAIN.with_density(POLYGONS["rooms"])
-    second = painter.render_frame(scene_of(other))
+    second = painter.render_frame(build_density_scene(other))
     assert not np.array_equal(first, second)
-    assert np.array_equal(painter.render_frame(scene_of(HEAVY)), first)
+    assert np.array_equal(painter.render_frame(build_density_scene(HEAVY)), first)
 
 
 def test_zoomed_in_it_stays_in_the_view():
     painter = Painter(HEAVY, (400, 380))
-    painter.render_frame(scene_of(HEAVY))
+    painter.render_frame(build_density_scene(HEAVY))
     painter.camera = painter.camera.zoom_at(40.0, (200, 200))
-    assert painter.render_frame(scene_of(HEAVY)).shape == (380, 400, 3)
+    assert painter.render_frame(build_density_scene(HEAVY)).shape == (380, 400, 3)
 
 
 def test_on_a_page():

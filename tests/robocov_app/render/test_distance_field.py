@@ -29,7 +29,7 @@ from robocov_app.render.distance_map.lattice import FieldLattice
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
 
 
-def field_of(environment, n, seed, lattice=128):
+def build_field(environment, n, seed, lattice=128):
     cost = CoverageCost(environment, lattice)
     hall = max(environment.free.geoms, key=lambda part: part.area)
     points = cost.points[shapely.contains_xy(hall, *cost.points.T)]
@@ -37,7 +37,7 @@ def field_of(environment, n, seed, lattice=128):
     return cost, DistanceField(FieldLattice(cost.sites), cost(positions))
 
 
-def pixels(environment, width=331):
+def list_pixel_centers(environment, width=331):
     """Return the middles of pixels, x to the right and y down."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     step = (high_x - low_x) / width
@@ -45,7 +45,7 @@ def pixels(environment, width=331):
     return x, np.arange(high_y - 0.5 * step, low_y, -step), step
 
 
-def some_free(environment, x, y, count, seed):
+def sample_free_pixels(environment, x, y, count, seed):
     """Return rows and columns of pixels that robots can reach."""
     columns, rows = np.meshgrid(np.arange(len(x)), np.arange(len(y)))
     hall = max(environment.free.geoms, key=lambda part: part.area)
@@ -57,9 +57,9 @@ def some_free(environment, x, y, count, seed):
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda map_: map_.name)
 @pytest.mark.parametrize("seed", range(4))
 def test_distances_are_the_exact_ones(environment, seed):
-    cost, field = field_of(environment, 5, seed)
-    x, y, _ = pixels(environment)
-    row, column = some_free(environment, x, y, 150, seed)
+    cost, field = build_field(environment, 5, seed)
+    x, y, _ = list_pixel_centers(environment)
+    row, column = sample_free_pixels(environment, x, y, 150, seed)
     places = np.column_stack([x[column], y[row]])
     exact = cost.geodesics.compute_distances(places, field.result.positions).min(axis=1)
     error = np.abs(field.compute_distances(x, y)[row, column] - exact)
@@ -70,10 +70,10 @@ def test_distances_are_the_exact_ones(environment, seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_owner_is_the_nearest_robot(seed):
-    cost, field = field_of(ROOMS, 6, seed)
-    x, y, step = pixels(ROOMS)
+    cost, field = build_field(ROOMS, 6, seed)
+    x, y, step = list_pixel_centers(ROOMS)
     owner, _ = field.compute_cells(x, y, step)
-    row, column = some_free(ROOMS, x, y, 150, seed)
+    row, column = sample_free_pixels(ROOMS, x, y, 150, seed)
     exact = cost.geodesics.compute_distances(np.column_stack([x[column], y[row]]), field.result.positions)
     chosen = exact[np.arange(150), owner[row, column]]
     assert (chosen - exact.min(axis=1)).max() < 0.2 * cost.spacing
@@ -81,8 +81,8 @@ def test_the_owner_is_the_nearest_robot(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_borders_are_equally_far_from_two_robots(seed):
-    cost, field = field_of(ROOMS, 6, seed)
-    x, y, step = pixels(ROOMS)
+    cost, field = build_field(ROOMS, 6, seed)
+    x, y, step = list_pixel_centers(ROOMS)
     borders = field.compute_borders(x, y, 0.5 * step)
     free = shapely.contains_xy(ROOMS.free, x[borders.columns], y[borders.rows])
     chosen = np.nonzero(free)[0][::7]
@@ -95,8 +95,8 @@ def test_borders_are_equally_far_from_two_robots(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_every_change_of_owner_in_the_open_has_a_border(seed):
-    _, field = field_of(HALL, 7, seed)
-    x, y, step = pixels(HALL)
+    _, field = build_field(HALL, 7, seed)
+    x, y, step = list_pixel_centers(HALL)
     owner, borders = field.compute_cells(x, y, 1.5 * step)
     marked = np.zeros(owner.shape, dtype=bool)
     marked[borders.rows, borders.columns] = True
@@ -125,7 +125,7 @@ def test_fields_with_moving_obstacles_depend_on_time():
 def test_no_distance_leaks_through_a_wall():
     cost = CoverageCost(SEALED, 64)
     field = DistanceFields(cost, 5.0).compute_at(np.array([[1.0, 1.0], [3.0, 5.0]]))
-    x, y, _ = pixels(SEALED)
+    x, y, _ = list_pixel_centers(SEALED)
     distance, (owner, borders) = field.compute_distances(x, y), field.compute_cells(x, y, 0.1)
     closed = x > 6.15 + cost.spacing
     assert np.isinf(distance[:, closed]).all()
@@ -138,17 +138,17 @@ def test_no_distance_leaks_through_a_wall():
 
 
 def test_one_robot_has_no_borders():
-    _, field = field_of(ROOMS, 1, 0)
-    x, y, _ = pixels(ROOMS)
+    _, field = build_field(ROOMS, 1, 0)
+    x, y, _ = list_pixel_centers(ROOMS)
     owner, borders = field.compute_cells(x, y, 10.0)
     assert len(borders.distances) == 0
-    row, column = some_free(ROOMS, x, y, 100, 0)
+    row, column = sample_free_pixels(ROOMS, x, y, 100, 0)
     assert set(owner[row, column].tolist()) == {0}
 
 
 @pytest.mark.parametrize("lattice", [2, 3, 5])
 def test_coarse_lattices_and_single_pixels(lattice):
-    _, field = field_of(HALL, 1, 0, lattice)
+    _, field = build_field(HALL, 1, 0, lattice)
     for x, y in (([3.0], [3.0]), ([0.0, 14.0], [11.0, 0.0]), (np.linspace(-5, 20, 9), [2.0])):
         distance = field.compute_distances(np.array(x, dtype=float), np.array(y, dtype=float))
         assert distance.shape == (len(y), len(x))

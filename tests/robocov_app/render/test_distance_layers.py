@@ -19,7 +19,7 @@ from robocov_app.render.painter import Painter
 SIZE = (560, 364)
 
 
-def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
+def build_field_scene(environment=ROOMS, n=5, seed=0, limit=8.0):
     record = record_walk(environment, n, seed=seed)
     cost = CoverageCost(environment, 128)
     positions = environment.start("spread").sample(n, seed + 1000)
@@ -27,13 +27,13 @@ def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
     return cost, replace(build_row_scene(record), field=field, field_limit=limit)
 
 
-def painted(what, *names, theme=LIGHT, size=SIZE):
+def paint_layers(what, *names, theme=LIGHT, size=SIZE):
     painter = Painter(what.environment, size, theme)
     painter.show_only(names)
     return painter.render_frame(what).astype(int), painter
 
 
-def free_pixels(painter, environment, count, seed=0):
+def sample_free_pixels(painter, environment, count, seed=0):
     """Return (count, 2) pixels well inside the free space, and their places."""
     rng = np.random.default_rng(seed)
     bounds = environment.region.bounds
@@ -50,9 +50,9 @@ def free_pixels(painter, environment, count, seed=0):
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda map_: map_.name)
 def test_colors_are_those_of_the_exact_distances(environment, theme):
-    cost, what = scene(environment)
-    frame, painter = painted(what, "distances", theme=theme)
-    pixels, places = free_pixels(painter, environment, 150)
+    cost, what = build_field_scene(environment)
+    frame, painter = paint_layers(what, "distances", theme=theme)
+    pixels, places = sample_free_pixels(painter, environment, 150)
     exact = cost.geodesics.compute_distances(places, what.field.result.positions).min(axis=1)
     reached = np.isfinite(exact)
     wanted = build_palette(theme)[np.minimum(exact[reached] / 8.0 * MAX_LEVEL, MAX_LEVEL).astype(int)].astype(
@@ -66,8 +66,8 @@ def test_colors_are_those_of_the_exact_distances(environment, theme):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 def test_no_color_leaves_the_free_space(theme):
-    _, what = scene(HALL)
-    frame, painter = painted(what, "distances", "geodesic_cells", "obstacles", theme=theme)
+    _, what = build_field_scene(HALL)
+    frame, painter = paint_layers(what, "distances", "geodesic_cells", "obstacles", theme=theme)
     rows, columns = np.indices(frame.shape[:2])
     places = painter.camera.to_world(np.stack([columns, rows], axis=-1).astype(float))
     outside = ~shapely.contains_xy(HALL.region.polygon.buffer(0.1), places[..., 0], places[..., 1])
@@ -79,9 +79,9 @@ def test_no_color_leaves_the_free_space(theme):
 
 @pytest.mark.parametrize("n", [4, 14])
 def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
-    cost, what = scene(n=n, seed=2)
-    frame, painter = painted(what, "geodesic_cells")
-    pixels, places = free_pixels(painter, ROOMS, 200)
+    cost, what = build_field_scene(n=n, seed=2)
+    frame, painter = paint_layers(what, "geodesic_cells")
+    pixels, places = sample_free_pixels(painter, ROOMS, 200)
     exact = cost.geodesics.compute_distances(places, what.field.result.positions)
     ordered = np.sort(exact, axis=1)
     reached = np.isfinite(ordered[:, 0])
@@ -93,9 +93,9 @@ def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
 
 
 def test_borders_are_drawn_only_between_owners():
-    cost, what = scene(seed=4)
-    frame, painter = painted(what, "geodesic_cells", "distances")
-    plain, _ = painted(what, "distances")
+    cost, what = build_field_scene(seed=4)
+    frame, painter = paint_layers(what, "geodesic_cells", "distances")
+    plain, _ = paint_layers(what, "distances")
     line = np.abs(frame - plain).max(axis=2) > 60
     rows, columns = np.nonzero(line)
     assert len(rows) > 200
@@ -107,22 +107,24 @@ def test_borders_are_drawn_only_between_owners():
 
 
 def test_cells_below_colors_are_lines_only():
-    _, what = scene()
-    with_cells, _ = painted(what, "distances", "cells")
-    without, _ = painted(what, "distances")
+    _, what = build_field_scene()
+    with_cells, _ = paint_layers(what, "distances", "cells")
+    without, _ = paint_layers(what, "distances")
     differs = np.abs(with_cells - without).max(axis=2) > 0
     assert 0.001 < differs.mean() < 0.05
 
 
 def test_without_a_field_nothing_is_drawn():
-    _, what = scene()
-    frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "color_bar", "legend")
+    _, what = build_field_scene()
+    frame, painter = paint_layers(
+        replace(what, field=None), "distances", "geodesic_cells", "color_bar", "legend"
+    )
     assert (frame == LIGHT.background).all()
     assert list_legend_texts(painter, replace(what, field=None)) == []
 
 
 def test_the_legend_explains_the_distance_layers():
-    _, what = scene()
+    _, what = build_field_scene()
     painter = Painter(ROOMS, SIZE)
     painter.change_visible(["distances", "geodesic_cells"], ["cells"])
     words = list_legend_texts(painter, what)
@@ -135,8 +137,8 @@ def test_the_legend_explains_the_distance_layers():
 )
 @pytest.mark.parametrize("limit", [0.8, 8.0, 15.0, 2500.0])
 def test_the_color_scale_is_complete_and_next_to_the_map(size, limit):
-    _, what = scene(limit=limit)
-    frame, painter = painted(what, "distances", "color_bar", "boundary", "status", size=size)
+    _, what = build_field_scene(limit=limit)
+    frame, painter = paint_layers(what, "distances", "color_bar", "boundary", "status", size=size)
     corner = painter.camera.to_pixels(np.array([16.0, 0.0]))
     beside = frame[:, int(np.ceil(corner[0])) + 3 :]
     ink = (beside != LIGHT.background).any(axis=2)
@@ -157,15 +159,15 @@ def test_the_color_scale_marks_values_beyond_its_end(monkeypatch):
     monkeypatch.setattr(canvas.Canvas, "draw_text", lambda self, text, at, **style: said.append(text) or 0)
     for limit, last in ((50.0, "50 m"), (2.0, "≥ 2 m"), (2500.0, "2.5 km")):
         said.clear()
-        _, what = scene(limit=limit)
-        painted(what, "distances", "color_bar")
+        _, what = build_field_scene(limit=limit)
+        paint_layers(what, "distances", "color_bar")
         assert said[-1] == last
         assert said[0] == "0"
 
 
 @pytest.mark.parametrize("layer", ["distances", "geodesic_cells"])
 def test_an_unchanged_picture_is_cached(layer, monkeypatch):
-    _, what = scene()
+    _, what = build_field_scene()
     made = []
     name = f"render_{layer}"
     real = getattr(distances, name)
@@ -177,14 +179,14 @@ def test_an_unchanged_picture_is_cached(layer, monkeypatch):
     assert len(made) == 1
     painter.camera = painter.camera.pan(10, 0)
     painter.render_frame(what)
-    _, other = scene(seed=1)
+    _, other = build_field_scene(seed=1)
     painter.render_frame(other)
     assert len(made) == 3
 
 
 @pytest.mark.parametrize("zoom", [0.05, 4.0, 300.0])
 def test_any_zoom_shows_the_same_colors(zoom):
-    cost, what = scene()
+    cost, what = build_field_scene()
     painter = Painter(ROOMS, (300, 200))
     painter.show_only(["distances"])
     place = np.array([9.0, 8.0])

@@ -55,7 +55,7 @@ def test_terms_differ_by_more_than_hue():
     assert len(shapes) == 4
 
 
-def gliding(*velocity, viscosity=1.0, positions=ONE):
+def build_gliding_scene(*velocity, viscosity=1.0, positions=ONE):
     """Return a scene of robots of one velocity in a world of a viscosity."""
     scene = build_scene(positions, velocities=np.tile(np.array(velocity, dtype=float), (len(positions), 1)))
     return replace(scene, team=Team.homogeneous(len(positions), viscosity=viscosity))
@@ -65,7 +65,7 @@ def gliding(*velocity, viscosity=1.0, positions=ONE):
 @given(st.floats(0, 2 * np.pi))
 def test_viscosity_points_against_the_velocity(angle):
     direction = np.array([np.cos(angle), np.sin(angle)])
-    pixels, painter = list_pixels(gliding(*0.8 * direction), "force_viscosity")
+    pixels, painter = list_pixels(build_gliding_scene(*0.8 * direction), "force_viscosity")
     away = painter.camera.to_world(pixels.astype(float)) - ONE[0]
     middle = away.mean(axis=0) / np.linalg.norm(away.mean(axis=0))
     assert middle @ -direction > 0.98
@@ -74,7 +74,7 @@ def test_viscosity_points_against_the_velocity(angle):
 
 def test_viscosity_ends_in_a_bar_across():
     """It is no arrow: it pulls nowhere, it only slows down."""
-    pixels, painter = list_pixels(gliding(-0.8, 0.0), "force_viscosity")
+    pixels, painter = list_pixels(build_gliding_scene(-0.8, 0.0), "force_viscosity")
     center = painter.camera.to_pixels(ONE)[0]
     heights = [np.ptp(pixels[pixels[:, 0] == x][:, 1]) for x in range(pixels[:, 0].min(), pixels[:, 0].max())]
     assert max(heights[:-6]) <= 4 * painter.scale
@@ -85,7 +85,7 @@ def test_viscosity_ends_in_a_bar_across():
 def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
     reach = []
     for speed, viscosity in ((0.0, 1.0), (0.3, 1.0), (0.9, 1.0), (0.9, 3.0), (0.9, 1e5), (0.9, 0.0)):
-        pixels, painter = list_pixels(gliding(speed, 0.0, viscosity=viscosity), "force_viscosity")
+        pixels, painter = list_pixels(build_gliding_scene(speed, 0.0, viscosity=viscosity), "force_viscosity")
         center = painter.camera.to_pixels(ONE)[0]
         reach.append((center[0] - pixels[:, 0]).max() if len(pixels) else 0.0)
     assert reach[0] == reach[5] == 0.0
@@ -94,7 +94,7 @@ def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_viscosity_has_its_own_color_and_legend(theme):
-    scene = gliding(-0.9, 0.0)
+    scene = build_gliding_scene(-0.9, 0.0)
     frame, painter = render_layers(scene, "force_viscosity", theme=theme)
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
     assert measure_least_error(frame, start, theme.forces["viscosity"]) < 25
@@ -105,7 +105,7 @@ def test_viscosity_has_its_own_color_and_legend(theme):
 
 def test_viscosity_of_robots_out_of_sight_is_left_out():
     pixels, _ = list_pixels(
-        gliding(0.9, 0.0, positions=np.array([[500.0, 4.0], [4.0, -900.0]])), "force_viscosity"
+        build_gliding_scene(0.9, 0.0, positions=np.array([[500.0, 4.0], [4.0, -900.0]])), "force_viscosity"
     )
     assert len(pixels) == 0
 

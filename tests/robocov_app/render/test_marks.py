@@ -24,15 +24,15 @@ from robocov_app.render.painter import Painter
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
 
-def broken(failed, positions=TWO, **more):
+def build_failed_scene(failed, positions=TWO, **more):
     return replace(build_scene(positions), failed=failed, **more)
 
 
-def numbers(frame, painter, text, theme=LIGHT):
+def find_numbers(frame, painter, text, theme=LIGHT):
     return places(frame, text, round(theme.small_text * painter.scale), theme, theme.ink)
 
 
-def around(frame, painter, place, radius):
+def extract_pixels_around(frame, painter, place, radius):
     """Return the pixels within so many px at scale 1 of a place."""
     rows, columns = np.indices(frame.shape[:2])
     x, y = painter.camera.to_pixels(np.array(place))
@@ -42,7 +42,7 @@ def around(frame, painter, place, radius):
 class TestFailed:
     @THEMES
     def test_a_failed_robot_is_gray_and_crossed_out(self, theme):
-        frame, painter = render_layers(broken({3: (4.0, 5.0)}), "failed", theme=theme)
+        frame, painter = render_layers(build_failed_scene({3: (4.0, 5.0)}), "failed", theme=theme)
         center = painter.camera.to_pixels(np.array([4.0, 5.0]))
         assert measure_error(frame, center, theme.ink) < 8
         for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -53,8 +53,8 @@ class TestFailed:
 
     @THEMES
     def test_a_failed_robot_differs_from_a_working_one(self, theme):
-        frame, painter = render_layers(broken({3: (4.0, 5.0)}), "failed", theme=theme)
-        disc = around(frame, painter, (4.0, 5.0), 9)
+        frame, painter = render_layers(build_failed_scene({3: (4.0, 5.0)}), "failed", theme=theme)
+        disc = extract_pixels_around(frame, painter, (4.0, 5.0), 9)
         assert np.ptp(disc, axis=1).max() < 32  # no hue
         for robot in theme.robots:
             assert np.abs(disc - np.array(robot)).max(axis=1).min() > 20
@@ -63,14 +63,14 @@ class TestFailed:
     @THEMES
     def test_a_failed_robot_has_its_number_next_to_it(self, theme):
         failed = {12: (2.0, 6.0), 3: (6.0, 2.0)}
-        frame, painter = render_layers(broken(failed), "failed", theme=theme)
+        frame, painter = render_layers(build_failed_scene(failed), "failed", theme=theme)
         for number, place in failed.items():
-            found = numbers(frame, painter, str(number), theme)
+            found = find_numbers(frame, painter, str(number), theme)
             assert len(found) == 1
             right, down = found[0] - painter.camera.to_pixels(np.array(place))
             assert 8 * painter.scale < right < 30 * painter.scale
             assert abs(down) < 4 * painter.scale
-        assert len(numbers(frame, painter, "7", theme)) == 0
+        assert len(find_numbers(frame, painter, "7", theme)) == 0
 
     @pytest.mark.parametrize(
         ("robots", "side"),
@@ -85,22 +85,22 @@ class TestFailed:
         """Robots at the right, left and above (y up) push it left, above and below (y down)."""
         near = 4.0 + 0.4 * np.array(robots).reshape(-1, 2)
         positions = np.vstack([near, [[1.0, 1.0]]])
-        frame, painter = render_layers(broken({8: (4.0, 4.0)}, positions), "failed", "robots")
-        found = numbers(frame, painter, "8")
+        frame, painter = render_layers(build_failed_scene({8: (4.0, 4.0)}, positions), "failed", "robots")
+        found = find_numbers(frame, painter, "8")
         assert len(found) == 1
         away = found[0] - painter.camera.to_pixels(np.array([4.0, 4.0]))
         assert away @ np.array(side) / np.linalg.norm(away) > 0.9
 
     def test_numbers_of_two_that_failed_side_by_side_can_both_be_read(self):
-        scene = broken({4: (4.0, 4.0), 5: (4.3, 4.0)})
+        scene = build_failed_scene({4: (4.0, 4.0), 5: (4.3, 4.0)})
         frame, painter = render_layers(scene, "failed")
-        assert len(numbers(frame, painter, "4")) == 1
-        assert len(numbers(frame, painter, "5")) == 1
+        assert len(find_numbers(frame, painter, "4")) == 1
+        assert len(find_numbers(frame, painter, "5")) == 1
 
     def test_in_a_crowd_it_is_no_larger_than_there_is_room(self):
         sizes = []
         for apart in (0.15, 2.0):
-            scene = broken({4: (4.0, 4.0)}, np.array([[4.0 + apart, 4.0], [1.0, 1.0]]))
+            scene = build_failed_scene({4: (4.0, 4.0)}, np.array([[4.0 + apart, 4.0], [1.0, 1.0]]))
             scene = replace(scene, team=Team.homogeneous(2, radius=0.02))
             pixels, painter = list_pixels(scene, "failed")
             away = painter.camera.to_pixels(np.array([4.0, 4.0])) - pixels
@@ -108,7 +108,7 @@ class TestFailed:
         assert sizes[0] < 6 < 7 < sizes[1] < 10
 
     def test_a_large_one_is_drawn_in_true_size(self):
-        scene = replace(broken({4: (4.0, 4.0)}), team=Team.homogeneous(2, radius=1.0))
+        scene = replace(build_failed_scene({4: (4.0, 4.0)}), team=Team.homogeneous(2, radius=1.0))
         frame, painter = render_layers(scene, "failed")
         center = painter.camera.to_pixels(np.array([4.0, 4.0]))
         fill = mix(LIGHT.background, LIGHT.ink, 0.3)
@@ -119,25 +119,28 @@ class TestFailed:
         )
 
     def test_working_robots_are_above_it(self):
-        scene = broken({3: (4.05, 4.0)}, ONE)
+        scene = build_failed_scene({3: (4.05, 4.0)}, ONE)
         frame, painter = render_layers(scene, "failed", "robots")
         alone, _ = render_layers(build_scene(ONE), "robots")
-        disc = (around(alone, painter, (4.0, 4.0), 7), around(frame, painter, (4.0, 4.0), 7))
+        disc = (
+            extract_pixels_around(alone, painter, (4.0, 4.0), 7),
+            extract_pixels_around(frame, painter, (4.0, 4.0), 7),
+        )
         assert (disc[0] == disc[1]).all()
 
     def test_without_failed_robots_nothing_is_drawn(self):
-        pixels, painter = list_pixels(broken({}), "failed")
+        pixels, painter = list_pixels(build_failed_scene({}), "failed")
         assert len(pixels) == 0
-        assert list_legend_texts(painter, broken({})) == []
-        assert list_legend_texts(painter, broken({3: (4.0, 5.0)})) == ["failed robot"]
+        assert list_legend_texts(painter, build_failed_scene({})) == []
+        assert list_legend_texts(painter, build_failed_scene({3: (4.0, 5.0)})) == ["failed robot"]
 
     def test_failed_robots_are_drawn_before_the_first_step(self):
-        frame, painter = render_layers(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
-        assert len(numbers(frame, painter, "3")) == 1
+        frame, painter = render_layers(replace(build_failed_scene({3: (4.0, 5.0)}), snapshot=None), "failed")
+        assert len(find_numbers(frame, painter, "3")) == 1
 
     @THEMES
     def test_its_glyph_in_the_legend(self, theme):
-        (picture,) = glyphs(find_layer("failed"), broken({3: (4.0, 5.0)}), theme)
+        (picture,) = glyphs(find_layer("failed"), build_failed_scene({3: (4.0, 5.0)}), theme)
         check_glyph(picture, theme, theme.ink)
         check_glyph(picture, theme, mix(theme.background, theme.ink, 0.3))
 
@@ -161,9 +164,18 @@ class TestSelection:
     def test_leaves_the_robot_and_its_number_as_they_are(self):
         frame, painter = render_layers(replace(build_scene(TWO), selected=1), "selection", "robots")
         alone, _ = render_layers(build_scene(TWO), "robots")
-        assert (around(frame, painter, TWO[1], 9) == around(alone, painter, TWO[1], 9)).all()
-        assert (around(frame, painter, TWO[0], 20) == around(alone, painter, TWO[0], 20)).all()
-        assert (around(frame, painter, TWO[1], 15) != around(alone, painter, TWO[1], 15)).any()
+        assert (
+            extract_pixels_around(frame, painter, TWO[1], 9)
+            == extract_pixels_around(alone, painter, TWO[1], 9)
+        ).all()
+        assert (
+            extract_pixels_around(frame, painter, TWO[0], 20)
+            == extract_pixels_around(alone, painter, TWO[0], 20)
+        ).all()
+        assert (
+            extract_pixels_around(frame, painter, TWO[1], 15)
+            != extract_pixels_around(alone, painter, TWO[1], 15)
+        ).any()
 
     def test_fits_a_large_robot(self):
         team = Team.homogeneous(2)
@@ -179,7 +191,7 @@ class TestSelection:
 
 def test_marks_stay_inside_the_picture_of_the_map():
     """What is out of sight below is not drawn over the status line."""
-    scene = replace(broken({3: (1.0, 0.0)}, np.array([[4.0, 0.0], [1.0, 1.0]])), selected=0)
+    scene = replace(build_failed_scene({3: (1.0, 0.0)}, np.array([[4.0, 0.0], [1.0, 1.0]])), selected=0)
     painter = Painter(SQUARE, SIZE)
     painter.show_only({"failed", "selection", "status"})
     painter.camera = painter.camera.pan(0, 4)

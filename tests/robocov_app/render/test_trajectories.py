@@ -22,7 +22,7 @@ RATE = 20.0
 """Rows for each second."""
 
 
-def walks(rows, n=3, seed=0):
+def build_random_trail(rows, n=3, seed=0):
     """Return (rows, n, 2) m of smooth walks in the square."""
     rng = np.random.default_rng(seed)
     time = np.arange(rows)[:, None] / RATE
@@ -32,7 +32,7 @@ def walks(rows, n=3, seed=0):
     )
 
 
-def straight(rows, n=1):
+def build_straight_trail(rows, n=1):
     """Return walks to the right at 2 m/s below each other."""
     path = np.empty((rows, n, 2))
     path[..., 0] = 0.5 + 2.0 * np.arange(rows)[:, None] / RATE
@@ -40,7 +40,7 @@ def straight(rows, n=1):
     return path
 
 
-def walked(trail, time=None, **more):
+def build_trail_scene(trail, time=None, **more):
     time = np.arange(len(trail)) / RATE if time is None else time
     known = np.nan_to_num(trail[-1], nan=1.0)
     return replace(build_scene(known), trail=trail, trail_time=time, **more)
@@ -53,7 +53,7 @@ class FadingPainter(Painter):
         super().draw(surface, replace(scene, trail_fade=self.fade))
 
 
-def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
+def build_painter(fade=None, theme=LIGHT, size=SIZE, also=()):
     """Return a painter of trajectories, and what draws them."""
     painter = FadingPainter(SQUARE, size, theme)
     painter.show_only({"trajectories", *also})
@@ -61,15 +61,15 @@ def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
     return painter, find_layer("trajectories", painter.layers).draw.__self__
 
 
-def frame_of(painter, *scene, **more):
-    return painter.render_frame(walked(*scene, **more)).astype(int)
+def render_trail(painter, *scene, **more):
+    return painter.render_frame(build_trail_scene(*scene, **more)).astype(int)
 
 
-def ink(frame, theme=LIGHT):
+def find_ink(frame, theme=LIGHT):
     return np.abs(frame - np.array(theme.background)).max(axis=2)
 
 
-def off_the_paths(painter, trail, frame, theme=LIGHT, reach=3.0):
+def count_pixels_off_paths(painter, trail, frame, theme=LIGHT, reach=3.0):
     """Return what is drawn farther than a few px from the paths, robot by robot, rows without nan only."""
     lines = []
     for path in painter.camera.to_pixels(trail.swapaxes(0, 1)):
@@ -78,7 +78,7 @@ def off_the_paths(painter, trail, frame, theme=LIGHT, reach=3.0):
         pieces = [piece for piece in pieces if np.isfinite(piece[0, 0])]
         lines += [shapely.LineString(p) if len(p) > 1 else shapely.Point(p[0]) for p in pieces]
     near = shapely.union_all(lines).buffer(reach)
-    rows, columns = np.nonzero(ink(frame, theme))
+    rows, columns = np.nonzero(find_ink(frame, theme))
     return int((~shapely.contains_xy(near, columns, rows)).sum())
 
 
@@ -95,41 +95,41 @@ class TestThinning:
     @pytest.mark.parametrize("together", [pytest.param(0, marks=pytest.mark.slow), 3])
     def test_a_continued_trail_gives_the_same_picture_without_redrawing(self, fade, together):
         """Also where rows were added before the next frame."""
-        trail = walks(self.rows)
-        whole, _ = painter_of(fade)
-        thin, layer = painter_of(fade)
+        trail = build_random_trail(self.rows)
+        whole, _ = build_painter(fade)
+        thin, layer = build_painter(fade)
         for count in range(1, self.at + 1):
-            frame_of(whole, trail[:count])
-            frame_of(thin, trail[:count])
+            render_trail(whole, trail[:count])
+            render_trail(thin, trail[:count])
         page, before = layer._page, layer._key
         for count in range(self.at + together, self.rows + 1):
-            expected = frame_of(whole, trail[:count])
-            seen = frame_of(thin, *self.thinned(trail[:count]))
+            expected = render_trail(whole, trail[:count])
+            seen = render_trail(thin, *self.thinned(trail[:count]))
             assert (expected == seen).all()
             if layer._key == before:  # no step of fading since
                 assert layer._page is page
         assert fade is not None or layer._page is page
 
     def test_without_a_cached_page_the_picture_is_nearly_the_same(self):
-        trail = walks(self.rows)
-        expected = frame_of(painter_of()[0], trail)
-        seen = frame_of(painter_of()[0], *self.thinned(trail))
-        drawn_pixels = ink(expected) > 0
+        trail = build_random_trail(self.rows)
+        expected = render_trail(build_painter()[0], trail)
+        seen = render_trail(build_painter()[0], *self.thinned(trail))
+        drawn_pixels = find_ink(expected) > 0
         assert drawn_pixels.sum() > 800
         assert np.abs(expected - seen)[drawn_pixels].mean() < 12
 
     def test_another_trail_of_the_same_length_is_redrawn(self):
-        painter, _ = painter_of()
+        painter, _ = build_painter()
         for seed in (0, 1, 0):
-            seen = frame_of(painter, walks(60, seed=seed))
-            assert (seen == frame_of(painter_of()[0], walks(60, seed=seed))).all()
+            seen = render_trail(painter, build_random_trail(60, seed=seed))
+            assert (seen == render_trail(build_painter()[0], build_random_trail(60, seed=seed))).all()
 
 
 class TestGaps:
     """Rows have nan for robots that are not there then."""
 
     def late(self, rows=80, begin=40):
-        trail = straight(rows, 2)
+        trail = build_straight_trail(rows, 2)
         trail[:begin, 1] = np.nan
         return trail
 
@@ -137,30 +137,33 @@ class TestGaps:
     @MOSTLY_LIGHT
     def test_robots_that_join_later_are_drawn_from_there(self, fade, theme):
         trail = self.late()
-        painter, _ = painter_of(fade, theme)
+        painter, _ = build_painter(fade, theme)
         for count in (1, 20, 38, 40, 41, 42, 60, 80):
-            frame = frame_of(painter, trail[:count])
-            assert off_the_paths(painter, trail[:count], frame, theme) == 0
-        at_once = frame_of(painter_of(fade, theme)[0], trail)
+            frame = render_trail(painter, trail[:count])
+            assert count_pixels_off_paths(painter, trail[:count], frame, theme) == 0
+        at_once = render_trail(build_painter(fade, theme)[0], trail)
         for each in (frame, at_once):
-            assert off_the_paths(painter, trail, each, theme) == 0
+            assert count_pixels_off_paths(painter, trail, each, theme) == 0
             for row in (60, 70, 78):
                 pixel = painter.camera.to_pixels(trail[row, 1])
                 assert measure_least_error(each, pixel, choose_trail_color(theme, 1)) < 120
             first = painter.camera.to_pixels(trail[40, 1])
-            assert ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max() == 0
+            assert (
+                find_ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max()
+                == 0
+            )
 
     @FADES
     def test_robots_that_join_again_elsewhere_have_separate_paths(self, fade):
-        trail = straight(60, 2)
+        trail = build_straight_trail(60, 2)
         trail[30:40, 1] = np.nan
         trail[40:, 1, 1] = 6.0
-        painter, _ = painter_of(fade)
+        painter, _ = build_painter(fade)
         for count in (1, 20, 30, 31, 39, 40, 41, 42, 60):
-            frame = frame_of(painter, trail[:count])
-            assert off_the_paths(painter, trail[:count], frame) == 0
-        at_once = frame_of(painter_of(fade)[0], trail)
-        assert off_the_paths(painter, trail, at_once) == 0
+            frame = render_trail(painter, trail[:count])
+            assert count_pixels_off_paths(painter, trail[:count], frame) == 0
+        at_once = render_trail(build_painter(fade)[0], trail)
+        assert count_pixels_off_paths(painter, trail, at_once) == 0
         for each in (frame, at_once):
             for row in (26, 44, 55):
                 pixel = painter.camera.to_pixels(trail[row, 1])
@@ -168,21 +171,21 @@ class TestGaps:
 
     @FADES
     def test_slow_ones_leave_none_either(self, fade):
-        trail = straight(30, 2) * np.array([0.05, 1.0]) + np.array([2.0, 0.0])
+        trail = build_straight_trail(30, 2) * np.array([0.05, 1.0]) + np.array([2.0, 0.0])
         trail[14:17, 1] = np.nan
         trail[17:, 1, 1] = 5.0
-        frame = frame_of(painter_of(fade and 20.0)[0], trail)
-        assert off_the_paths(painter_of()[0], trail, frame) == 0
-        assert (ink(frame) > 0).any()
+        frame = render_trail(build_painter(fade and 20.0)[0], trail)
+        assert count_pixels_off_paths(build_painter()[0], trail, frame) == 0
+        assert (find_ink(frame) > 0).any()
 
     @FADES
     def test_robots_that_fail_leave_only_their_path(self, fade):
-        trail = straight(50, 2)
+        trail = build_straight_trail(50, 2)
         trail[35:, 1] = np.nan
-        painter, _ = painter_of(fade)
+        painter, _ = build_painter(fade)
         for count in range(1, 51):
-            frame = frame_of(painter, trail[:count])
-        assert off_the_paths(painter, trail, frame) == 0
+            frame = render_trail(painter, trail[:count])
+        assert count_pixels_off_paths(painter, trail, frame) == 0
         assert (
             measure_least_error(frame, painter.camera.to_pixels(trail[30, 1]), choose_trail_color(LIGHT, 1))
             < 200
@@ -190,22 +193,22 @@ class TestGaps:
 
     @FADES
     def test_an_absent_robot_has_no_path(self, fade):
-        trail = straight(40, 2)
+        trail = build_straight_trail(40, 2)
         trail[:, 1] = np.nan
-        alone = frame_of(painter_of(fade)[0], trail)
-        painter, _ = painter_of(fade)
-        assert off_the_paths(painter, trail, alone) == 0
+        alone = render_trail(build_painter(fade)[0], trail)
+        painter, _ = build_painter(fade)
+        assert count_pixels_off_paths(painter, trail, alone) == 0
         nowhere = np.full((5, 2, 2), np.nan)
-        assert (frame_of(painter, nowhere) == 255).all()
-        assert (frame_of(painter, nowhere[:1]) == 255).all()
+        assert (render_trail(painter, nowhere) == 255).all()
+        assert (render_trail(painter, nowhere[:1]) == 255).all()
 
     def test_gaps_do_not_hinder_thinning(self):
         trail = self.late()
-        painter, layer = painter_of()
-        frame_of(painter, trail[:60])
+        painter, layer = build_painter()
+        render_trail(painter, trail[:60])
         page = layer._page
         keep = np.r_[0:30:2, 30:80]
-        frame_of(painter, trail[keep], keep / RATE)
+        render_trail(painter, trail[keep], keep / RATE)
         assert layer._page is page
 
 
@@ -213,14 +216,14 @@ class TestFading:
     def strengths(self, frame, painter, trail, rows, theme):
         """Return how far the picture is from the background at rows of the first robot."""
         pixels = painter.camera.to_pixels(trail[rows, 0])
-        strength = ink(frame, theme)
+        strength = find_ink(frame, theme)
         return [int(strength[int(y) - 1 : int(y) + 3, int(x)].max()) for x, y in np.rint(pixels)]
 
     @THEMES
     def test_older_pieces_are_fainter(self, theme):
-        trail = straight(70)
-        painter, _ = painter_of(3.0, theme)
-        frame = frame_of(painter, trail)
+        trail = build_straight_trail(70)
+        painter, _ = build_painter(3.0, theme)
+        frame = render_trail(painter, trail)
         rows = np.arange(68, 2, -6)
         seen = self.strengths(frame, painter, trail, rows, theme)
         age = (69 - rows) / RATE
@@ -234,11 +237,11 @@ class TestFading:
     @MOSTLY_LIGHT
     def test_frame_by_frame_too(self, theme):
         """The newest is strong at any time, and nothing is missing up to now."""
-        trail = straight(70)
-        painter, _ = painter_of(3.0, theme)
+        trail = build_straight_trail(70)
+        painter, _ = build_painter(3.0, theme)
         full = max(abs(a - b) for a, b in zip(choose_trail_color(theme, 0), theme.background, strict=True))
         for count in range(2, 71, 4):
-            frame = frame_of(painter, trail[:count])
+            frame = render_trail(painter, trail[:count])
             if count % 12 == 6:
                 continue  # to look at all of them takes a while
             rows = np.arange(count - 2, max(count - 50, 0), -1)
@@ -250,9 +253,9 @@ class TestFading:
     @THEMES
     def test_trails_fade_into_the_layers_below(self, theme):
         """On a cell it is neither paler nor darker than the cell and the color of its robot."""
-        trail = straight(70)
-        painter, _ = painter_of(3.0, theme, also={"cells"})
-        frame = frame_of(painter, trail)
+        trail = build_straight_trail(70)
+        painter, _ = build_painter(3.0, theme, also={"cells"})
+        frame = render_trail(painter, trail)
         low = np.minimum(theme.get_cell_color(0), choose_trail_color(theme, 0)) - 4
         high = np.maximum(theme.get_cell_color(0), choose_trail_color(theme, 0)) + 4
         for x, y in np.rint(painter.camera.to_pixels(trail[8:68, 0])).astype(int):
@@ -268,95 +271,101 @@ class TestFading:
         part = np.arange(rows) / RATE
         trail[:, 0] = np.column_stack([np.full(rows, 4.0), 6.5 - 2.0 * part])  # crosses late, at 1.25 s
         trail[:, 1] = np.column_stack([3.5 + 2.0 * part, np.full(rows, 4.0)])  # crosses early, at 0.25 s
-        painter, _ = painter_of(3.0)
+        painter, _ = build_painter(3.0)
         pixel = painter.camera.to_pixels(np.array([4.0, 4.0]))
-        frame = frame_of(painter, trail)
+        frame = render_trail(painter, trail)
         assert measure_least_error(frame, pixel, choose_trail_color(LIGHT, 0), reach=0) < measure_least_error(
             frame, pixel, choose_trail_color(LIGHT, 1), reach=0
         )
-        swapped = frame_of(painter, trail[:, ::-1])
+        swapped = render_trail(painter, trail[:, ::-1])
         assert measure_least_error(swapped, pixel, choose_trail_color(LIGHT, 1), reach=0) < 110
 
     def test_slow_robots_have_trails_without_gaps(self):
         trail = np.empty((400, 2, 2))
-        trail[:, 0] = walks(400, 1)[:, 0]
+        trail[:, 0] = build_random_trail(400, 1)[:, 0]
         trail[:, 1] = np.column_stack([2.0 + 0.0009 * np.arange(400), np.full(400, 1.0)])
-        painter, _ = painter_of(20.0)
-        frame = frame_of(painter, trail)
+        painter, _ = build_painter(20.0)
+        frame = render_trail(painter, trail)
         first, last = np.rint(painter.camera.to_pixels(trail[[200, -1], 1])).astype(int)
-        band = ink(frame)[first[1] - 2 : first[1] + 4, first[0] : last[0]]
+        band = find_ink(frame)[first[1] - 2 : first[1] + 4, first[0] : last[0]]
         assert band.shape[1] > 7
         assert band.max(axis=0).min() > 60
 
     @pytest.mark.slow
     def test_the_oldest_rows_of_a_fading_trail_are_drawn(self):
         """Rounding may find them a little older."""
-        painter, _ = painter_of(0.3)
-        trail = straight(40)
+        painter, _ = build_painter(0.3)
+        trail = build_straight_trail(40)
         older = 0
         for rate in (7.0, 10.0, 30.0):
             time = np.arange(40) / rate
             for count in range(5, 40):
                 painter.fade = 3 / rate
                 older += (time[count - 1] - time[count - 4]) / painter.fade > 1.0
-                frame = frame_of(painter, trail[:count], time[:count])
-                assert (ink(frame) > 0).any()
+                frame = render_trail(painter, trail[:count], time[:count])
+                assert (find_ink(frame) > 0).any()
         assert older > 0
 
     def test_the_page_of_a_fading_trail_is_cached_between_steps(self):
-        trail = walks(200)
-        painter, layer = painter_of(6.0)
+        trail = build_random_trail(200)
+        painter, layer = build_painter(6.0)
         pages = []
         for count in range(100, 200):
-            frame_of(painter, trail[:count])
+            render_trail(painter, trail[:count])
             if not pages or layer._page is not pages[-1]:
                 pages.append(layer._page)
         assert len(pages) == pytest.approx(100 / RATE / (6.0 / FADE_STEPS), abs=2)
 
     def test_another_run_or_a_step_back_replaces_the_page(self):
-        painter, _ = painter_of(4.0)
-        frame_of(painter, walks(43))
-        for trail in (walks(43, seed=1), walks(41, seed=1), walks(42), walks(20), walks(3)):
-            assert (frame_of(painter, trail) == frame_of(painter_of(4.0)[0], trail)).all()
+        painter, _ = build_painter(4.0)
+        render_trail(painter, build_random_trail(43))
+        for trail in (
+            build_random_trail(43, seed=1),
+            build_random_trail(41, seed=1),
+            build_random_trail(42),
+            build_random_trail(20),
+            build_random_trail(3),
+        ):
+            assert (render_trail(painter, trail) == render_trail(build_painter(4.0)[0], trail)).all()
 
     def test_other_colors_are_redrawn(self):
-        trail = straight(40, 2)
+        trail = build_straight_trail(40, 2)
         for fade in (None, 4.0):
-            painter, _ = painter_of(fade)
+            painter, _ = build_painter(fade)
             for numbers in ((1, 2), (3, 4)):
-                frame = frame_of(painter, trail, numbers=numbers)
-                assert (frame == frame_of(painter_of(fade)[0], trail, numbers=numbers)).all()
+                frame = render_trail(painter, trail, numbers=numbers)
+                assert (frame == render_trail(build_painter(fade)[0], trail, numbers=numbers)).all()
                 for row, number in enumerate(numbers):
                     for place in painter.camera.to_pixels(trail[[30, 36], row]):
                         assert measure_least_error(frame, place, choose_trail_color(LIGHT, number - 1)) < 90
 
     def test_it_may_be_switched_on_and_off(self):
-        trail = walks(90)
-        painter, _ = painter_of()
-        stays = frame_of(painter, trail)
+        trail = build_random_trail(90)
+        painter, _ = build_painter()
+        stays = render_trail(painter, trail)
         painter.fade = 1.5
-        fades = frame_of(painter, trail)
-        assert (fades == frame_of(painter_of(1.5)[0], trail)).all()
+        fades = render_trail(painter, trail)
+        assert (fades == render_trail(build_painter(1.5)[0], trail)).all()
         painter.fade = None
-        assert (frame_of(painter, trail) == stays).all()
-        assert (ink(fades) > 0).sum() < 0.7 * (ink(stays) > 0).sum()
+        assert (render_trail(painter, trail) == stays).all()
+        assert (find_ink(fades) > 0).sum() < 0.7 * (find_ink(stays) > 0).sum()
         painter.fade = 1.5
-        scene = replace(walked(trail), trail_time=None)  # it cannot, without times
+        scene = replace(build_trail_scene(trail), trail_time=None)  # it cannot, without times
         assert (painter.render_frame(scene) == stays).all()
 
     def test_short_trails_and_robots_at_rest_draw_nothing_distant(self):
-        still = np.repeat(walks(1), 30, axis=0)
+        still = np.repeat(build_random_trail(1), 30, axis=0)
         for trail in (still, still[:1]):
-            frame = frame_of(painter_of(1.0)[0], trail)
-            assert (ink(frame) > 0).sum() <= 3 * 9
+            frame = render_trail(build_painter(1.0)[0], trail)
+            assert (find_ink(frame) > 0).sum() <= 3 * 9
 
     @FADES
     def test_scans_are_drawn_at_high_zoom(self, fade):
-        painter, _ = painter_of(fade)
-        trail = walks(60)
+        painter, _ = build_painter(fade)
+        trail = build_random_trail(60)
         x, y = trail[-5, 0]
         painter.camera = replace(painter.camera, center=(x, y), zoom=2e4)
-        frame = frame_of(painter, trail)
+        frame = render_trail(painter, trail)
         assert (
             measure_least_error(
                 frame, painter.camera.to_pixels(trail[-5, 0]), choose_trail_color(LIGHT, 0), reach=3
@@ -365,9 +374,9 @@ class TestFading:
         )
 
     def test_large_teams_are_in_one_quiet_color(self):
-        trail = straight(40, 12) * np.array([1.0, 0.55])
-        frame = frame_of(painter_of(4.0)[0], trail)
-        painter, _ = painter_of(4.0)
+        trail = build_straight_trail(40, 12) * np.array([1.0, 0.55])
+        frame = render_trail(build_painter(4.0)[0], trail)
+        painter, _ = build_painter(4.0)
         red = [
             measure_least_error(frame, painter.camera.to_pixels(trail[37, k]), LIGHT.trajectory)
             for k in range(12)
@@ -380,7 +389,7 @@ class TestFading:
 def test_pieces_on_the_page_and_new_ones_are_alike(size):
     """Where a section begins or ends, the line is neither thicker nor broken."""
     record = record_walk(SQUARE, 3, steps=80)
-    painter, _ = painter_of(size=size)
+    painter, _ = build_painter(size=size)
     for row in range(1, 80):
         frame = painter.render_frame(build_row_scene(record, row)).astype(int)
     at_once, _ = render_layers(build_row_scene(record), "trajectories", size=size)
@@ -406,9 +415,9 @@ def test_a_short_path_is_drawn_once_and_smooth(monkeypatch):
         return draw_lines(surface, color, closed, points)
 
     monkeypatch.setattr(pygame.draw, "aalines", draw_and_count)
-    painter, _ = painter_of()
+    painter, _ = build_painter()
     painter.scale = 0.5
     for rows in range(2, 30):
-        frame_of(painter, walks(rows))
+        render_trail(painter, build_random_trail(rows))
     assert n_points
     assert min(n_points) > 2

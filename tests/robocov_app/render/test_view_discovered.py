@@ -15,7 +15,7 @@ from robocov_app.render.layers.known_obstacles import get_discovered_map
 from robocov_app.render.sensed_points import SensedPoints
 
 
-def scene(selected: int | None = 0):
+def build_discovered_scene(selected: int | None = 0):
     """A scene in which the first robot knows a wall, a presumed one, and free cells on the left."""
     raster = Raster(SQUARE.region, 0.1)
     state = np.zeros(raster.shape, dtype=np.uint8)
@@ -33,7 +33,7 @@ def scene(selected: int | None = 0):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_walls_and_unknown_cells_are_visible(theme):
-    known, shown = scene()
+    known, shown = build_discovered_scene()
     assert get_discovered_map(shown) is known
     frame, painter = render_layers(shown, "sensed", theme=theme)
     at = {
@@ -53,7 +53,7 @@ def test_walls_and_unknown_cells_are_visible(theme):
 
 
 def test_without_a_selected_robot_or_map_nothing_is_drawn():
-    _, shown = scene(selected=None)
+    _, shown = build_discovered_scene(selected=None)
     assert get_discovered_map(shown) is None
     assert get_discovered_map(replace(build_scene(ONE), selected=0)) is None
     assert get_discovered_map(replace(shown, snapshot=None, selected=0)) is None

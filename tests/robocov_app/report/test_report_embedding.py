@@ -33,25 +33,25 @@ from robocov_app.report.pictures import has_path
 STYLE = choose_controller_styles(["rapf"])["rapf"]
 
 
-def read_back(text: str, low: float, high: float) -> np.ndarray:
+def dequantize(text: str, low: float, high: float) -> np.ndarray:
     """Return what `quantize` was given: an implementation of its own."""
     words = np.frombuffer(base64.b64decode(text), dtype="<u2").astype(float)
     return np.where(words == NO_NUMBER, np.nan, low + words / (NO_NUMBER - 1) * (high - low))
 
 
-def run_of(seconds: float = 6.0, **walking) -> ReplayRun:
+def build_replay_run(seconds: float = 6.0, **walking) -> ReplayRun:
     record = build_record(seconds=seconds, **walking)
     return ReplayRun(record, build_history(record, 2.0), "a run")
 
 
-def places_of(data: dict, record, name: str = "positions") -> np.ndarray:
+def read_points(data: dict, record, name: str = "positions") -> np.ndarray:
     low_x, low_y, high_x, high_y = record.environment.region.bounds
-    flat = read_back(data[name], 0.0, 1.0).reshape(data["count"], -1, 2)
+    flat = dequantize(data[name], 0.0, 1.0).reshape(data["count"], -1, 2)
     return np.array([low_x, low_y]) + flat * np.array([high_x - low_x, high_y - low_y])
 
 
 def test_speeds_are_embedded_for_cells_by_travel_time() -> None:
-    run = run_of()
+    run = build_replay_run()
     size = len(run.record.team)
     speeds = np.where(np.arange(size) == 0, 1.0, 0.4)
     mixed = replace(run.record, team=replace(run.record.team, max_speed=speeds))
@@ -68,12 +68,12 @@ def test_speeds_are_embedded_for_cells_by_travel_time() -> None:
 def test_quantized_numbers_are_accurate_to_half_a_step(values) -> None:
     array = np.array(values)
     low, high = float(array.min()), float(array.max())
-    back = read_back(quantize(array, low, high), low, high)
+    back = dequantize(quantize(array, low, high), low, high)
     assert np.abs(back - array).max() <= 0.51 * (high - low) / (NO_NUMBER - 1) + 1e-12
 
 
 def test_missing_numbers_stay_missing() -> None:
-    back = read_back(quantize(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
+    back = dequantize(quantize(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
     assert np.isnan(back).tolist() == [False, True, True, False]
 
 
@@ -89,7 +89,7 @@ def test_even_times_begin_at_zero_and_end_at_the_end(end, rate) -> None:
 @pytest.mark.parametrize("hz", [60.0, 5.0, 3.0])
 @pytest.mark.parametrize("seconds", [6.0, 4.35])
 def test_positions_are_those_of_the_record(hz, seconds) -> None:
-    run = run_of(seconds, hz=hz)
+    run = build_replay_run(seconds, hz=hz)
     data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
     record = run.record
     times = np.minimum(np.arange(data["count"]) * data["step"], data["end"])
@@ -101,17 +101,17 @@ def test_positions_are_those_of_the_record(hz, seconds) -> None:
         axis=1,
     )
     assert data["end"] == pytest.approx(record.time[-1])
-    assert np.abs(places_of(data, record) - wanted).max() < 1e-3
-    assert np.abs(places_of(data, record, "goals") - record.goals[0]).max() < 1e-3
+    assert np.abs(read_points(data, record) - wanted).max() < 1e-3
+    assert np.abs(read_points(data, record, "goals") - record.goals[0]).max() < 1e-3
 
 
 def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
-    run = run_of()
+    run = build_replay_run()
     cost = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)["cost"]
     assert run.history is not None
     times = np.minimum(np.arange(cost["count"]) * cost["step"], 6.0)
     wanted = np.interp(times, run.history.time, run.history.mean_distance)
-    assert read_back(cost["values"], cost["low"], cost["high"]) == pytest.approx(wanted, abs=1e-3)
+    assert dequantize(cost["values"], cost["low"], cost["high"]) == pytest.approx(wanted, abs=1e-3)
     assert cost["last"] == run.history.mean_distance[-1]
 
 
@@ -126,7 +126,7 @@ def test_a_run_without_goals_cost_or_path() -> None:
     data = embed_run(ReplayRun(ends, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["count"] == 2 and not data["path"]
     assert data["cost"]["count"] > 20  # of the cost there is more
-    assert np.abs(places_of(data, record) - record.positions[[0, -1]]).max() < 1e-3
+    assert np.abs(read_points(data, record) - record.positions[[0, -1]]).max() < 1e-3
 
 
 def test_missing_goals_are_embedded_as_missing() -> None:
@@ -134,12 +134,12 @@ def test_missing_goals_are_embedded_as_missing() -> None:
     record.goals[:10] = np.nan
     run = ReplayRun(record, None, "x")
     data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
-    gone = np.isnan(places_of(data, record, "goals")).all(axis=(1, 2))
+    gone = np.isnan(read_points(data, record, "goals")).all(axis=(1, 2))
     assert gone.tolist() == [k < 10 for k in range(data["count"])]
 
 
 def test_lifetimes_of_robots_are_embedded() -> None:
-    run = run_of()
+    run = build_replay_run()
     assert "lives" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     bad = Conditions(failures=((2, 2.0), (4, 5.0)), joins=((3, 1.5), (4, 3.0)))
     record = replace(run.record, conditions=bad)
@@ -193,14 +193,14 @@ def test_tiny_maps_are_rounded_less() -> None:
 
 
 def test_runs_of_one_map_share_it() -> None:
-    runs = [run_of(), run_of(seed=1), run_of(environment=HALL)]
+    runs = [build_replay_run(), build_replay_run(seed=1), build_replay_run(environment=HALL)]
     data = embed_replay(runs, [STYLE] * 3, [0, 2])
     assert [each["map"] for each in data["runs"]] == [0, 0, 1]
     assert data["panes"] == [0, 2] and len(data["maps"]) == 2 and data["rate"] == MAX_RATE_HZ
 
 
 def test_large_runs_are_thinned() -> None:
-    runs = [run_of(60.0) for _ in range(4)]
+    runs = [build_replay_run(60.0) for _ in range(4)]
     sizes = []
     for budget in (1_000_000, 60_000, 20_000, 4_000, 500):
         data = embed_replay(runs, [STYLE] * 4, [0], budget)
@@ -217,13 +217,13 @@ def test_no_name_ends_its_script_element() -> None:
 
 
 def test_headings_of_unicycles_are_embedded() -> None:
-    run = run_of()
+    run = build_replay_run()
     assert "headings" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     count, n = run.record.positions.shape[:2]
     angles = np.linspace(0.0, 3.0, count)[:, None] + np.arange(n)
     turning = Team.homogeneous(n, kinematics="unicycle")
     record = replace(run.record, team=turning, steering=np.stack([angles, 0.0 * angles], axis=2))
     data = embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)
-    x, y = read_back(data["headings"], -1.0, 1.0).reshape(data["count"], -1, 2).transpose(2, 0, 1)
+    x, y = dequantize(data["headings"], -1.0, 1.0).reshape(data["count"], -1, 2).transpose(2, 0, 1)
     off = np.angle(np.exp(1j * (np.arctan2(y, x)[[0, -1]] - angles[[0, -1]])))
     assert np.abs(off).max() < 1e-3

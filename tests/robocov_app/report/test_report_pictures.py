@@ -17,11 +17,11 @@ from robocov.environment import CircleObstacle, ObstaclePath
 from robocov_app.report.pictures import MAX_ROBOTS, PictureFrame, _format_path, draw_map, draw_run
 
 
-def drawn(svg: str) -> ElementTree.Element:
+def parse_svg(svg: str) -> ElementTree.Element:
     return ElementTree.fromstring(svg)
 
 
-def of_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+def find_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
     return [each for each in root if name in each.get("class", "").split()]
 
 
@@ -40,26 +40,26 @@ def test_failed_robots_are_crossed_out_and_absent_ones_not_drawn() -> None:
     record = build_record(robots=5)
     bad = Conditions(failures=((2, 2.0),), joins=((4, 3.0), (5, 99.0)))
     picture = draw_run(replace(record, conditions=bad), None, has_numbers=True)
-    root = drawn(picture)
+    root = parse_svg(picture)
     assert [each.text for each in root.iter() if each.tag.endswith("text")] == ["1", "3", "4"]
-    assert len(of_class(root, "robot")) == 3
-    assert [each.tag.rpartition("}")[2] for each in of_class(root, "failed")] == ["circle", "path"]
-    assert len(of_class(root, "start")) == 4
+    assert len(find_class(root, "robot")) == 3
+    assert [each.tag.rpartition("}")[2] for each in find_class(root, "failed")] == ["circle", "path"]
+    assert len(find_class(root, "start")) == 4
     assert "Robot 2 fails at 2.0 s, robot 4 joins at 3.0 s." in picture
     assert "fails" not in draw_run(record, None)
 
 
 def test_robots_are_drawn_at_their_final_positions() -> None:
     record = build_record(robots=5)
-    root = drawn(draw_run(record, build_history(record, 2.0), 400, 300, has_numbers=True))
+    root = parse_svg(draw_run(record, build_history(record, 2.0), 400, 300, has_numbers=True))
     frame = PictureFrame(ROOMS, 400, 300)
-    places = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "robot")])
+    places = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in find_class(root, "robot")])
     assert places == pytest.approx(frame.to_pixels(record.positions[-1]), abs=0.06)
-    starts = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "start")])
+    starts = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in find_class(root, "start")])
     assert starts == pytest.approx(frame.to_pixels(record.positions[0]), abs=0.06)
     assert [each.text for each in root if each.tag == "text"] == ["1", "2", "3", "4", "5"]
-    assert len(of_class(root, "cell")) == 5
-    assert of_class(root, "way")[0].get("d").count("M") == 5
+    assert len(find_class(root, "cell")) == 5
+    assert find_class(root, "way")[0].get("d").count("M") == 5
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
@@ -69,29 +69,29 @@ def test_a_map_fits_into_its_picture(environment, room) -> None:
     points = frame.to_pixels(environment.region.vertices)
     assert (points >= 2.9).all() and (points <= np.array([frame.width, frame.height]) - 2.9).all()
     assert frame.width == pytest.approx(room[0], abs=0.1) or frame.height == pytest.approx(room[1], abs=0.1)
-    root = drawn(draw_map(environment, *room))
+    root = parse_svg(draw_map(environment, *room))
     assert root.get("viewBox") == f"0 0 {frame.width:g} {frame.height:g}"
-    assert of_class(root, "blocked") and of_class(root, "region")
+    assert find_class(root, "blocked") and find_class(root, "region")
 
 
 def test_every_picture_has_a_description() -> None:
     record = build_record()
-    said = drawn(draw_run(record, build_history(record, 2.345))).get("aria-label")
+    said = parse_svg(draw_run(record, build_history(record, 2.345))).get("aria-label")
     assert said == (
         "RAPF on map rooms: trajectories of 4 robots from start spread over 6 s. "
         "The mean distance to the nearest robot falls from 6.000 m to 2.345 m."
     )
-    assert "cost" not in drawn(draw_run(record, None)).get("aria-label")
-    assert drawn(draw_map(HALL)).get("aria-label") == (
+    assert "cost" not in parse_svg(draw_run(record, None)).get("aria-label")
+    assert parse_svg(draw_map(HALL)).get("aria-label") == (
         "Map hall: 14 m by 11 m without obstacles, 98 m² free, 22 % of the known region blocked."
     )
-    hidden = drawn(draw_run(record, None, is_hidden=True))
+    hidden = parse_svg(draw_run(record, None, is_hidden=True))
     assert hidden.get("aria-hidden") == "true" and hidden.get("aria-label") is None
 
 
 def test_names_are_escaped() -> None:
     record = build_record(replace(ROOMS, name=HOSTILE), label=HOSTILE)
-    root = drawn(draw_run(record, None))  # is XML in spite of them
+    root = parse_svg(draw_run(record, None))  # is XML in spite of them
     assert HOSTILE in root.get("aria-label")
     assert not [each for each in root.iter() if each.tag in ("img", "script")]
 
@@ -100,15 +100,15 @@ def test_a_record_without_a_path_has_no_lines() -> None:
     record = build_record()
     names = ("time", "positions", "goals")
     ends = replace(record, **{name: getattr(record, name)[[0, -1]] for name in names})
-    root = drawn(draw_run(ends, None))
-    assert not of_class(root, "way") and of_class(root, "robot")
+    root = parse_svg(draw_run(ends, None))
+    assert not find_class(root, "way") and find_class(root, "robot")
 
 
 def test_a_very_large_team_makes_no_very_large_picture() -> None:
     record = build_record(robots=MAX_ROBOTS + 1, hz=2.0)
-    root = drawn(draw_run(record, None))
-    assert not of_class(root, "cell") and not of_class(root, "way")
-    assert len(of_class(root, "robot")) == MAX_ROBOTS + 1
+    root = parse_svg(draw_run(record, None))
+    assert not find_class(root, "cell") and not find_class(root, "way")
+    assert len(find_class(root, "robot")) == MAX_ROBOTS + 1
 
 
 def test_moving_obstacles_are_drawn_apart():

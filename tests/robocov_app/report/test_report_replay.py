@@ -18,7 +18,7 @@ from robocov_app.report.replay import (
 )
 
 
-def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
+def build_replay_runs(count: int = 2, name: str = "run") -> list[ReplayRun]:
     records = [
         build_record(seed=seed, controller=("rapf", "rpf", "lloyd")[seed % 3]) for seed in range(count)
     ]
@@ -28,18 +28,18 @@ def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
     ]
 
 
-def data_of(html: str) -> dict:
+def read_replay_data(html: str) -> dict:
     return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
 
 
 def test_a_fragment_brings_all_that_it_needs() -> None:
-    html = build_replay_html(runs_of())
+    html = build_replay_html(build_replay_runs())
     page = Page(html)
     assert [attributes for name, attributes in page.elements if "id" in attributes] == []
     assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
     assert len(page.all("style")) == 1 and len(page.all("script")) == 2
     assert not page.all("html")
-    data = data_of(html)
+    data = read_replay_data(html)
     assert [run["title"] for run in data["runs"]] == ["run 0", "run 1"]
     assert [run["style"] for run in data["runs"]] == ["rapf", "rpf"]
 
@@ -47,13 +47,14 @@ def test_a_fragment_brings_all_that_it_needs() -> None:
 def test_runs_of_one_controller_with_other_gains_look_different() -> None:
     runs = [ReplayRun(build_record(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
     looks = [
-        (run["style"], run["mark"], tuple(run["dashes"])) for run in data_of(build_replay_html(runs))["runs"]
+        (run["style"], run["mark"], tuple(run["dashes"]))
+        for run in read_replay_data(build_replay_html(runs))["runs"]
     ]
     assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
 
 
 def test_without_scripts_pictures_with_descriptions_are_shown() -> None:
-    page = Page(build_replay_element(runs_of(6)))
+    page = Page(build_replay_element(build_replay_runs(6)))
     pictures = page.all("svg")
     assert len(pictures) == MAX_PANES
     assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)
@@ -65,7 +66,7 @@ def test_no_name_leaves_its_element() -> None:
     html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
     assert len(page.all("script")) == 2 and not page.all("img")
-    data = data_of(html)
+    data = read_replay_data(html)
     assert (
         data["runs"][0]["title"]
         == data["runs"][0]["facts"]
@@ -75,12 +76,12 @@ def test_no_name_leaves_its_element() -> None:
 
 
 def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
-    assert data_of(build_replay_html(runs_of(6)))["panes"] == [0, 1, 2, 3]
-    assert data_of(build_replay_element(runs_of(6), [5, 2]))["panes"] == [5, 2]
+    assert read_replay_data(build_replay_html(build_replay_runs(6)))["panes"] == [0, 1, 2, 3]
+    assert read_replay_data(build_replay_element(build_replay_runs(6), [5, 2]))["panes"] == [5, 2]
 
 
 def test_the_same_runs_give_the_same_bytes() -> None:
-    assert build_replay_html(runs_of()) == build_replay_html(runs_of())
+    assert build_replay_html(build_replay_runs()) == build_replay_html(build_replay_runs())
 
 
 def test_style_and_script_do_not_affect_the_page() -> None:
@@ -88,7 +89,7 @@ def test_style_and_script_do_not_affect_the_page() -> None:
     for selector in re.findall(r"([^{}]+)\{", re.sub(r"@[^{]+\{", "", css)):
         for part in re.sub(r":is\([^)]*\)", "", selector).split(","):
             assert part.strip().startswith((".robocov-replay", ".robocov-picture")), part
-    html = build_replay_html(runs_of(1))
+    html = build_replay_html(build_replay_runs(1))
     script = html[html.rindex("<script>") : html.rindex("</script>")]
     assert script.startswith('<script>(() => {\n"use strict";') and script.rstrip().endswith("})();")
     assert "window." not in read_replay_js().replace("window.devicePixelRatio", "").replace(

@@ -12,14 +12,14 @@ from robocov_app.report.theme_css import build_theme_rules, format_variables, li
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
 
-def declared(css: str) -> dict[str, str]:
+def parse_declarations(css: str) -> dict[str, str]:
     return dict(re.findall(r"--rc-([\w-]+):(#[0-9a-f]{6});", css))
 
 
 def test_both_themes_have_the_same_names() -> None:
     assert list(list_css_colors(LIGHT)) == list(list_css_colors(DARK))
-    assert declared(format_variables(DARK)).keys() == list_css_colors(DARK).keys()
-    assert declared(format_variables(DARK))["ink"] == format_hex_color(DARK.ink)
+    assert parse_declarations(format_variables(DARK)).keys() == list_css_colors(DARK).keys()
+    assert parse_declarations(format_variables(DARK))["ink"] == format_hex_color(DARK.ink)
     assert parse_hex_color(format_hex_color((1, 171, 255))[1:]) == (1, 171, 255)
 
 
@@ -48,8 +48,8 @@ def test_texts_on_colors_are_legible(theme) -> None:
 def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:
     css = build_theme_rules(":root", "dark")
     screen, _, paper = css.partition("@media print")
-    assert declared(screen)["background"] == format_hex_color(DARK.background)
-    assert declared(paper)["background"] == format_hex_color(LIGHT.background)
+    assert parse_declarations(screen)["background"] == format_hex_color(DARK.background)
+    assert parse_declarations(paper)["background"] == format_hex_color(LIGHT.background)
     assert "prefers-color-scheme" not in css
 
 
