@@ -23,11 +23,11 @@ from robocov_app.editor.model.validation import Problem, find_problems
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 
-def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> tuple[Problem, ...]:
+def list_problems(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> tuple[Problem, ...]:
     return find_problems(sketch, radius)[0]
 
 
-def renumbered(sketch: Sketch) -> Sketch:
+def renumber(sketch: Sketch) -> Sketch:
     """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
     items = tuple(replace(item, key=key) for key, item in enumerate(sketch.obstacles))
     return replace(sketch, obstacles=items)
@@ -57,7 +57,7 @@ def shapes(points=places, sizes=_sizes):
 
 
 @st.composite
-def sound_shapes(draw):
+def valid_shapes(draw):
     """Obstacles that break no rule; they may overlap and stick out."""
     x, y = draw(places)
     size = draw(st.integers(2, 30)) / 10
@@ -110,9 +110,9 @@ backgrounds = st.builds(
 
 
 @st.composite
-def drafts(draw, of_shapes=None):
+def drafts(draw, shape_strategy=None):
     """Sketches of all kinds, many of them broken."""
-    held = draw(st.lists(shapes() if of_shapes is None else of_shapes, max_size=5))
+    held = draw(st.lists(shapes() if shape_strategy is None else shape_strategy, max_size=5))
     notes = draw(st.lists(st.sampled_from(["", "", "ask Ada", "2 m high"]), min_size=5, max_size=5))
     return Sketch(
         name=draw(st.sampled_from(["Hall", "", "Büro 1"])),
@@ -129,9 +129,9 @@ def drafts(draw, of_shapes=None):
 
 
 @st.composite
-def sound_sketches(draw, least=0, most=5):
+def valid_sketches(draw, least=0, most=5):
     """Sketches whose parts are sound, in a hall; starts may still be blocked."""
-    held = draw(st.lists(sound_shapes(), min_size=least, max_size=most))
+    held = draw(st.lists(valid_shapes(), min_size=least, max_size=most))
     return Sketch(
         name="Hall",
         boundary=HALL,

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from drawn_sketches import HALL, sound_sketches
+from drawn_sketches import HALL, valid_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,18 +11,18 @@ from robocov_app.editor.model.selection import Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 
-def box(x, y, width, height):
+def build_box(x, y, width, height):
     return PolygonObstacle(((x, y), (x + width, y), (x + width, y + height), (x, y + height)))
 
 
 @pytest.fixture
 def sketch() -> Sketch:
-    shapes = [box(1.0, 1.0, 2.0, 1.0), CircleObstacle((5.0, 4.0), 0.5), box(8.0, 2.0, 1.0, 4.0)]
+    shapes = [build_box(1.0, 1.0, 2.0, 1.0), CircleObstacle((5.0, 4.0), 0.5), build_box(8.0, 2.0, 1.0, 4.0)]
     starts = (("disc", DiscStart((10.0, 7.0), 0.5)), ("all", UniformStart()))
     return Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0]
 
 
-def boxes(sketch, owners):
+def list_bounds(sketch, owners):
     return np.array([compute_bounds(sketch, Selection.of(owner)) for owner in owners])
 
 
@@ -36,13 +36,13 @@ LEVELS = {
 }
 
 
-@given(sound_sketches(least=2), st.sampled_from(SIDES), st.booleans())
+@given(valid_sketches(least=2), st.sampled_from(SIDES), st.booleans())
 def test_aligned_objects_are_level_and_move_along_one_axis(sketch, side, to_boundary):
     keys = [item.key for item in sketch.obstacles]
-    before = boxes(sketch, keys)
+    before = list_bounds(sketch, keys)
     selection = Selection.of(*keys, BOUNDARY) if to_boundary else Selection.of(*keys)
     change = align(sketch, selection, side)
-    after = boxes(change.sketch, keys)
+    after = list_bounds(change.sketch, keys)
     levels = LEVELS[side](after)
     frame = np.array([*before[:, :2].min(axis=0), *before[:, 2:].max(axis=0)])
     if to_boundary:
@@ -53,13 +53,13 @@ def test_aligned_objects_are_level_and_move_along_one_axis(sketch, side, to_boun
     np.testing.assert_allclose(after[:, 2:] - after[:, :2], before[:, 2:] - before[:, :2], atol=2.1e-4)
 
 
-@given(sound_sketches(least=3), st.sampled_from(["x", "y"]))
+@given(valid_sketches(least=3), st.sampled_from(["x", "y"]))
 def test_gaps_become_equal(sketch, axis):
     keys = [item.key for item in sketch.obstacles]
     a = ("x", "y").index(axis)
-    before = boxes(sketch, keys)
+    before = list_bounds(sketch, keys)
     order = sorted(range(len(keys)), key=lambda k: (before[k, a], before[k, a + 2]))
-    after = boxes(distribute(sketch, Selection.of(*keys), axis).sketch, keys)[order]
+    after = list_bounds(distribute(sketch, Selection.of(*keys), axis).sketch, keys)[order]
     gaps = after[1:, a] - after[:-1, a + 2]
     np.testing.assert_allclose(gaps, gaps.mean(), atol=4e-4)
     np.testing.assert_allclose(after[0], before[order[0]])
@@ -108,6 +108,6 @@ def test_impossible_arrangements_raise_a_map_error(sketch, deed, words):
 
 
 def test_aligning_with_a_boundary_requires_one(sketch):
-    without, keys = Sketch().with_obstacles([box(0.0, 0.0, 1.0, 1.0)])
+    without, keys = Sketch().with_obstacles([build_box(0.0, 0.0, 1.0, 1.0)])
     with pytest.raises(MapError, match="no boundary"):
         align(without, Selection.of(*keys, BOUNDARY), "left")

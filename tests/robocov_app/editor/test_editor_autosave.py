@@ -21,23 +21,23 @@ from robocov_app.storage.autosave import Autosaver, remove_draft
 SKETCH = Sketch("Hall", boundary=HALL)
 
 
-def with_circles(count: int) -> Sketch:
+def draw_circles(count: int) -> Sketch:
     return SKETCH.with_obstacles([CircleObstacle((k + 1.0, 1.0), 0.3) for k in range(count)])[0]
 
 
-def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
-    keeper = Autosaver(folder, KIND, path)
-    keeper.save_draft(lambda: build_draft_content(sketch, disk))
-    keeper.close(discard=False)
+def leave_draft(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
+    autosaver = Autosaver(folder, KIND, path)
+    autosaver.save_draft(lambda: build_draft_content(sketch, disk))
+    autosaver.close(discard=False)
 
 
 def test_a_draft_is_recovered_with_the_path_of_its_file(tmp_path):
     path = tmp_path / "hall.json"
     disk = write_sketch(SKETCH, path)
-    kept(tmp_path / "drafts", with_circles(5), path, disk)
+    leave_draft(tmp_path / "drafts", draw_circles(5), path, disk)
     (found,) = find_recoverable(tmp_path / "drafts")
     assert (found.path, found.name, found.obstacles, found.version) == (path, "Hall", 5, disk)
-    assert found.read_sketch() == with_circles(5)
+    assert found.read_sketch() == draw_circles(5)
     assert found.describe().startswith("“Hall”, 5 obstacles, today ")
     assert found.describe().endswith("not saved to hall.json")
     assert check_file(found.version) == "same"
@@ -45,15 +45,15 @@ def test_a_draft_is_recovered_with_the_path_of_its_file(tmp_path):
 
 def test_a_draft_with_the_content_of_its_file_is_not_offered(tmp_path):
     path = tmp_path / "hall.json"
-    disk = write_sketch(with_circles(3), path)
-    kept(tmp_path / "drafts", with_circles(3), path, disk)
+    disk = write_sketch(draw_circles(3), path)
+    leave_draft(tmp_path / "drafts", draw_circles(3), path, disk)
     assert find_recoverable(tmp_path / "drafts") == ()
-    write_sketch(with_circles(4), path, disk)
+    write_sketch(draw_circles(4), path, disk)
     assert len(find_recoverable(tmp_path / "drafts")) == 1
 
 
 def test_a_draft_that_has_been_removed_raises_an_error(tmp_path):
-    kept(tmp_path, SKETCH)
+    leave_draft(tmp_path, SKETCH)
     (found,) = find_recoverable(tmp_path)
     assert found.describe().endswith("never saved")
     remove_draft(found.folder)
@@ -62,7 +62,7 @@ def test_a_draft_that_has_been_removed_raises_an_error(tmp_path):
 
 
 def test_drafts_that_are_not_maps_or_have_invalid_versions_are_left_alone(tmp_path):
-    kept(tmp_path, SKETCH)
+    leave_draft(tmp_path, SKETCH)
     (file,) = tmp_path.glob("*/draft.json")
     held = json.loads(file.read_text())
     for wrong in ({"sketch": []}, {"path": "x", "disk": 1}, {"path": "x", "disk": {"stamp": [1]}}):
@@ -100,8 +100,8 @@ def test_changes_during_a_trial_are_in_the_draft(ends, tmp_path):
             driver.window.close()
         assert driver.editor.document.flush()
         (file,) = drafts.glob("*/draft.json")
-        kept = json.loads(file.read_text())["sketch"]["obstacles"]
-        assert len(kept) == before + 1
+        leave_draft = json.loads(file.read_text())["sketch"]["obstacles"]
+        assert len(leave_draft) == before + 1
         if ends == "killed":
             driver.press_key("f5")
             assert driver.shapes[-1] == circle

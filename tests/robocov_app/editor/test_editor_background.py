@@ -18,8 +18,8 @@ from robocov_app.toolkit.tools.geometry import compute_cos_sin
 PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
 
 
-def pixel_at(background: Background, place):
-    dx, dy = place[0] - background.corner[0], place[1] - background.corner[1]
+def find_pixel(background: Background, position):
+    dx, dy = position[0] - background.corner[0], position[1] - background.corner[1]
     cos, sin = compute_cos_sin(background.turn)
     x, y = cos * dx + sin * dy, cos * dy - sin * dx
     return x / background.scale, background.pixels[1] - y / background.scale
@@ -27,9 +27,9 @@ def pixel_at(background: Background, place):
 
 @given(backgrounds, st.floats(-100, 5000), st.floats(-100, 5000))
 def test_pixels_and_positions_correspond(background, x, y):
-    place = background.to_world((x, y))
-    size = max(1.0, *map(abs, background.corner), *map(abs, place)) / background.scale
-    assert pixel_at(background, place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
+    position = background.to_world((x, y))
+    size = max(1.0, *map(abs, background.corner), *map(abs, position)) / background.scale
+    assert find_pixel(background, position) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
 
 
 def test_pixels_count_downwards_from_the_upper_left_corner():
@@ -85,7 +85,8 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 def test_scaling_gives_two_points_the_given_distance(background, offset, meters):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world((offset[0] + 5, offset[1]))
-    pixel_a, pixel_b = pixel_at(background, a), pixel_at(background, b)
+    pixel_a = find_pixel(background, a)
+    pixel_b = find_pixel(background, b)
     scaled = scale_to_length(background, a, b, meters)
     assert math.dist(scaled.to_world(pixel_a), scaled.to_world(pixel_b)) == pytest.approx(meters)
     assert scaled.to_world(pixel_a) == pytest.approx(a, abs=1e-6)
@@ -108,10 +109,11 @@ def test_levelling_makes_two_points_level_or_upright(background, offset):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world(offset)
     level = level_background(background, a, b)
-    there, end = level.to_world((0, 0)), level.to_world(offset)
-    assert there == pytest.approx(a, abs=1e-6)
+    start = level.to_world((0, 0))
+    end = level.to_world(offset)
+    assert start == pytest.approx(a, abs=1e-6)
     assert min(abs(end[0] - a[0]), abs(end[1] - a[1])) < 1e-6
-    assert math.dist(there, end) == pytest.approx(math.dist(a, b))
+    assert math.dist(start, end) == pytest.approx(math.dist(a, b))
     assert abs(math.remainder(level.turn - background.turn, 360.0)) <= 45.0 + 1e-6
     assert -180.0 <= level.turn <= 180.0
     with pytest.raises(MapError, match="farther apart"):

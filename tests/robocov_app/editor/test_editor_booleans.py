@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, problems, sound_shapes, sound_sketches
+from drawn_sketches import HALL, list_problems, valid_shapes, valid_sketches
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -15,11 +15,11 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 
 
-def covered(sketch: Sketch) -> shapely.Geometry:
+def unite_shapes(sketch: Sketch) -> shapely.Geometry:
     return shapely.union_all([item.shape.polygon for item in sketch.obstacles])
 
 
-def box(x, y, width, height):
+def build_box(x, y, width, height):
     return PolygonObstacle(((x, y), (x + width, y), (x + width, y + height), (x, y + height)))
 
 
@@ -31,13 +31,14 @@ WANTED = {
 
 @settings(max_examples=150)
 @given(
-    st.lists(sound_shapes(), min_size=2, max_size=4),
+    st.lists(valid_shapes(), min_size=2, max_size=4),
     st.sampled_from(["unite", "subtract", "intersect", "divide"]),
 )
 def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, name):
     sketch, keys = Sketch("n", boundary=HALL).with_obstacles(shapes)
     raw = [shape.polygon for shape in shapes]
-    first, others = raw[0], shapely.union_all(raw[1:])
+    first = raw[0]
+    others = shapely.union_all(raw[1:])
     wanted = {
         "unite": shapely.union_all(raw),
         "subtract": first - others,
@@ -63,7 +64,9 @@ def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, nam
         for ring in (shape.vertices, *shape.holes):
             assert ring[0] != ring[-1]
             assert all(value == round(value, 4) for point in ring for value in point)
-    assert not [problem for problem in problems(change.sketch) if problem.is_error and problem.owner in keys]
+    assert not [
+        problem for problem in list_problems(change.sketch) if problem.is_error and problem.owner in keys
+    ]
     # by places: in as many of the shapes as it takes, but for a hair's breadth at the edges
     rng = np.random.default_rng(0)
     low_x, low_y, high_x, high_y = shapely.union_all(raw).bounds
@@ -77,7 +80,7 @@ def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, nam
         "intersect": inside.all(axis=0),
         "divide": inside[0],
     }[name]
-    np.testing.assert_array_equal(shapely.contains(covered(change.sketch), points), expected)
+    np.testing.assert_array_equal(shapely.contains(unite_shapes(change.sketch), points), expected)
 
 
 def test_booleans_preserve_holes():
@@ -86,16 +89,18 @@ def test_booleans_preserve_holes():
         (((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)),),
         "f",
     )
-    sketch, (a, b) = Sketch(boundary=HALL).with_obstacles([frame, box(4.5, 2.5, 2.0, 1.0)])
+    sketch, (a, b) = Sketch(boundary=HALL).with_obstacles([frame, build_box(4.5, 2.5, 2.0, 1.0)])
     change = boolean.unite(sketch, Selection.of(a, b))
     (item,) = change.sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(12.0 + 1.5)
     assert change.description == "2 obstacles united"
-    cut = boolean.subtract(change.sketch.with_obstacles([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
+    cut = boolean.subtract(
+        change.sketch.with_obstacles([build_box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1)
+    )
     assert cut.selection
     # from a plate, a smaller one cuts a hole
-    sketch, keys = Sketch().with_obstacles([box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
+    sketch, keys = Sketch().with_obstacles([build_box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
     (item,) = boolean.subtract(sketch, Selection.of(*keys)).sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(16.0 - np.pi, abs=5e-3)
@@ -105,9 +110,9 @@ def test_the_result_replaces_the_lowest_obstacle():
     sketch = Sketch(
         obstacles=(
             Item(5, CircleObstacle((9.0, 9.0), 0.5, "other")),
-            Item(3, replace(box(0.0, 0.0, 3.0, 1.0), name="desk"), "oak"),
+            Item(3, replace(build_box(0.0, 0.0, 3.0, 1.0), name="desk"), "oak"),
             Item(9, CircleObstacle((9.0, 1.0), 0.5, "another")),
-            Item(4, replace(box(1.0, -1.0, 1.0, 3.0), name="knife")),
+            Item(4, replace(build_box(1.0, -1.0, 1.0, 3.0), name="knife")),
         )
     )
     change = boolean.subtract(sketch, Selection.of(4, 3))
@@ -124,11 +129,27 @@ def test_the_result_replaces_the_lowest_obstacle():
 @pytest.mark.parametrize(
     ("name", "shapes", "words"),
     [
-        ("unite", [box(0.0, 0.0, 1.0, 1.0)], "select two or more obstacles to unite"),
-        ("intersect", [box(0.0, 0.0, 1.0, 1.0), box(2.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
-        ("intersect", [box(0.0, 0.0, 1.0, 1.0), box(1.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
-        ("subtract", [box(0.2, 0.2, 0.5, 0.5), box(0.0, 0.0, 1.0, 1.0)], "nothing is left of polygon"),
-        ("unite", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
+        ("unite", [build_box(0.0, 0.0, 1.0, 1.0)], "select two or more obstacles to unite"),
+        (
+            "intersect",
+            [build_box(0.0, 0.0, 1.0, 1.0), build_box(2.0, 0.0, 1.0, 1.0)],
+            "they have nothing in common",
+        ),
+        (
+            "intersect",
+            [build_box(0.0, 0.0, 1.0, 1.0), build_box(1.0, 0.0, 1.0, 1.0)],
+            "they have nothing in common",
+        ),
+        (
+            "subtract",
+            [build_box(0.2, 0.2, 0.5, 0.5), build_box(0.0, 0.0, 1.0, 1.0)],
+            "nothing is left of polygon",
+        ),
+        (
+            "unite",
+            [build_box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)],
+            "the wall covers nothing",
+        ),
     ],
 )
 def test_impossible_booleans_raise_a_map_error(name, shapes, words):
@@ -137,7 +158,7 @@ def test_impossible_booleans_raise_a_map_error(name, shapes, words):
         getattr(boolean, name)(sketch, Selection.of(*keys))
 
 
-@given(sound_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
+@given(valid_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
 def test_an_offset_has_the_given_distance(shape, by):
     sketch, (key,) = Sketch().with_obstacles([shape])
     before = shape.polygon
@@ -148,7 +169,7 @@ def test_an_offset_has_the_given_distance(shape, by):
         assert by < 0
         assert before.buffer(by).area < 0.01
         return
-    after = covered(change.sketch)
+    after = unite_shapes(change.sketch)
     if by > 0:
         assert after.buffer(2e-3).covers(before.buffer(by * 0.99))
         # sharp corners are cut off half as far again, which leaves two farther out; holes may close
@@ -188,7 +209,7 @@ def test_crossing_outlines_are_repaired():
     )
     change = boolean.repair_outlines(sketch, Selection())
     assert change.description == "2 outlines repaired"
-    assert not [problem for problem in problems(change.sketch) if problem.is_error]
+    assert not [problem for problem in list_problems(change.sketch) if problem.is_error]
     assert sum(item.geometry.area for item in change.sketch.obstacles[:2]) == pytest.approx(2.0)
     assert change.sketch.obstacles[-1] is sketch.obstacles[-1]
     assert change.selection.boundary
@@ -199,13 +220,13 @@ def test_crossing_outlines_are_repaired():
     assert only.sketch.boundary == sketch.boundary
 
 
-@given(sound_sketches(least=1))
+@given(valid_sketches(least=1))
 def test_walls_and_circles_become_polygons_of_the_same_area(sketch):
     keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
     assume(keys)
     change = properties.convert_to_polygons(sketch, Selection.of(*keys))
     assert all(isinstance(item.shape, PolygonObstacle) for item in change.sketch.obstacles)
-    difference = covered(change.sketch) ^ covered(sketch)
+    difference = unite_shapes(change.sketch) ^ unite_shapes(sketch)
     assert difference.area <= 1e-4 * sum(item.geometry.length for item in sketch.obstacles)
 
 

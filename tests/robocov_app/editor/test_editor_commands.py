@@ -211,7 +211,7 @@ def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "bounds"),
     [
         ("move 1 0.5", (2, 1.5, 5, 4.5)),
         ("place 0 0", (0, 0, 3, 3)),
@@ -224,11 +224,11 @@ def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
     ],
 )
 def test_typed_commands_change_the_selection(
-    driver: EditorDriver, text: str, wanted: tuple[float, ...]
+    driver: EditorDriver, text: str, bounds: tuple[float, ...]
 ) -> None:
     driver.select(0)
     driver.run_command(text)
-    assert driver.sketch.get_item(0).geometry.bounds == pytest.approx(wanted)
+    assert driver.sketch.get_item(0).geometry.bounds == pytest.approx(bounds)
 
 
 def test_typed_commands_name_note_array_and_set(driver: EditorDriver) -> None:
@@ -258,7 +258,7 @@ def test_commands_that_take_a_value_are_found_by_typing(driver: EditorDriver) ->
     assert {command.name for command in list_typed_commands(driver.editor)} == set(TYPED_COMMANDS)
 
 
-def palette(driver: EditorDriver) -> Choice:
+def open_palette(driver: EditorDriver) -> Choice:
     asked = driver.editor.dialogs.current
     assert isinstance(asked, Choice)
     return asked
@@ -269,7 +269,7 @@ def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -
         driver.press_key("ctrl+k")
         driver.type("array")
         driver.press_key("return")
-        assert palette(driver).text == "array "
+        assert open_palette(driver).text == "array "
 
 
 def test_a_problem_is_fixed_by_the_button_next_to_it(driver: EditorDriver) -> None:
@@ -287,4 +287,4 @@ def test_a_problem_is_fixed_by_the_button_next_to_it(driver: EditorDriver) -> No
 def test_a_refused_command_stays_for_correction(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
         driver.run_command("grid 99999")
-        assert "99999" in palette(driver).error and palette(driver).text == "grid 99999"
+        assert "99999" in open_palette(driver).error and open_palette(driver).text == "grid 99999"

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from density_cases import KINDS
-from drawn_sketches import problems
+from drawn_sketches import list_problems
 from driven_editor import open_editor, sheet
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,7 +25,7 @@ RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
 
 
-def heavy(density=ONE) -> Sketch:
+def build_dense_map(density=ONE) -> Sketch:
     return Sketch.from_environment(Environment("heavy", RING, density=density))
 
 
@@ -70,9 +70,9 @@ def test_an_invalid_density_is_reported_with_its_path():
 def test_a_density_of_zero_in_the_free_space_is_a_problem():
     nothing = WeightedPolygons(KINDS["rooms"].areas[1:], 0.0)
     covering = sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
-    grave = [problem.message for problem in problems(covering) if problem.is_error]
+    grave = [problem.message for problem in list_problems(covering) if problem.is_error]
     assert grave and "at least one weight above 0" in grave[0]
-    assert not [problem for problem in problems(heavy()) if problem.is_error]
+    assert not [problem for problem in list_problems(build_dense_map()) if problem.is_error]
 
 
 class TestEdits:
@@ -81,16 +81,19 @@ class TestEdits:
         assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
         two = density_edits.add_peak(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
         assert len(density_edits.list_features(two)) == 2
-        assert density_edits.add_peak(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
+        assert (
+            density_edits.add_peak(build_dense_map(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor
+            == 3.0
+        )
 
     def test_removing_the_last_hot_spot_removes_the_density(self):
-        assert density_edits.remove_feature(heavy(), 0).sketch.density is None
-        assert density_edits.remove_density(heavy()).sketch.density is None
+        assert density_edits.remove_feature(build_dense_map(), 0).sketch.density is None
+        assert density_edits.remove_density(build_dense_map()).sketch.density is None
         with pytest.raises(MapError, match="the same weight already"):
             density_edits.remove_density(sheet())
 
     def test_hot_spots_are_moved_resized_and_weighted(self):
-        moved = density_edits.move_feature(heavy(), 0, 1.0, 2.0).sketch
+        moved = density_edits.move_feature(build_dense_map(), 0, 1.0, 2.0).sketch
         assert density_edits.list_features(moved)[0].center == (4.0, 5.0)
         sized = density_edits.resize_peak(moved, 0, 2.5).sketch
         assert density_edits.list_features(sized)[0].sigma == 2.5
@@ -100,28 +103,37 @@ class TestEdits:
 
     def test_an_elliptic_hot_spot_keeps_its_shape(self):
         slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
-        sketch = heavy(Gaussians((slanted,), 0.5))
+        sketch = build_dense_map(Gaussians((slanted,), 0.5))
         spread = density_edits.compute_spread(slanted)
         twice = density_edits.list_features(density_edits.resize_peak(sketch, 0, 2.0 * spread).sketch)[0]
         assert density_edits.compute_spread(twice) == pytest.approx(2.0 * spread)
         assert np.array(twice.matrix) == pytest.approx(4.0 * np.array(slanted.matrix))
 
     @pytest.mark.parametrize(
-        ("act", "words"),
+        ("edit", "message"),
         [
-            (lambda: density_edits.add_peak(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
-            (lambda: density_edits.add_peak(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: expected .*, got 0"),
-            (lambda: density_edits.add_peak(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
-            (lambda: density_edits.set_weight(heavy(), 0, float("nan")), "weight: expected .*, got nan"),
-            (lambda: density_edits.set_weight(heavy(), 0, 1e9), "weight: expected .*, got 1e"),
-            (lambda: density_edits.move_feature(heavy(), 5, 1.0, 1.0), "hot spot no longer exists"),
+            (lambda: density_edits.add_peak(build_dense_map(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
+            (
+                lambda: density_edits.add_peak(build_dense_map(), (1.0, 1.0), 1.0, 0.0),
+                "weight: expected .*, got 0",
+            ),
+            (lambda: density_edits.add_peak(build_dense_map(), (1e9, 1.0), 1.0, 1.0), "too far away"),
+            (
+                lambda: density_edits.set_weight(build_dense_map(), 0, float("nan")),
+                "weight: expected .*, got nan",
+            ),
+            (lambda: density_edits.set_weight(build_dense_map(), 0, 1e9), "weight: expected .*, got 1e"),
+            (lambda: density_edits.move_feature(build_dense_map(), 5, 1.0, 1.0), "hot spot no longer exists"),
             (lambda: density_edits.set_floor(sheet(), 0.0), "weight: expected .*, got 0"),
-            (lambda: density_edits.add_peak(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
+            (
+                lambda: density_edits.add_peak(build_dense_map(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0),
+                "is a polygons",
+            ),
         ],
     )
-    def test_impossible_edits_raise_a_map_error(self, act, words):
-        with pytest.raises(MapError, match=words):
-            act()
+    def test_impossible_edits_raise_a_map_error(self, edit, message):
+        with pytest.raises(MapError, match=message):
+            edit()
 
     @given(
         center=st.tuples(st.floats(0.5, 9.5), st.floats(0.5, 9.5)),
@@ -130,7 +142,7 @@ class TestEdits:
     )
     @settings(max_examples=15, deadline=None)
     def test_any_drawn_density_can_be_saved(self, center, sigma, weight):
-        sketch = density_edits.add_peak(heavy(), center, sigma, weight).sketch
+        sketch = density_edits.add_peak(build_dense_map(), center, sigma, weight).sketch
         assert parse_sketch(dump_sketch(sketch), "again").density == sketch.density
         assert sketch.build_environment().density == sketch.density
 
@@ -226,22 +238,22 @@ class TestAreas:
             density_edits.convert_polygons(sketch, Selection.of(keys[1]), 5.0)
 
     @pytest.mark.parametrize(
-        ("act", "words"),
+        ("edit", "message"),
         [
             (lambda s: density_edits.add_area(s, WeightedArea(AREA[:2], 1.0)), "three corners"),
             (
                 lambda s: density_edits.add_area(s, WeightedArea((*AREA[:2], AREA[3], AREA[2]), 1.0)),
                 "crossings",
             ),
-            (lambda s: density_edits.add_area(heavy(), WeightedArea(AREA, 1.0)), "is a gaussians"),
+            (lambda s: density_edits.add_area(build_dense_map(), WeightedArea(AREA, 1.0)), "is a gaussians"),
             (lambda s: density_edits.move_corner(s, 0, 9, (0.0, 0.0)), "corner no longer exists"),
             (lambda s: density_edits.resize_peak(s, 0, 1.0), "hot spot no longer exists"),
             (lambda s: density_edits.set_weight(density_edits.set_floor(s, 0.0).sketch, 0, 0.0), "above 0"),
         ],
     )
-    def test_impossible_edits_raise_a_map_error(self, act, words):
-        with pytest.raises(MapError, match=words):
-            act(density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch)
+    def test_impossible_edits_raise_a_map_error(self, edit, message):
+        with pytest.raises(MapError, match=message):
+            edit(density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch)
 
     def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
         sketch = Sketch.from_environment(load_map("hospital"))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, anywhere, drafts, floats, json_values, renumbered, shapes, sound_sketches
+from drawn_sketches import HALL, anywhere, drafts, floats, json_values, renumber, shapes, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +34,7 @@ EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 
 
 @settings(max_examples=150)
-@given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), sound_sketches()))
+@given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), valid_sketches()))
 def test_a_sketch_survives_its_document(sketch):
     document = to_document(sketch)
     again = build_sketch(json.loads(json.dumps(document)), "again")
@@ -45,7 +45,7 @@ def test_a_sketch_survives_its_document(sketch):
 
 
 @settings(max_examples=60)
-@given(st.one_of(drafts(), sound_sketches()))
+@given(st.one_of(drafts(), valid_sketches()))
 def test_a_sketch_survives_its_text(sketch):
     text = dump_sketch(sketch)
     assert parse_sketch(text.encode(), "again") == sketch
@@ -62,7 +62,7 @@ def test_bundled_maps_are_unchanged(name):
     assert dump_sketch(sketch) == dump_map(environment)
 
 
-@given(sound_sketches())
+@given(valid_sketches())
 def test_a_sketch_runs_like_its_saved_map(sketch):
     try:
         environment = sketch.build_environment("here")
@@ -80,7 +80,7 @@ def test_keys_are_not_in_the_file():
     )
     again = build_sketch(to_document(sketch))
     assert [item.key for item in again.obstacles] == [0, 1]
-    assert again == renumbered(sketch)
+    assert again == renumber(sketch)
 
 
 def test_a_draft_may_contain_numbers_that_no_map_can_have():
@@ -94,7 +94,7 @@ def test_a_draft_may_contain_numbers_that_no_map_can_have():
 
 
 @pytest.mark.parametrize(
-    ("document", "words"),
+    ("document", "message"),
     [
         ([], "expected a JSON object with a map"),
         ({"format": "geojson"}, 'format: expected "robocov-map", got "geojson"'),
@@ -119,8 +119,8 @@ def test_a_draft_may_contain_numbers_that_no_map_can_have():
         ({**EMPTY, "boundary": [[0, float("nan")]]}, "finite"),
     ],
 )
-def test_invalid_documents_are_reported_with_the_path(document, words):
-    with pytest.raises(MapError, match=words) as caught:
+def test_invalid_documents_are_reported_with_the_path(document, message):
+    with pytest.raises(MapError, match=message) as caught:
         build_sketch(document, "mine.json")
     assert str(caught.value).startswith("mine.json: ")
     assert "\n" not in str(caught.value)
@@ -146,7 +146,7 @@ def test_a_header_is_a_draft():
 @settings(max_examples=60)
 @given(st.data())
 def test_moving_a_vertex_changes_one_line(data):
-    sketch = data.draw(sound_sketches(least=1))
+    sketch = data.draw(valid_sketches(least=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
     vertex, _ = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))
@@ -167,7 +167,7 @@ def test_numbers_are_written_without_rounding_errors():
 # notes and what else lies in the free keys
 
 
-def noted() -> Sketch:
+def build_annotated_sketch() -> Sketch:
     items = (
         Item(0, CircleObstacle((1.0, 1.0), 0.5, "pillar"), "ask Ada"),
         Item(1, CircleObstacle((3.0, 1.0), 0.5)),
@@ -177,17 +177,17 @@ def noted() -> Sketch:
 
 
 def test_notes_are_in_the_free_keys_of_a_valid_map():
-    environment = noted().build_environment()
+    environment = build_annotated_sketch().build_environment()
     assert environment.extra["editor"]["notes"] == [
         {"obstacle": 0, "name": "pillar", "note": "ask Ada"},
         {"obstacle": 2, "note": "no name"},
     ]
     assert environment.extra["editor"]["background"]["path"] == "plan.png"
-    assert Sketch.from_environment(environment) == noted()
+    assert Sketch.from_environment(environment) == build_annotated_sketch()
 
 
 def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
-    document = to_document(noted())
+    document = to_document(build_annotated_sketch())
     first, second, third = document["obstacles"]
     document["obstacles"] = [second, third, first]
     notes = [item.note for item in build_sketch(document).obstacles]
@@ -218,7 +218,9 @@ def test_free_keys_of_other_programs_are_unchanged(foreign):
     sketch = build_sketch(document)
     assert sketch.extra == {"editor": foreign, "mine": 1}
     assert to_document(sketch)["extra"] == document["extra"]
-    ours = replace(sketch, obstacles=noted().obstacles, background=noted().background)
+    ours = replace(
+        sketch, obstacles=build_annotated_sketch().obstacles, background=build_annotated_sketch().background
+    )
     again = build_sketch(json.loads(json.dumps(to_document(ours))))
     assert again == ours
     assert again.extra == sketch.extra

@@ -17,7 +17,7 @@ from robocov_app.editor.model.selection import Selection
 PILLAR = CircleObstacle((5, 5), 1.0)
 
 
-def changed(document: Document, radius: float = 1.0) -> None:
+def add_circle(document: Document, radius: float = 1.0) -> None:
     document.history.apply(create.add_circle(document.history.sketch, (5, 5), radius))
     document.update_draft()
 
@@ -33,7 +33,7 @@ def test_a_new_document_has_a_boundary_and_no_changes(tmp_path: Path) -> None:
 
 def test_a_saved_document_can_be_opened(tmp_path: Path) -> None:
     document = Document.new(None)
-    changed(document)
+    add_circle(document)
     assert document.history.has_unsaved_changes
     words = document.save(tmp_path / "plan")
     assert words == f"saved: {tmp_path / 'plan.json'}" and not document.history.has_unsaved_changes
@@ -74,12 +74,12 @@ def test_another_file_is_not_replaced_without_permission(tmp_path: Path) -> None
 
 def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_path: Path) -> None:
     document = Document.new(None)
-    changed(document)
+    add_circle(document)
     document.save(tmp_path / "plan.json")
     mine = document.history.sketch
     assert document.check_disk(10.0) == "same"
     other = Document.new(None)
-    changed(other, 2.0)
+    add_circle(other, 2.0)
     other.save(tmp_path / "other.json")
     rewrite_file(tmp_path / "plan.json", (tmp_path / "other.json").read_text())
     assert document.check_disk(10.5) == "same"  # not asked that often
@@ -98,7 +98,7 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
 
 def test_ignoring_a_change_lets_saving_replace_the_file(tmp_path: Path) -> None:
     document = Document.new(None)
-    changed(document)
+    add_circle(document)
     document.save(tmp_path / "plan.json")
     rewrite_file(tmp_path / "plan.json", "{}")
     assert document.check_disk(10.0) == "changed"
@@ -119,7 +119,7 @@ def test_a_removed_file_is_noticed(tmp_path: Path) -> None:
 def test_a_draft_is_recovered_and_removed_by_saving(tmp_path: Path) -> None:
     drafts = tmp_path / "drafts"
     document = Document(sheet(), drafts)
-    changed(document)
+    add_circle(document)
     document.flush()
     assert find_recoverable(drafts) == ()  # its editor lives
     document.close(discard=False)
@@ -144,8 +144,8 @@ def test_an_unwritable_folder_is_reported(tmp_path: Path) -> None:
 
 def test_naming_a_map_on_saving_preserves_redo(tmp_path):
     document = Document.new(None)
-    changed(document)
-    changed(document, 2.0)
+    add_circle(document)
+    add_circle(document, 2.0)
     document.history.undo()
     document.save(tmp_path / "plan.json")
     assert document.history.sketch.name == "plan" and not document.history.has_unsaved_changes

@@ -9,7 +9,7 @@ from pathlib import Path
 import pygame
 import pytest
 from called import complaint
-from drawn_sketches import renumbered
+from drawn_sketches import renumber
 from driven_editor import EditorDriver, open_editor, rewrite_file, sheet
 from PIL import Image
 
@@ -37,13 +37,13 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
         yield driver
 
 
-def asked(driver: EditorDriver) -> str:
+def get_dialog_title(driver: EditorDriver) -> str:
     return driver.editor.dialogs.current.title if driver.editor.dialogs.current is not None else ""
 
 
 def test_saving_asks_for_a_name_once(driver: EditorDriver, tmp_path: Path) -> None:
     driver.press_key("ctrl+s")
-    assert asked(driver) == "Save as" and driver.editor.dialogs.current.text == "untitled.json"
+    assert get_dialog_title(driver) == "Save as" and driver.editor.dialogs.current.text == "untitled.json"
     driver.press_key("ctrl+a")
     driver.type("plan")
     driver.press_key("return")
@@ -60,7 +60,7 @@ def test_another_file_is_replaced_only_after_confirmation(driver: EditorDriver, 
     driver.press_key("ctrl+a")
     driver.type("mine.json")
     driver.press_key("return")
-    assert asked(driver) == "Replace the file?"
+    assert get_dialog_title(driver) == "Replace the file?"
     driver.press_key("escape")
     assert (tmp_path / "mine.json").read_text() == "{}"
     driver.press_key("ctrl+shift+s")
@@ -77,7 +77,7 @@ def test_an_invalid_map_is_saved_as_a_draft(driver: EditorDriver, tmp_path: Path
     driver.press_key("ctrl+s")
     driver.press_key("return")
     assert "as a draft" in driver.message
-    assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumbered(driver.sketch)
+    assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumber(driver.sketch)
 
 
 def test_a_missing_folder_is_reported_and_nothing_is_lost(driver: EditorDriver) -> None:
@@ -92,14 +92,14 @@ def test_a_missing_folder_is_reported_and_nothing_is_lost(driver: EditorDriver) 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(driver: EditorDriver, tmp_path: Path) -> None:
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+n")
-    assert asked(driver) == "Save the changes?"
+    assert get_dialog_title(driver) == "Save the changes?"
     driver.press_key("escape")
     assert len(driver.shapes) == 2
     driver.post(pygame.QUIT)
     driver.settle()
-    assert asked(driver) == "Save the changes?" and not driver.window.closed
+    assert get_dialog_title(driver) == "Save the changes?" and not driver.window.closed
     driver.press_key("s")
-    assert asked(driver) == "Save as"
+    assert get_dialog_title(driver) == "Save as"
     driver.press_key("return")
     assert driver.window.closed and (tmp_path / "untitled.json").exists()
 
@@ -156,7 +156,7 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_p
     rewrite_file(path, json.dumps(document))
     driver.window.run_frame(2.0)
     driver.window.run_frame(2.0)
-    assert asked(driver) == "The file has changed"
+    assert get_dialog_title(driver) == "The file has changed"
     driver.press_key("r")
     assert driver.shapes == [] and not driver.editor.document.history.has_unsaved_changes
     driver.press_key("ctrl+z")
@@ -203,7 +203,9 @@ def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDrive
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+e")
     driver.press_key("return")
-    assert asked(driver) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
+    assert (
+        get_dialog_title(driver) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
+    )
     driver.press_key("r")
     assert (tmp_path / "untitled.svg").read_text() != first
     driver.press_key("ctrl+e")
@@ -228,46 +230,48 @@ def test_a_map_is_never_saved_under_another_formats_suffix(driver: EditorDriver,
 
 
 @pytest.fixture
-def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "settings"))
     monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     return tmp_path
 
 
-def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractContextManager[EditorWindow]:
+def open_launched_editor(
+    folder: Path, path: Path | None = None, **more: object
+) -> AbstractContextManager[EditorWindow]:
     return EditorLauncher(path, folder, size=(900, 600), scale=1.0, **more).window()
 
 
-def test_settings_are_remembered(places: Path) -> None:
-    with opening(places) as window:
+def test_settings_are_remembered(folders: Path) -> None:
+    with open_launched_editor(folders) as window:
         window.editor.theme = "dark"
         window.editor.attempt(lambda: run_typed_command(window.editor, "0.25", "grid"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
-        window.documents.remember(places / "x.json")
+        window.documents.remember(folders / "x.json")
         window.documents.may_close = True
-    with opening(places) as window:
+    with open_launched_editor(folders) as window:
         editor = window.editor
         assert (editor.theme, editor.grid, window.panel.tab) == ("dark", 0.25, "snap")
-        assert "edges" not in editor.snaps and editor.recent == [str(places / "x.json")]
+        assert "edges" not in editor.snaps and editor.recent == [str(folders / "x.json")]
 
 
-def test_options_are_not_saved_as_settings(places: Path) -> None:
-    with opening(places, theme="dark") as window:
+def test_options_are_not_saved_as_settings(folders: Path) -> None:
+    with open_launched_editor(folders, theme="dark") as window:
         assert window.editor.theme == "dark"
         window.documents.may_close = True
-    with opening(places) as window:
+    with open_launched_editor(folders) as window:
         assert window.editor.theme == "light"
         window.documents.may_close = True
 
 
-def test_a_picture_given_as_an_option_is_shown(places: Path) -> None:
-    Image.new("RGB", (40, 30)).save(places / "plan.png")
-    with opening(places) as window:
+def test_a_picture_given_as_an_option_is_shown(folders: Path) -> None:
+    Image.new("RGB", (40, 30)).save(folders / "plan.png")
+    with open_launched_editor(folders) as window:
         window.editor.shown.discard("picture")
         window.documents.may_close = True
-    with opening(places, background=places / "plan.png") as window:
+    with open_launched_editor(folders, background=folders / "plan.png") as window:
         assert "picture" in window.editor.shown and window.editor.sketch.background is not None
 
 
@@ -279,67 +283,68 @@ def test_recent_files_are_found_from_every_folder(
     assert driver.editor.recent == [str(tmp_path / "x.json")]
 
 
-def test_abandoned_drafts_are_offered_and_recovered(places: Path) -> None:
-    lost = Document(sheet(), places / "drafts")
+def test_abandoned_drafts_are_offered_and_recovered(folders: Path) -> None:
+    lost = Document(sheet(), folders / "drafts")
     lost.history.apply(create.add_circle(lost.history.sketch, (5, 5), 1.0))
     lost.update_draft()
     lost.flush()
     lost.close(discard=False)
-    with opening(places) as window:
-        asked = window.editor.dialogs.current
-        assert isinstance(asked, Question) and "Recover" in asked.title
+    with open_launched_editor(folders) as window:
+        get_dialog_title = window.editor.dialogs.current
+        assert isinstance(get_dialog_title, Question) and "Recover" in get_dialog_title.title
         EditorDriver(window).press_key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.has_unsaved_changes
     # the window went without a decision: it is offered again
-    with opening(places) as window:
+    with open_launched_editor(folders) as window:
         assert window.editor.dialogs.current is not None
         EditorDriver(window).press_key("l")
-        offer_recovery(window, find_recoverable(places / "drafts"))
+        offer_recovery(window, find_recoverable(folders / "drafts"))
         EditorDriver(window).press_key("d")
         window.documents.may_close = True
-    assert find_recoverable(places / "drafts") == ()
+    assert find_recoverable(folders / "drafts") == ()
 
 
-def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -> None:
-    document = Document.new(places / "drafts")
-    document.save(places / "plan.json")
+def test_a_file_that_another_editor_has_open_is_not_opened_twice(folders: Path) -> None:
+    document = Document.new(folders / "drafts")
+    document.save(folders / "plan.json")
     document.flush()
     with (
         pytest.raises(InputError, match="another editor has it open"),
-        opening(places, places / "plan.json"),
+        open_launched_editor(folders, folders / "plan.json"),
     ):
         pass
-    with opening(places) as window:
-        window.editor.attempt(lambda: window.documents.open(places / "plan.json"))
+    with open_launched_editor(folders) as window:
+        window.editor.attempt(lambda: window.documents.open(folders / "plan.json"))
         assert window.editor.has_error_message and "another editor" in window.editor.message
         window.documents.may_close = True
     document.close(discard=True)
 
 
-def test_a_new_name_is_a_new_map(places: Path) -> None:
-    with opening(places, places / "fresh.json") as window:
+def test_a_new_name_is_a_new_map(folders: Path) -> None:
+    with open_launched_editor(folders, folders / "fresh.json") as window:
         assert (
             window.editor.document.title == "fresh.json"
             and not window.editor.document.history.has_unsaved_changes
         )
         window.editor.attempt(window.documents.save)
         window.documents.may_close = True
-    assert load_map(places / "fresh.json").area == 100.0
+    assert load_map(folders / "fresh.json").area == 100.0
 
 
-def test_screenshots_need_no_display(places: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Image.new("RGB", (60, 40), (200, 0, 0)).save(places / "plan.png")
-    target = places / "shot.png"
+def test_screenshots_need_no_display(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Image.new("RGB", (60, 40), (200, 0, 0)).save(folders / "plan.png")
+    target = folders / "shot.png"
     words = ["edit", "rooms", "--screenshot", str(target), "--size", "900x600", "--scale", "1"]
     assert (
-        main([*words, "--page", "problems", "--theme", "dark", "--background", str(places / "plan.png")]) == 0
+        main([*words, "--page", "problems", "--theme", "dark", "--background", str(folders / "plan.png")])
+        == 0
     )
     assert capsys.readouterr().out == f"saved {target}\n"
     with Image.open(target) as picture:
         assert picture.size == (900, 600)
 
 
-def test_a_missing_display_is_reported_in_one_line(places: Path, monkeypatch, capsys) -> None:
+def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, capsys) -> None:
     for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     line = complaint(capsys, "edit", "rooms")
@@ -347,7 +352,7 @@ def test_a_missing_display_is_reported_in_one_line(places: Path, monkeypatch, ca
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("words", "message"),
     [
         (["roms"], "did you mean 'rooms'"),
         (["nothing.dxf"], "no such file"),
@@ -357,28 +362,28 @@ def test_a_missing_display_is_reported_in_one_line(places: Path, monkeypatch, ca
     ],
 )
 def test_invalid_options_are_reported_in_one_line(
-    places: Path, capsys, words: list[str], wanted: str
+    folders: Path, capsys, words: list[str], message: str
 ) -> None:
-    assert wanted in complaint(capsys, "edit", *words)
+    assert message in complaint(capsys, "edit", *words)
 
 
-def test_a_broken_file_is_reported_before_a_window_opens(places: Path, capsys) -> None:
-    (places / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
-    assert "boundery" in complaint(capsys, "edit", str(places / "bad.json"))
-    (places / "draft.json").write_text(
+def test_a_broken_file_is_reported_before_a_window_opens(folders: Path, capsys) -> None:
+    (folders / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
+    assert "boundery" in complaint(capsys, "edit", str(folders / "bad.json"))
+    (folders / "draft.json").write_text(
         json.dumps({"format": "robocov-map", "version": 1, "name": "d", "boundary": [[0, 0], [1, 1]]})
     )
-    target = places / "shot.png"
-    assert main(["edit", str(places / "draft.json"), "--screenshot", str(target)]) == 0
+    target = folders / "shot.png"
+    assert main(["edit", str(folders / "draft.json"), "--screenshot", str(target)]) == 0
 
 
-def test_a_map_of_another_format_opens_the_import_dialog(places: Path) -> None:
+def test_a_map_of_another_format_opens_the_import_dialog(folders: Path) -> None:
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
-    (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
-    with opening(places, places / "flat.json") as window:
-        asked = window.editor.dialogs.current
-        assert isinstance(asked, ImportDialog) and asked.path.name == "flat.json"
-        asked.accepted = True
+    (folders / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
+    with open_launched_editor(folders, folders / "flat.json") as window:
+        get_dialog_title = window.editor.dialogs.current
+        assert isinstance(get_dialog_title, ImportDialog) and get_dialog_title.path.name == "flat.json"
+        get_dialog_title.accepted = True
         end = time.monotonic() + 60.0
         while window.editor.dialogs.current is not None and time.monotonic() < end:
             window.run_frame(0.01)
@@ -387,10 +392,10 @@ def test_a_map_of_another_format_opens_the_import_dialog(places: Path) -> None:
         window.documents.may_close = True
 
 
-def test_an_unsupported_file_is_reported_by_its_format(places: Path) -> None:
-    (places / "plan.shp").write_bytes(b"\0\0'\x0a" + bytes(96))
-    wanted = pytest.raises(MapError, match="a shapefile, which cannot be imported: ogr2ogr")
-    with wanted, opening(places, places / "plan.shp"):
+def test_an_unsupported_file_is_reported_by_its_format(folders: Path) -> None:
+    (folders / "plan.shp").write_bytes(b"\0\0'\x0a" + bytes(96))
+    message = pytest.raises(MapError, match="a shapefile, which cannot be imported: ogr2ogr")
+    with message, open_launched_editor(folders, folders / "plan.shp"):
         pass
 
 

@@ -3,7 +3,7 @@ import stat
 import sys
 
 import pytest
-from drawn_sketches import HALL, drafts, renumbered
+from drawn_sketches import HALL, drafts, renumber
 from hypothesis import HealthCheck, given, settings
 
 from robocov.environment import CircleObstacle
@@ -66,13 +66,14 @@ def test_changes_on_disk_are_noticed(tmp_path):
 def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     path = tmp_path / "map.json"
     write_sketch(SKETCH, path)
-    (first, disk_of_first), (second, disk_of_second) = read_sketch(path), read_sketch(path)
+    (first, disk_of_first) = read_sketch(path)
+    (second, disk_of_second) = read_sketch(path)
     one, _ = first.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
     other, _ = second.with_obstacles([CircleObstacle((2.0, 2.0), 0.5)])
     disk_of_first = write_sketch(one, path, disk_of_first)
     with pytest.raises(FileChangedError):
         write_sketch(other, path, disk_of_second)
-    assert read_sketch(path)[0] == renumbered(one)
+    assert read_sketch(path)[0] == renumber(one)
     write_sketch(other, path, disk_of_second, overwrites=True)
     assert check_file(disk_of_first) == "changed"
 

@@ -18,14 +18,16 @@ NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5
 CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
 
 
-def near(picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, int], within: int) -> int:
+def count_pixels(
+    picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, int], distance: int
+) -> int:
     """Return how many pixels around one are of a color."""
     x, y = (round(value) for value in at)
-    part = picture[y - within : y + within + 1, x - within : x + within + 1]
+    part = picture[y - distance : y + distance + 1, x - distance : x + distance + 1]
     return int((np.abs(part - np.array(color)).max(axis=2) < 40).sum())
 
 
-def without_message(driver: EditorDriver) -> np.ndarray:
+def draw_without_message(driver: EditorDriver) -> np.ndarray:
     driver.editor.message = ""
     driver.move(5, 590)
     driver.window.run_frame(0.0)
@@ -39,12 +41,12 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
         measurement = driver.editor.measurement
         assert measurement.gap.width == pytest.approx(0.15) and not measurement.impassable.is_empty
         at = driver.find_pixel((4.975, 5))
-        assert near(without_message(driver), at, red, 6) > 15
+        assert count_pixels(draw_without_message(driver), at, red, 6) > 15
         driver.run_command("radius 0.05")
-        assert near(without_message(driver), at, red, 6) == 0
+        assert count_pixels(draw_without_message(driver), at, red, 6) == 0
         driver.run_command("radius 0.1")
         driver.press_key("alt+1")
-        assert near(without_message(driver), at, red, 6) == 0
+        assert count_pixels(draw_without_message(driver), at, red, 6) == 0
 
 
 def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
@@ -66,7 +68,7 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         spot = problems[0].geometry.representative_point()
         x, y = driver.find_pixel((spot.x, spot.y))
         at = x, y - STEM_PX
-        assert near(without_message(driver), at, LIGHT.trajectory, 6) > 40
+        assert count_pixels(draw_without_message(driver), at, LIGHT.trajectory, 6) > 40
         driver.click(*at)
         assert driver.editor.problem is problems[0] and driver.message == problems[0].message
         driver.open_tab("problems")
@@ -123,10 +125,10 @@ def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) 
         assert any(guide.kind == "angle" for guide in driver.editor.tool.guides)
 
 
-def await_that(driver: EditorDriver, seen: Callable[[], bool]) -> None:
+def wait_until(driver: EditorDriver, condition: Callable[[], bool]) -> None:
     """Let the window run until a thread beside it has done something."""
     end = time.monotonic() + 30.0
-    while not seen():
+    while not condition():
         driver.window.run_frame(0.02)
         time.sleep(0.001)
         assert time.monotonic() < end, "nothing happens"
@@ -135,11 +137,11 @@ def await_that(driver: EditorDriver, seen: Callable[[], bool]) -> None:
 def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> None:
     with open_editor(tmp_path, load_sketch("rooms")) as driver:
         driver.press_key("a")
-        await_that(driver, lambda: driver.window.canvas.team is not None)
+        wait_until(driver, lambda: driver.window.canvas.team is not None)
         team = driver.window.canvas.team
         assert len(team.positions) == 6
         driver.press_key("shift+=")
-        await_that(driver, lambda: driver.window.canvas.team.robots == 7)
+        wait_until(driver, lambda: driver.window.canvas.team.robots == 7)
         assert len(driver.window.canvas.team.positions) == 7
 
 

@@ -15,40 +15,52 @@ BOX = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
 BOW_TIE = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
 
 
-def hall(*shapes, starts=(), **others) -> Sketch:
+def build_hall(*shapes, starts=(), **others) -> Sketch:
     return replace(Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0], **others)
 
 
-def rooms(width: float) -> Sketch:
+def build_rooms(width: float) -> Sketch:
     """Return a hall that two walls part, with a door of a width between them."""
     middle = 4.0
     low = WallObstacle(((6.0, 0.0), (6.0, middle - width / 2)), 0.1)
     high = WallObstacle(((6.0, middle + width / 2), (6.0, 8.0)), 0.1)
-    return hall(low, high)
+    return build_hall(low, high)
 
 
 @pytest.mark.parametrize(
     ("sketch", "kind", "words"),
     [
-        (hall(CircleObstacle((3.0, 3.0), 1.0), boundary=None), "no boundary", "drawn around everything"),
-        (hall(BOW_TIE), "crossing", "1 outline repaired"),
-        (hall(CircleObstacle((20.0, 3.0), 1.0, "lamp")), "outside", "circle “lamp” deleted"),
-        (hall(*[CircleObstacle((5.0, 5.0), 1.0)] * 2), "twice", "circle deleted"),
-        (hall(PolygonObstacle(((1.0, 1.0), *BOX[:1], *BOX))), "double", "polygon 1: vertices merged"),
-        (hall(PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0)),))), "sealed", "filled"),
-        (hall(PolygonObstacle(BOX, (((3.0, 3.0), (3.2, 3.0), (3.2, 3.2)),))), "sealed", "filled"),
-        (rooms(0.3), "narrow", "wall 1 shortened by 0.1 m"),
-        (hall(CircleObstacle((6.0, 2.0), 3.0), CircleObstacle((6.0, 5.6), 0.3)), "narrow", "circle 2 moved"),
-        (rooms(0.3), "cut off", "filled"),
         (
-            hall(PolygonObstacle(BOX), starts=(("a", PointsStart(((2.1, 4.0), (1.0, 4.0)))),)),
+            build_hall(CircleObstacle((3.0, 3.0), 1.0), boundary=None),
+            "no boundary",
+            "drawn around everything",
+        ),
+        (build_hall(BOW_TIE), "crossing", "1 outline repaired"),
+        (build_hall(CircleObstacle((20.0, 3.0), 1.0, "lamp")), "outside", "circle “lamp” deleted"),
+        (build_hall(*[CircleObstacle((5.0, 5.0), 1.0)] * 2), "twice", "circle deleted"),
+        (build_hall(PolygonObstacle(((1.0, 1.0), *BOX[:1], *BOX))), "double", "polygon 1: vertices merged"),
+        (build_hall(PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0)),))), "sealed", "filled"),
+        (build_hall(PolygonObstacle(BOX, (((3.0, 3.0), (3.2, 3.0), (3.2, 3.2)),))), "sealed", "filled"),
+        (build_rooms(0.3), "narrow", "wall 1 shortened by 0.1 m"),
+        (
+            build_hall(CircleObstacle((6.0, 2.0), 3.0), CircleObstacle((6.0, 5.6), 0.3)),
+            "narrow",
+            "circle 2 moved",
+        ),
+        (build_rooms(0.3), "cut off", "filled"),
+        (
+            build_hall(PolygonObstacle(BOX), starts=(("a", PointsStart(((2.1, 4.0), (1.0, 4.0)))),)),
             "spot",
             "start “a”: position 1 moved",
         ),
-        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.1, 1.0)))),)), "spot", "position 2 moved"),
-        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)), "spot", "position 2 moved"),
-        (hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "position 1 moved"),
-        (hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)), "no room", "“a” moved"),
+        (build_hall(starts=(("a", PointsStart(((1.0, 1.0), (1.1, 1.0)))),)), "spot", "position 2 moved"),
+        (build_hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)), "spot", "position 2 moved"),
+        (build_hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "position 1 moved"),
+        (
+            build_hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)),
+            "no room",
+            "“a” moved",
+        ),
     ],
 )
 def test_a_fix_solves_its_problem(sketch, kind, words):
@@ -66,22 +78,22 @@ def test_a_fix_solves_its_problem(sketch, kind, words):
 def test_all_unreachable_areas_are_filled_at_once():
     frame = PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)),))
     fork = ((8.0, 0.0), (8.0, 3.0), (8.2, 3.0), (8.2, 0.2), (8.5, 0.2), (8.5, 3.0), (9.0, 0.0))
-    sketch = hall(frame, PolygonObstacle(fork))
+    sketch = build_hall(frame, PolygonObstacle(fork))
     assert measure(sketch, 0.3).problems
     after = measure(fill_unreachable(sketch, 0.3).sketch, 0.3)
     assert not after.problems and len(after.reached) == 1
     with pytest.raises(MapError, match="nothing to fill"):
-        fill_unreachable(hall(), 0.3)
+        fill_unreachable(build_hall(), 0.3)
     with pytest.raises(MapError, match="fits anywhere"):
-        fill_unreachable(hall(), 5.0)
+        fill_unreachable(build_hall(), 5.0)
 
 
 def test_problems_without_a_fix_give_none():
-    locked = rooms(0.3)
+    locked = build_rooms(0.3)
     locked = replace(locked, obstacles=tuple(replace(item, locked=True) for item in locked.obstacles))
     narrow = next(each for each in measure(locked, 0.2).problems if each.kind == "narrow")
     assert find_fix(locked, narrow, 0.2) is None
-    nameless = hall(name="")
+    nameless = build_hall(name="")
     assert find_fix(nameless, measure(nameless).problems[0], 0.2) is None
-    full = hall(starts=(("a", PointsStart(((-1.0, 4.0),))),))
+    full = build_hall(starts=(("a", PointsStart(((-1.0, 4.0),))),))
     assert find_fix(full, measure(full, 5.0).problems[0], 5.0) is None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from drawn_sketches import renumbered
+from drawn_sketches import renumber
 from driven_editor import EditorDriver, load_sketch, open_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
@@ -17,10 +17,12 @@ from robocov_app.editor.model.sketch import dump_sketch
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS
 
-EVENTS, BATCH, DRAWN = 2_500, 6, 5
+EVENTS_PER_SEED = 2_500
+EVENTS_PER_STEP = 6
+STEPS_PER_FRAME = 5
 """Events of one seed, events between two frames, and frames of which one is drawn."""
 
-MOST = {
+MAX_RUNS = {
     "screenshot": 2,
     "save": 6,
     "save:as": 4,
@@ -62,7 +64,8 @@ class SeldomReadings:
     is_busy = False
 
     def __init__(self) -> None:
-        self._asked, self._count = None, 0
+        self._asked = None
+        self._count = 0
 
     def put(self, question) -> None:
         self._asked = question
@@ -71,8 +74,9 @@ class SeldomReadings:
         self._count += 1
         if self._asked is None or self._count % 40:
             return None
-        asked, self._asked = self._asked, None
-        return measure(*asked)
+        question = self._asked
+        self._asked = None
+        return measure(*question)
 
     def close(self) -> None:
         pass
@@ -82,7 +86,8 @@ class Monkey:
     """Does one random thing after the other."""
 
     def __init__(self, driver: EditorDriver, seed: int) -> None:
-        self.driver, self.random = driver, random.Random(seed)
+        self.driver = driver
+        self.random = random.Random(seed)
         self.done: dict[str, int] = {}
         self.held = 0
 
@@ -98,7 +103,7 @@ class Monkey:
         commands = self.driver.window.commands.commands
         name, key = self.random.choice([(each.name, key) for each in commands for key in each.keys])
         self.done[name] = self.done.get(name, 0) + 1
-        if self.done[name] > MOST.get(name, 10**9):
+        if self.done[name] > MAX_RUNS.get(name, 10**9):
             return
         plus = key == "+" or key.endswith("++")
         *held, last = [*key[:-1].split("+"), "+"] if plus else key.split("+")
@@ -179,22 +184,22 @@ class Monkey:
 @pytest.mark.parametrize("seed", [1])
 @pytest.mark.parametrize("name", SHEETS)
 def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
-    play(name, seed, tmp_path, EVENTS)
+    play(name, seed, tmp_path, EVENTS_PER_SEED)
 
 
 def test_some_random_events_do_no_harm(tmp_path: Path) -> None:
-    play("rooms", 3, tmp_path, EVENTS // 20)
+    play("rooms", 3, tmp_path, EVENTS_PER_SEED // 20)
 
 
 def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
     readings = SeldomReadings()
     with open_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=readings) as driver:
         monkey = Monkey(driver, seed)
-        for step in range(events // BATCH):
-            for _ in range(BATCH):
+        for step in range(events // EVENTS_PER_STEP):
+            for _ in range(EVENTS_PER_STEP):
                 monkey.act()
             window = driver.window
-            if window.trial is not None or step % DRAWN == 0:
+            if window.trial is not None or step % STEPS_PER_FRAME == 0:
                 window.run_frame(1 / 50)
             else:
                 window.advance(1 / 50)
@@ -202,7 +207,7 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
                 window.closed = window.documents.may_close = False
             if step % 50 == 0:
                 sketch = driver.sketch
-                assert parse_sketch(dump_sketch(sketch), "map") == renumbered(sketch)
+                assert parse_sketch(dump_sketch(sketch), "map") == renumber(sketch)
                 assert driver.editor.selection.restrict_to(sketch) == driver.editor.selection
         # and back to the beginning, exactly
         pygame.event.clear()

@@ -1,4 +1,4 @@
-from drawn_sketches import changes, drafts, renumbered, sound_sketches
+from drawn_sketches import changes, drafts, renumber, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,14 +15,14 @@ HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 @settings(max_examples=120)
 @given(st.data())
 def test_undo_is_the_exact_inverse_of_any_change(data):
-    history = UndoHistory(data.draw(st.one_of(sound_sketches(least=2), drafts())))
+    history = UndoHistory(data.draw(st.one_of(valid_sketches(least=2), drafts())))
     was = [(history.sketch, history.selection)]
     for _ in range(data.draw(st.integers(1, 6))):
         change = data.draw(changes(history.sketch))
         if change is not None and history.apply(change):
             was.append((history.sketch, history.selection))
             # whatever an edit makes can be kept, and comes back
-            assert build_sketch(to_document(change.sketch)) == renumbered(change.sketch)
+            assert build_sketch(to_document(change.sketch)) == renumber(change.sketch)
             assert change.selection == change.selection.restrict_to(change.sketch)
             assert len(change.sketch.index_by_key) == len(change.sketch.obstacles)
             assert change.description
@@ -43,7 +43,7 @@ def test_undo_is_the_exact_inverse_of_any_change(data):
 @settings(max_examples=100)
 @given(st.data())
 def test_coordinates_are_rounded_to_a_tenth_of_a_millimeter(data):
-    sketch = data.draw(sound_sketches(least=1))
+    sketch = data.draw(valid_sketches(least=1))
     change = data.draw(changes(sketch))
     document = to_document(change.sketch) if change is not None else {}
 
@@ -61,7 +61,7 @@ def test_coordinates_are_rounded_to_a_tenth_of_a_millimeter(data):
     walk([document.get("boundary", []), document.get("obstacles", []), document.get("starts", {})])
 
 
-def drawn(count: int) -> UndoHistory:
+def draw_circles(count: int) -> UndoHistory:
     history = UndoHistory(Sketch(boundary=HALL))
     for k in range(count):
         history.apply(create.add_circle(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
@@ -69,7 +69,7 @@ def drawn(count: int) -> UndoHistory:
 
 
 def test_a_drag_is_one_step():
-    history = drawn(1)
+    history = draw_circles(1)
     selection = Selection.of(0)
     before = history.sketch
     for k in range(1, 30):
@@ -87,7 +87,7 @@ def test_a_drag_is_one_step():
 
 
 def test_a_drag_that_returns_is_no_step():
-    history = drawn(1)
+    history = draw_circles(1)
     before = history.sketch
     history.mark_saved()
     history.apply(transform.move(before, Selection.of(0), 1.0, 0.0), drag=1)
@@ -99,7 +99,7 @@ def test_a_drag_that_returns_is_no_step():
 
 
 def test_an_edit_without_effect_is_no_step_and_preserves_redo():
-    history = drawn(2)
+    history = draw_circles(2)
     history.undo()
     assert not history.apply(Change(history.sketch, Selection.of(0), "nothing"))
     assert history.redo_descriptions
@@ -109,7 +109,7 @@ def test_an_edit_without_effect_is_no_step_and_preserves_redo():
 
 
 def test_undo_has_no_limit():
-    history = drawn(3000)
+    history = draw_circles(3000)
     first = history.sketch
     count = 0
     while history.undo():
@@ -123,7 +123,7 @@ def test_undo_has_no_limit():
 
 
 def test_unsaved_changes_are_relative_to_the_saved_state():
-    history = drawn(3)
+    history = draw_circles(3)
     assert history.has_unsaved_changes
     history.mark_saved()
     assert not history.has_unsaved_changes
@@ -138,7 +138,7 @@ def test_unsaved_changes_are_relative_to_the_saved_state():
 
 
 def test_undoing_restores_the_selection():
-    history = drawn(2)
+    history = draw_circles(2)
     history.selection = Selection.of(0)
     history.apply(properties.delete(history.sketch, Selection.of(0)))
     assert history.selection == Selection()

@@ -36,57 +36,57 @@ def drawing(tmp_path: Path) -> Path:
     return tmp_path / "plan.svg"
 
 
-def dialog(path: Path, kind: str = "svg") -> ImportDialog:
-    asked = ImportDialog(path, IMPORTERS[kind], DirectWorker(ImportJob()), lambda _: None)
-    asked.poll()
-    return asked
+def build_dialog(path: Path, kind: str = "svg") -> ImportDialog:
+    import_dialog = ImportDialog(path, IMPORTERS[kind], DirectWorker(ImportJob()), lambda _: None)
+    import_dialog.poll()
+    return import_dialog
 
 
-def free_area(asked: ImportDialog) -> float:
-    asked.poll()
-    assert asked.imported is not None and asked.problem == ""
-    return asked.imported.environment.free_area
+def free_area(import_dialog: ImportDialog) -> float:
+    import_dialog.poll()
+    assert import_dialog.imported is not None and import_dialog.problem == ""
+    return import_dialog.imported.environment.free_area
 
 
 def test_clicks_cycle_a_color_through_its_roles(drawing: Path) -> None:
-    asked = dialog(drawing)
-    assert free_area(asked) == pytest.approx(ROOM - 6)
+    import_dialog = build_dialog(drawing)
+    assert free_area(import_dialog) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
-        asked.form.cycle_color((224, 224, 255))
-        assert find_role(asked.form.entries, (224, 224, 255)) == role
-        assert free_area(asked) == pytest.approx(area)
+        import_dialog.form.cycle_color((224, 224, 255))
+        assert find_role(import_dialog.form.entries, (224, 224, 255)) == role
+        assert free_area(import_dialog) == pytest.approx(area)
         # what is left out can still be clicked
-        assert asked.imported is not None and asked.imported.sheet is not None
-        assert asked.imported.sheet.find_color(*RUG) == (224, 224, 255)
-    assert asked.form.entries == {}
+        assert import_dialog.imported is not None and import_dialog.imported.sheet is not None
+        assert import_dialog.imported.sheet.find_color(*RUG) == (224, 224, 255)
+    assert import_dialog.form.entries == {}
 
 
 def test_clicked_colors_are_added_to_typed_ones() -> None:
-    given = {"free_color": "red, lightblue", "cell": "1"}
-    set_role(given, (0, 0, 255), "free")
-    assert given == {"free_color": "red, lightblue, #0000ff", "cell": "1"}
-    set_role(given, (255, 0, 0), "solid")
-    assert given == {"free_color": "lightblue, #0000ff", "solid_color": "#ff0000", "cell": "1"}
-    assert list_declared_colors(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
-    set_role(given, (255, 0, 0), None)
-    assert "solid_color" not in given
+    entries = {"free_color": "red, lightblue", "cell": "1"}
+    set_role(entries, (0, 0, 255), "free")
+    assert entries == {"free_color": "red, lightblue, #0000ff", "cell": "1"}
+    set_role(entries, (255, 0, 0), "solid")
+    assert entries == {"free_color": "lightblue, #0000ff", "solid_color": "#ff0000", "cell": "1"}
+    assert list_declared_colors(entries) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
+    set_role(entries, (255, 0, 0), None)
+    assert "solid_color" not in entries
     # half a name is no color yet
-    given["free_color"] = "lightbl"
-    assert list_declared_colors(given) == []
+    entries["free_color"] = "lightbl"
+    assert list_declared_colors(entries) == []
     assert choose_next_role(choose_next_role(choose_next_role(choose_next_role(None)))) is None
 
 
 def test_a_click_finds_the_topmost_shape(drawing: Path) -> None:
-    found = build_color_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
-    assert found is not None
-    assert found.colors == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
-    assert found.find_color(*RUG) == (224, 224, 255)
-    assert found.find_color(5.0, 5.0) == (0, 0, 0)
-    assert found.find_color(8.0, 1.0) == (200, 200, 200)
-    assert found.find_color(-1.0, 1.0) is None
+    color_sheet = build_color_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
+    assert color_sheet is not None
+    assert color_sheet.colors == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
+    assert color_sheet.find_color(*RUG) == (224, 224, 255)
+    assert color_sheet.find_color(5.0, 5.0) == (0, 0, 0)
+    assert color_sheet.find_color(8.0, 1.0) == (200, 200, 200)
+    assert color_sheet.find_color(-1.0, 1.0) is None
 
 
-def picture(folder: Path) -> Path:
+def save_picture(folder: Path) -> Path:
     """A plan whose edges are soft, with a pale blue rug and a red line."""
     large = Image.new("RGB", (800, 480), "white")
     draw = ImageDraw.Draw(large)
@@ -98,32 +98,36 @@ def picture(folder: Path) -> Path:
 
 
 def test_colors_of_a_picture_ignore_soft_edges(tmp_path: Path) -> None:
-    found = build_color_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
-    assert found is not None
+    color_sheet = build_color_sheet(IMPORTERS["picture"].read(save_picture(tmp_path), ReadOptions(cell=0.1)))
+    assert color_sheet is not None
     names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
-    assert set(found.colors) == names
-    assert found.find_color(5.0, 8.0) == (160, 192, 255)
-    assert found.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
-    assert found.find_color(25.0, 5.0) is None and found.find_color(5.0, -0.01) is None
-    asked = dialog(picture(tmp_path), "picture")
-    asked.form.set("cell", "0.1")
-    split = free_area(asked)
-    asked.form.cycle_color((255, 0, 0))
-    assert find_role(asked.form.entries, (255, 0, 0)) == "free"
-    assert free_area(asked) > split + 50
+    assert set(color_sheet.colors) == names
+    assert color_sheet.find_color(5.0, 8.0) == (160, 192, 255)
+    assert color_sheet.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
+    assert color_sheet.find_color(25.0, 5.0) is None and color_sheet.find_color(5.0, -0.01) is None
+    import_dialog = build_dialog(save_picture(tmp_path), "picture")
+    import_dialog.form.set("cell", "0.1")
+    split = free_area(import_dialog)
+    import_dialog.form.cycle_color((255, 0, 0))
+    assert find_role(import_dialog.form.entries, (255, 0, 0)) == "free"
+    assert free_area(import_dialog) > split + 50
 
 
 def test_a_map_without_colors_has_no_sheet(tmp_path: Path) -> None:
-    foreign = IMPORTERS["svg"].read(dialog_file(tmp_path), ReadOptions())
+    foreign = IMPORTERS["svg"].read(write_drawing(tmp_path), ReadOptions())
     assert build_color_sheet(foreign) is not None
     path = tmp_path / "plan.wkt"
     path.write_text(shapely.box(0, 0, 5, 5).wkt)
-    asked = dialog(path, "wkt")
-    assert free_area(asked) == pytest.approx(25.0)
-    assert asked.imported is not None and asked.imported.sheet is None and asked.sheet is None
+    import_dialog = build_dialog(path, "wkt")
+    assert free_area(import_dialog) == pytest.approx(25.0)
+    assert (
+        import_dialog.imported is not None
+        and import_dialog.imported.sheet is None
+        and import_dialog.sheet is None
+    )
 
 
-def dialog_file(folder: Path) -> Path:
+def write_drawing(folder: Path) -> Path:
     path = folder / "plan.svg"
     path.write_text(SVG)
     return path
@@ -132,7 +136,7 @@ def dialog_file(folder: Path) -> Path:
 @pytest.fixture(params=[("light", (900, 600)), ("dark", (1280, 720))])
 def driver(request: Any, tmp_path: Path) -> Iterator[EditorDriver]:
     theme, size = request.param
-    dialog_file(tmp_path)
+    write_drawing(tmp_path)
     with open_editor(tmp_path, sheet(), theme=theme, size=size) as driver:
         driver.press_key("ctrl+o")
         driver.type("plan.svg")
@@ -141,42 +145,42 @@ def driver(request: Any, tmp_path: Path) -> Iterator[EditorDriver]:
         yield driver
 
 
-def shown(driver: EditorDriver) -> tuple[ImportDialog, Any]:
+def get_dialog(driver: EditorDriver) -> tuple[ImportDialog, Any]:
     driver.run_frames(2)
-    asked = driver.editor.dialogs.current
-    assert isinstance(asked, ImportDialog)
-    return asked, driver.window.dialogs.ui.widgets
+    import_dialog = driver.editor.dialogs.current
+    assert isinstance(import_dialog, ImportDialog)
+    return import_dialog, driver.window.dialogs.ui.widgets
 
 
-def pixel(driver: EditorDriver, point: Any) -> tuple[int, ...]:
+def get_pixel(driver: EditorDriver, point: Any) -> tuple[int, ...]:
     x, y = (round(value) for value in point)
     return tuple(driver.window.screen.get_at((x, y)))[:3]
 
 
 def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDriver) -> None:
-    asked, widgets = shown(driver)
+    import_dialog, widgets = get_dialog(driver)
     driver.click(*widgets["button:clicks:color"].rect.center)
-    asked, widgets = shown(driver)
-    before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.preview.cameras)
-    assert pixel(driver, before) == (224, 224, 255)
-    solid = pixel(driver, after)
+    import_dialog, widgets = get_dialog(driver)
+    before, after = (camera.to_pixels(np.array(RUG)) for camera in import_dialog.preview.cameras)
+    assert get_pixel(driver, before) == (224, 224, 255)
+    solid = get_pixel(driver, after)
     driver.click(*before.tolist())
-    asked, widgets = shown(driver)
-    assert asked.form.entries == {"free_color": "#e0e0ff"}
+    import_dialog, widgets = get_dialog(driver)
+    assert import_dialog.form.entries == {"free_color": "#e0e0ff"}
     # the rows of colors are in sight, and do not move the maps
     chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
-    assert pixel(driver, asked.preview.cameras[1].to_pixels(np.array(RUG))) != solid
+    assert get_pixel(driver, import_dialog.preview.cameras[1].to_pixels(np.array(RUG))) != solid
     # a click into the right map still keeps a part
-    driver.click(*asked.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
-    asked, _ = shown(driver)
-    assert [float(word) for word in asked.form.entries["inside"].split()] == pytest.approx(
+    driver.click(*import_dialog.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
+    import_dialog, _ = get_dialog(driver)
+    assert [float(word) for word in import_dialog.form.entries["inside"].split()] == pytest.approx(
         (8.0, 1.0), abs=0.1
     )
 
 
 def test_colors_can_be_set_by_keyboard(driver: EditorDriver) -> None:
-    shown(driver)
+    get_dialog(driver)
     ui = driver.window.dialogs.ui
     for _ in range(60):
         if ui.focus == "clicks:color":
@@ -192,18 +196,18 @@ def test_colors_can_be_set_by_keyboard(driver: EditorDriver) -> None:
         driver.press_key("tab")
         driver.run_frames(1)
     driver.press_key("space")
-    asked, _ = shown(driver)
-    assert asked.form.entries == {"free_color": "#e0e0ff"}
+    import_dialog, _ = get_dialog(driver)
+    assert import_dialog.form.entries == {"free_color": "#e0e0ff"}
     assert ui.focus is not None and ui.focus == "color:#e0e0ff"
     driver.press_key("space")
-    asked, _ = shown(driver)
-    assert asked.form.entries == {"solid_color": "#e0e0ff"}
+    import_dialog, _ = get_dialog(driver)
+    assert import_dialog.form.entries == {"solid_color": "#e0e0ff"}
 
 
 def test_the_report_is_visible(driver: EditorDriver) -> None:
-    asked, _ = shown(driver)
-    foot = max(camera.view[1] + camera.view[3] for camera in asked.preview.cameras)
-    left = round(asked.preview.cameras[0].view[0])
+    import_dialog, _ = get_dialog(driver)
+    foot = max(camera.view[1] + camera.view[3] for camera in import_dialog.preview.cameras)
+    left = round(import_dialog.preview.cameras[0].view[0])
     lines = np.array(
         [
             [driver.window.screen.get_at((x, y))[:3] for x in range(left, left + 120)]

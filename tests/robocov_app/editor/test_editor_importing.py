@@ -34,15 +34,15 @@ def plan(tmp_path: Path) -> Path:
     return tmp_path / "plan.png"
 
 
-def question(path: Path, worker: Any = None, taken: Any = None) -> ImportDialog:
+def build_dialog(path: Path, worker: Any = None, call: Any = None) -> ImportDialog:
     worker = worker or DirectWorker(ImportJob())
-    return ImportDialog(path, IMPORTERS["picture"], worker, taken)
+    return ImportDialog(path, IMPORTERS["picture"], worker, call)
 
 
-def free(asked: ImportDialog) -> float:
-    asked.poll()
-    assert asked.imported is not None and asked.problem == ""
-    return asked.imported.environment.free_area
+def compute_free_area(dialog: ImportDialog) -> float:
+    dialog.poll()
+    assert dialog.imported is not None and dialog.problem == ""
+    return dialog.imported.environment.free_area
 
 
 @pytest.mark.parametrize("name", IMPORTERS)
@@ -51,71 +51,71 @@ def test_the_dialog_has_the_options_of_the_format(name: str, tmp_path: Path) -> 
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
-    asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
-    assert asked.form.build_settings() == (ReadOptions(), Shaping())
+    dialog = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
+    assert dialog.form.build_settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "position": "1 2", "words": "a, b", "text": "walls"}
     given |= {"colors": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "position": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
     meant |= {"colors": ("red", "#00ff00"), "width": "3px"}
     for option in options:
-        asked.form.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
+        dialog.form.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (
             {"yes": True}.get(option.choices[-1], option.choices[-1])
             if option.choices
             else meant[option.kind]
         )
-        assert getattr(asked.form.build_settings()[option.name in shaping], option.name) == value
+        assert getattr(dialog.form.build_settings()[option.name in shaping], option.name) == value
 
 
 def test_every_change_updates_the_preview(plan: Path) -> None:
-    asked = question(plan)
-    assert "--cell" in asked.problem and not asked.is_ready
-    asked.form.set("cell", "0.1")
-    assert free(asked) == pytest.approx(80 - 1)
-    asked.form.set("invert", "yes")
-    assert free(asked) == pytest.approx(200 - 80 - 56)
-    asked.form.set("invert", "no")
-    asked.form.set("threshold", "0.3")
-    assert free(asked) == pytest.approx(80)
-    asked.form.set("threshold", "0.3x")
-    assert asked.problem == "threshold: expected a number, got '0.3x'"
-    asked.form.set("threshold", "")
-    asked.form.set("keep", "all")
-    assert free(asked) == pytest.approx(80 + 56 - 1)
-    asked.form.keep_inside((15.0, 5.0))
-    assert free(asked) == pytest.approx(56)
-    asked.form.keep_inside((11.5, 5.0))
-    assert "is solid, expected a free position" in asked.problem
-    asked.form.set("inside", "")
-    assert free(asked) == pytest.approx(80 - 1)
-    assert asked.form.entries == {"cell": "0.1"}
+    dialog = build_dialog(plan)
+    assert "--cell" in dialog.problem and not dialog.is_ready
+    dialog.form.set("cell", "0.1")
+    assert compute_free_area(dialog) == pytest.approx(80 - 1)
+    dialog.form.set("invert", "yes")
+    assert compute_free_area(dialog) == pytest.approx(200 - 80 - 56)
+    dialog.form.set("invert", "no")
+    dialog.form.set("threshold", "0.3")
+    assert compute_free_area(dialog) == pytest.approx(80)
+    dialog.form.set("threshold", "0.3x")
+    assert dialog.problem == "threshold: expected a number, got '0.3x'"
+    dialog.form.set("threshold", "")
+    dialog.form.set("keep", "all")
+    assert compute_free_area(dialog) == pytest.approx(80 + 56 - 1)
+    dialog.form.keep_inside((15.0, 5.0))
+    assert compute_free_area(dialog) == pytest.approx(56)
+    dialog.form.keep_inside((11.5, 5.0))
+    assert "is solid, expected a free position" in dialog.problem
+    dialog.form.set("inside", "")
+    assert compute_free_area(dialog) == pytest.approx(80 - 1)
+    assert dialog.form.entries == {"cell": "0.1"}
 
 
-def waited(asked: ImportDialog) -> None:
+def wait_for_import(dialog: ImportDialog) -> None:
     end = time.monotonic() + PATIENCE
-    while asked.is_busy and time.monotonic() < end:
-        asked.poll()
+    while dialog.is_busy and time.monotonic() < end:
+        dialog.poll()
         time.sleep(0.005)
-    assert not asked.is_busy
+    assert not dialog.is_busy
 
 
 @pytest.mark.slow
 def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
     # every older import is given up
     worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportJob", "imports", patience=0.0)
-    asked = question(plan, worker)
+    dialog = build_dialog(plan, worker)
     for text in ("0", "0.", "0.1"):
-        asked.form.set("cell", text)
+        dialog.form.set("cell", text)
     process = worker.process
-    waited(asked)
-    assert free(asked) == pytest.approx(80 - 1)
-    asked.form.keep_inside((15.0, 5.0))
-    asked.accepted = True
-    waited(asked)
-    taken = asked.poll()
-    assert taken is not None and taken.environment.free_area == pytest.approx(56)
+    wait_for_import(dialog)
+    assert compute_free_area(dialog) == pytest.approx(80 - 1)
+    dialog.form.keep_inside((15.0, 5.0))
+    dialog.accepted = True
+    wait_for_import(dialog)
+    call = dialog.poll()
+    assert call is not None and call.environment.free_area == pytest.approx(56)
     assert worker.process is process
-    asked.handle_cancel()
+    dialog.handle_cancel()
     assert process.poll() is not None
 
 
@@ -125,7 +125,7 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
         yield driver
 
 
-def shown(driver: EditorDriver) -> tuple[ImportDialog, Any]:
+def get_dialog(driver: EditorDriver) -> tuple[ImportDialog, Any]:
     """Return the dialog, and its widgets by kind and name."""
     driver.run_frames(2)
     assert isinstance(driver.editor.dialogs.current, ImportDialog)
@@ -137,13 +137,13 @@ def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path
     driver.type("plan.png")
     driver.press_key("return")
     driver.type("0.1")
-    asked, _ = shown(driver)
-    assert asked.form.entries == {"cell": "0.1"}
-    for camera, place in zip(asked.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
+    dialog, _ = get_dialog(driver)
+    assert dialog.form.entries == {"cell": "0.1"}
+    for camera, place in zip(dialog.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
         driver.click(*camera.to_pixels(np.array(place)).tolist())
-        x, y = (float(word) for word in asked.form.entries["inside"].split())
+        x, y = (float(word) for word in dialog.form.entries["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
-    driver.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
+    driver.click(*dialog.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     driver.press_key("return")
     driver.run_frames(2)
     assert driver.editor.dialogs.current is None
@@ -158,24 +158,24 @@ def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path
 
 def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
-    asked, view = shown(driver)
+    dialog, view = get_dialog(driver)
     driver.type("0.1")
     driver.click(*view["menu:invert"].rect.center)
     driver.press_key("down")
     driver.press_key("return")
-    assert asked.form.entries == {"cell": "0.1", "invert": "yes"} and not asked.accepted
-    menu = shown(driver)[1]["menu:unknown"]
+    assert dialog.form.entries == {"cell": "0.1", "invert": "yes"} and not dialog.accepted
+    menu = get_dialog(driver)[1]["menu:unknown"]
     seen = []
     for _ in range(4):
         driver.click(*menu.rect.center)
         driver.press_key("down")
         driver.press_key("return")
-        seen.append(asked.form.entries.get("unknown"))
+        seen.append(dialog.form.entries.get("unknown"))
     assert seen == ["obstacle", "free", "cut", "cut"]
     driver.click(*menu.rect.center)
     driver.press_key("home")
     driver.press_key("return")
-    assert "unknown" not in asked.form.entries, "an option without a default can be left again"
+    assert "unknown" not in dialog.form.entries, "an option without a default can be left again"
     before = driver.sketch
     driver.click(*view["button:cancel"].rect.center)
     assert driver.editor.dialogs.current is None and driver.sketch is before
@@ -183,13 +183,13 @@ def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> N
 
 def test_unusable_settings_are_reported_and_not_accepted(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
-    asked, _ = shown(driver)
+    dialog, _ = get_dialog(driver)
     driver.press_key("return")
     driver.run_frames(2)
-    assert driver.editor.dialogs.current is asked and "--cell" in asked.problem
+    assert driver.editor.dialogs.current is dialog and "--cell" in dialog.problem
     driver.type("0.1")
     driver.run_frames(2)
-    assert driver.editor.dialogs.current is asked, "an old Enter counts no more"
+    assert driver.editor.dialogs.current is dialog, "an old Enter counts no more"
     driver.press_key("escape")
     assert driver.editor.dialogs.current is None
 
@@ -198,19 +198,19 @@ def test_importing_asks_before_closing_the_open_map(driver: EditorDriver, plan: 
     driver.editor.apply(set_title(driver.sketch, "mine"))
     driver.post(pygame.DROPFILE, file=str(plan))
     driver.settle()
-    shown(driver)
+    get_dialog(driver)
     driver.type("0.1")
     driver.press_key("return")
     driver.run_frames(2)
-    asked = driver.editor.dialogs.current
-    assert isinstance(asked, Question) and asked.title == "Save the changes?"
+    dialog = driver.editor.dialogs.current
+    assert isinstance(dialog, Question) and dialog.title == "Save the changes?"
     driver.press_key("escape")
     assert driver.sketch.name == "mine"
 
 
 def test_closing_the_window_closes_the_dialog(driver: EditorDriver, plan: Path) -> None:
     driver.window.documents.open(plan)
-    shown(driver)
+    get_dialog(driver)
     driver.post(pygame.QUIT)
     driver.settle()
     assert driver.editor.dialogs.current is None and driver.window.closed
@@ -221,17 +221,17 @@ def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size
     with open_editor(tmp_path, sheet(), size=size) as driver:
         driver.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
         driver.run_frames(2)
-        asked, view = shown(driver)
+        dialog, view = get_dialog(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button", "area")]
-        assert len(rects) == len(asked.form.options) + 3
+        assert len(rects) == len(dialog.form.options) + 3
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
         driver.press_key("escape")
         driver.window.documents.ask_import(plan, IMPORTERS["picture"])
         driver.type("0.1")
-        asked, view = shown(driver)
+        dialog, view = get_dialog(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]
-        views = [pygame.Rect(camera.view) for camera in asked.preview.cameras]
+        views = [pygame.Rect(camera.view) for camera in dialog.preview.cameras]
         assert not views[0].colliderect(views[1]) and min(min(view.size) for view in views) > 120
         assert all(not view.colliderect(rect) for view in views for rect in rects)
         left, right = (driver.window.screen.subsurface(view).copy() for view in views)

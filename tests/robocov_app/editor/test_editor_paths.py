@@ -23,7 +23,7 @@ MOVING = replace(CART, path=ROUND)
 DESK = PolygonObstacle(((5.0, 7.0), (7.0, 7.0), (7.0, 8.0), (5.0, 8.0)))
 
 
-def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
+def get_path(sketch: Sketch, key: int = 0) -> ObstaclePath:
     path = sketch.get_item(key).shape.path
     assert path is not None
     return path
@@ -35,21 +35,21 @@ def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
 def test_the_first_waypoint_starts_a_path_at_the_center() -> None:
     sketch = sheet(DESK)
     change = paths.add_waypoint(sketch, 0, (1.0, 3.00004), speed=0.3)
-    assert led(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
+    assert get_path(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
     assert change.selection == Selection.of(0)
     # where it is drawn it stays
     assert change.sketch.build_environment().at(0.0).obstacles[0].polygon.equals(DESK.polygon)
     more = paths.add_waypoint(change.sketch, 0, (1.0, 1.0)).sketch
     between = paths.add_waypoint(more, 0, (3.0, 6.0), 1).sketch
-    assert led(between).points == ((6.0, 7.5), (3.0, 6.0), (1.0, 3.0), (1.0, 1.0))
+    assert get_path(between).points == ((6.0, 7.5), (3.0, 6.0), (1.0, 3.0), (1.0, 1.0))
 
 
 def test_waypoints_are_moved_and_removed() -> None:
     sketch = sheet(MOVING)
     moved = paths.move_waypoint(sketch, 0, 1, (7.0, 3.0)).sketch
-    assert led(moved).points[1] == (7.0, 3.0)
+    assert get_path(moved).points[1] == (7.0, 3.0)
     fewer = paths.remove_waypoint(moved, 0, 0).sketch
-    assert led(fewer).points == ((7.0, 3.0), (8.0, 6.0))
+    assert get_path(fewer).points == ((7.0, 3.0), (8.0, 6.0))
     assert paths.remove_waypoint(fewer, 0, 1).sketch.get_item(0).shape.path is None
     with pytest.raises(MapError, match="no longer exists"):
         paths.move_waypoint(sketch, 0, 3, (1.0, 1.0))
@@ -60,12 +60,13 @@ def test_waypoints_are_moved_and_removed() -> None:
 
 
 def test_speed_and_repetition_are_set() -> None:
-    sketch, both = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND)), Selection.of(0, 1, 2)
+    sketch = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND))
+    both = Selection.of(0, 1, 2)
     turned = paths.toggle_repeat(sketch, both).sketch
-    assert [led(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
-    assert led(paths.toggle_repeat(turned, both).sketch).repeat == "loop"
+    assert [get_path(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
+    assert get_path(paths.toggle_repeat(turned, both).sketch).repeat == "loop"
     paced = paths.set_speed(sketch, both, 0.25).sketch
-    assert led(paced, 2).speed == 0.25 and paced.get_item(1).shape.path is None
+    assert get_path(paced, 2).speed == 0.25 and paced.get_item(1).shape.path is None
     gone = paths.remove_path(sketch, both).sketch
     assert paths.list_moving_obstacles(sketch) == (0, 2) and paths.list_moving_obstacles(gone) == ()
     for act in (
@@ -111,11 +112,12 @@ def test_a_path_that_leads_nowhere_is_harmless(points, tmp_path: Path) -> None:
     "shape", [CART, DESK, WallObstacle(((2.0, 2.0), (3.0, 4.0)), 0.2)], ids=["circle", "polygon", "wall"]
 )
 def test_transforms_apply_to_paths(shape) -> None:
-    sketch, one = sheet(replace(shape, path=ROUND)), Selection.of(0)
+    sketch = sheet(replace(shape, path=ROUND))
+    one = Selection.of(0)
     moved = transform.move(sketch, one, 1.0, -0.5).sketch
-    assert led(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
+    assert get_path(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
     turned = transform.rotate(sketch, one, 90.0, (2.0, 2.0)).sketch
-    assert led(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
+    assert get_path(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
     stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).apply(replace(shape, path=ROUND))
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
@@ -129,7 +131,7 @@ def test_a_circle_that_becomes_a_polygon_keeps_its_path() -> None:
 def test_paths_are_saved() -> None:
     sketch = paths.add_waypoint(sheet(DESK), 0, (1.0, 3.0)).sketch
     again = parse_sketch(dump_sketch(sketch), "map")
-    assert led(again) == led(sketch)
+    assert get_path(again) == get_path(sketch)
     assert again.build_environment().has_moving_obstacles
 
 
@@ -146,25 +148,25 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         driver.click_all((2.0, 2.0), (2.1, 2.1))
         assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(driver.sketch) == ()
         driver.click_all((6.0, 2.0), (6.0, 5.0))
-        points = np.array(led(driver.sketch).points)
+        points = np.array(get_path(driver.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
         # a click on a leg puts a waypoint into it
         driver.click_all((4.0, 2.0))
-        assert len(led(driver.sketch).points) == 4
-        np.testing.assert_allclose(led(driver.sketch).points[1], (4.0, 2.0), atol=0.03)
+        assert len(get_path(driver.sketch).points) == 4
+        np.testing.assert_allclose(get_path(driver.sketch).points[1], (4.0, 2.0), atol=0.03)
         driver.wait()
         driver.drag_at((4.0, 2.0), (4.0, 2.5), (4.0, 3.0))
-        np.testing.assert_allclose(led(driver.sketch).points[1], (4.0, 3.0), atol=0.03)
+        np.testing.assert_allclose(get_path(driver.sketch).points[1], (4.0, 3.0), atol=0.03)
         driver.press_key("backspace")
-        np.testing.assert_allclose(led(driver.sketch).points, points, atol=1e-9)
+        np.testing.assert_allclose(get_path(driver.sketch).points, points, atol=1e-9)
         driver.type("0.25")
         driver.press_key("return")
-        assert led(driver.sketch).speed == 0.25
+        assert get_path(driver.sketch).speed == 0.25
         driver.press_key("shift+o")
-        assert led(driver.sketch).repeat == "loop"
+        assert get_path(driver.sketch).repeat == "loop"
         for _ in range(6):
             driver.press_key("ctrl+z")
-        assert len(led(driver.sketch).points) == 2
+        assert len(get_path(driver.sketch).points) == 2
         driver.press_key("ctrl+z")
         assert paths.list_moving_obstacles(driver.sketch) == ()
 
@@ -174,7 +176,7 @@ def test_the_tool_continues_with_another_obstacle(tmp_path: Path) -> None:
         driver.press_key("o")
         driver.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
         assert paths.list_moving_obstacles(driver.sketch) == (0, 1)
-        assert led(driver.sketch) == ROUND
+        assert get_path(driver.sketch) == ROUND
         driver.press_key("return")
         assert not driver.editor.selection and driver.editor.tool.name == "path"
         driver.click_all((6.0, 7.3))
@@ -206,7 +208,9 @@ def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: st
         driver.press_key("l")
         driver.editor.message = ""
         driver.run_frames(1, 4.0)
-        (shift,) = [led(driver.sketch).compute_displacement(driver.editor.now - driver.editor.moves_since)]
+        (shift,) = [
+            get_path(driver.sketch).compute_displacement(driver.editor.now - driver.editor.moves_since)
+        ]
         assert shift[0] > 1.0
         x, y = map(round, driver.find_pixel((2.0 + float(shift[0]), 2.2)))
         assert (driver.copy_frame()[y, x] != with_path[y, x]).any()
@@ -227,9 +231,9 @@ def test_commands_and_buttons_change_paths(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(MOVING)) as driver:
         driver.editor.select(Selection.of(0))
         run_typed_command(driver.editor, "0.75", "speed")
-        assert led(driver.sketch).speed == 0.75
+        assert get_path(driver.sketch).speed == 0.75
         driver.push_button("tab:object")
         driver.push_button("path:repeat")
-        assert led(driver.sketch).repeat == "back-and-forth"
+        assert get_path(driver.sketch).repeat == "back-and-forth"
         driver.push_button("path:none")
         assert paths.list_moving_obstacles(driver.sketch) == ()

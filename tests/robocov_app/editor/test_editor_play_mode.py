@@ -15,7 +15,7 @@ from robocov_app.editor.ui.play_mode import build_trial_change
 PILLAR = CircleObstacle((7, 7), 1.0)
 
 
-def tried(driver: EditorDriver):
+def start_trial(driver: EditorDriver):
     driver.press_key("f5")
     trial = driver.window.trial
     assert trial is not None
@@ -29,9 +29,11 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
         driver.press_key("v")
         driver.window.canvas.zoom(2.0, (200.0, 200.0))
         driver.window.run_frame(0.0)
-        before, camera, selection = driver.sketch, driver.window.canvas.camera, driver.editor.selection
+        before = driver.sketch
+        camera = driver.window.canvas.camera
+        selection = driver.editor.selection
         picture = driver.copy_frame()
-        trial = tried(driver)
+        trial = start_trial(driver)
         assert trial.viewer.session.displayed.environment == before.build_environment()
         assert trial.viewer.session.timeline.scenario.start_name == "s"
         driver.run_frames(10)
@@ -51,7 +53,7 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
 
 def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
     with open_editor(tmp_path, load_sketch("square")) as driver:
-        trial = tried(driver)
+        trial = start_trial(driver)
         driver.press_key("f1")
         assert trial.is_help_open
         driver.press_key("escape")
@@ -80,7 +82,7 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
 def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR)) as driver:
         driver.editor.apply(properties.set_note(driver.sketch, Selection.of(0), "old oak"))
-        trial = tried(driver)
+        trial = start_trial(driver)
         driver.press_key("c")
         x, y = trial.canvas.to_pixel((3.0, 3.0))
         to_x, _ = trial.canvas.to_pixel((3.5, 3.0))
@@ -93,12 +95,12 @@ def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
 
 def test_another_map_opened_in_a_trial_is_discarded(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR)) as driver:
-        trial = tried(driver)
+        trial = start_trial(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
         assert trial.viewer.files.has_left_tried_map and "Untitled" in trial.viewer.files.list_maps()
         driver.press_key("f5")
         assert driver.shapes == [PILLAR]
-        trial = tried(driver)
+        trial = start_trial(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("rooms"))
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("Untitled"))
         assert (
@@ -112,7 +114,7 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
     with open_editor(tmp_path, sheet()) as driver:
         driver.press_key("c")
         driver.drag_at((4, 4), (4.5, 4), (5, 4))
-        tried(driver)
+        start_trial(driver)
         driver.post(pygame.QUIT)
         driver.settle()
         driver.settle()
@@ -123,7 +125,7 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
 
 def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet()) as driver:
-        tried(driver)
+        start_trial(driver)
         driver.press_key("t")
         driver.press_key("f5")
         assert driver.editor.theme == "dark"

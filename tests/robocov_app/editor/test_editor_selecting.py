@@ -24,7 +24,7 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
         yield driver
 
 
-def handle(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
+def find_handle_pixel(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
     """Return the pixel of a handle."""
     (found,) = (each for each in driver.editor.handles if each.kind == kind and each.side == side)
     return driver.find_pixel(found.at)
@@ -145,13 +145,14 @@ def test_the_rim_of_a_circle_and_of_a_start_are_dragged(driver: EditorDriver) ->
 
 def test_the_knob_turns_by_dragging_and_by_degrees(driver: EditorDriver) -> None:
     driver.select(2)
-    x, y = handle(driver, "turn")
+    x, y = find_handle_pixel(driver, "turn")
     driver.press(x, y)
     driver.move(x + 60, y + 20, held=1)
     driver.type("90")
     driver.press_key("return")
     driver.release()
-    middle_x, middle_y = 7.0, 2.0
+    middle_x = 7.0
+    middle_y = 2.0
     turned = {
         (round(middle_x - (b - middle_y), 4), round(middle_y + a - middle_x, 4)) for a, b in WALL.points
     }
@@ -162,7 +163,7 @@ def test_the_knob_turns_by_dragging_and_by_degrees(driver: EditorDriver) -> None
 
 def test_shift_turns_in_steps(driver: EditorDriver) -> None:
     driver.select(0)
-    x, y = handle(driver, "turn")
+    x, y = find_handle_pixel(driver, "turn")
     driver.hold_keys("shift")
     cx, cy = driver.find_pixel((3, 3))
     driver.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
@@ -177,11 +178,11 @@ def test_shift_turns_in_steps(driver: EditorDriver) -> None:
 
 def test_corners_and_sides_of_the_box_scale(driver: EditorDriver) -> None:
     driver.select(0)
-    x, y = handle(driver, "scale", (1, 0))
+    x, y = find_handle_pixel(driver, "scale", (1, 0))
     one = driver.find_pixel((1, 0))[0] - driver.find_pixel((0, 0))[0]
     driver.drag((x, y), (x + one / 2, y), (x + one, y))
     assert driver.shapes[0].vertices == ((2, 2), (5, 2), (5, 4), (2, 4))
-    x, y = handle(driver, "scale", (1, 1))
+    x, y = find_handle_pixel(driver, "scale", (1, 1))
     driver.hold_keys("shift")
     driver.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
     driver.hold_keys()
@@ -192,7 +193,7 @@ def test_corners_and_sides_of_the_box_scale(driver: EditorDriver) -> None:
 
 def test_a_circle_stays_a_circle_when_it_is_scaled(driver: EditorDriver) -> None:
     driver.select(1)
-    x, y = handle(driver, "scale", (1, 0))
+    x, y = find_handle_pixel(driver, "scale", (1, 0))
     driver.drag((x, y), (x + 20, y), (x + 40, y + 5))
     assert isinstance(driver.shapes[1], CircleObstacle) and driver.shapes[1].radius > 1.0
 
@@ -227,14 +228,14 @@ def test_many_objects_are_dragged_as_an_image_with_the_same_result(tmp_path: Pat
 
     ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(MANY_POINTS + 10))
     with open_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as driver:
-        wanted = transform.move(driver.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
+        expected = transform.move(driver.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
         driver.select(0, 1)
         driver.press(*driver.find_pixel((3, 3)))
         driver.move_to((3.5, 3.2), (4, 3.5), held=1)
         assert driver.editor.displayed[0] is driver.sketch
         assert driver.editor.toolbox.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
         driver.release()
-        assert driver.shapes == [item.shape for item in wanted.obstacles]
+        assert driver.shapes == [item.shape for item in expected.obstacles]
 
 
 def test_handles_belong_to_the_shown_vertices(driver: EditorDriver) -> None:
@@ -257,7 +258,7 @@ def test_the_cursor_shows_the_effect_of_a_press(driver: EditorDriver) -> None:
     driver.select(0)
     driver.move_to((3, 3.01))
     assert selector.choose_cursor(driver.editor) == "move"
-    driver.move(*handle(driver, "scale", (1, 1)))
+    driver.move(*find_handle_pixel(driver, "scale", (1, 1)))
     assert selector.choose_cursor(driver.editor) == "rising"
 
 

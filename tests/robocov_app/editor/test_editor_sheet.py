@@ -43,13 +43,13 @@ def screen() -> Iterator[None]:
         yield
 
 
-def view(center: tuple[float, float] = (5.0, 5.0), zoom: float = 28.0, **more: object) -> View:
-    known = {"theme": LIGHT, "scale": 1.0, "shown": frozenset({"grid", "names", "picture"}), "grid": 0.5}
-    known |= more
-    return View(Camera(center, zoom, BOX), size=SIZE, folder=Path(), **known)
+def build_view(center: tuple[float, float] = (5.0, 5.0), zoom: float = 28.0, **more: object) -> View:
+    attributes = {"theme": LIGHT, "scale": 1.0, "shown": frozenset({"grid", "names", "picture"}), "grid": 0.5}
+    attributes |= more
+    return View(Camera(center, zoom, BOX), size=SIZE, folder=Path(), **attributes)
 
 
-def drawn(page: pygame.Surface, at: View) -> np.ndarray:
+def copy_page(page: pygame.Surface, at: View) -> np.ndarray:
     left, top, width, height = at.clip
     return copy_pixels(page)[top : top + height, left : left + width].copy()
 
@@ -62,8 +62,9 @@ def drawn(page: pygame.Surface, at: View) -> np.ndarray:
 def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
     sketch = sheet(*SHAPES)
     theme = DARK if dark else LIGHT
-    kept, center = Sheet(), (5.0, 5.0)
-    kept.draw(view(center, theme=theme), sketch)
+    kept = Sheet()
+    center = (5.0, 5.0)
+    kept.draw(build_view(center, theme=theme), sketch)
     for kind, x, y in steps:
         lifted: frozenset[int] = frozenset()
         if kind == 0:
@@ -78,9 +79,9 @@ def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
             lifted = frozenset({x % 4})
         else:
             sketch = transform.move(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
-        at = view(center, theme=theme)
-        page = drawn(kept.draw(at, sketch, lifted), at)
-        anew = drawn(Sheet().draw(at, sketch, lifted), at)
+        at = build_view(center, theme=theme)
+        page = copy_page(kept.draw(at, sketch, lifted), at)
+        anew = copy_page(Sheet().draw(at, sketch, lifted), at)
         # a smooth line that is cut by a patch's edge may differ by a shade in its pixels there
         apart = np.abs(page.astype(int) - anew.astype(int)).max(axis=2)
         assert (apart > 40).sum() <= 6, (kind, x, y)
@@ -93,9 +94,9 @@ class Watched(Sheet):
         super().__init__()
         self.boxes: list[pygame.Rect] = []
 
-    def _paint(self, page: pygame.Surface, view: View, *what) -> None:
+    def _paint(self, page: pygame.Surface, build_view: View, *what) -> None:
         self.boxes.append(what[-1])
-        super()._paint(page, view, *what)
+        super()._paint(page, build_view, *what)
 
     def painted(self, at: View, sketch: Sketch) -> str | int:
         self.boxes.clear()
@@ -106,19 +107,19 @@ class Watched(Sheet):
 def test_only_changes_are_redrawn() -> None:
     sketch = sheet(*SHAPES)
     page = Watched()
-    assert page.painted(view(), sketch) == "all"
-    assert page.painted(view(), sketch) == 0
+    assert page.painted(build_view(), sketch) == "all"
+    assert page.painted(build_view(), sketch) == 0
     moved = transform.move(sketch, Selection.of(1), 0.1, 0.0).sketch
-    assert page.painted(view(), moved) == 1
-    assert page.painted(view((5.0 + 3 / 28.0, 5.0)), moved) == 1
+    assert page.painted(build_view(), moved) == 1
+    assert page.painted(build_view((5.0 + 3 / 28.0, 5.0)), moved) == 1
     assert page.boxes[0].width == 3, "it was scrolled"
-    assert page.painted(view(zoom=40.0), moved) == "all"
-    assert page.painted(view(zoom=40.0, theme=DARK), moved) == "all"
+    assert page.painted(build_view(zoom=40.0), moved) == "all"
+    assert page.painted(build_view(zoom=40.0, theme=DARK), moved) == "all"
 
 
 def test_lifted_obstacles_are_not_on_the_page() -> None:
     sketch = sheet(*SHAPES)
-    at = view()
+    at = build_view()
     x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
     page = Sheet()
     assert page.draw(at, sketch).get_at((x, y))[:3] == LIGHT.obstacle
@@ -126,7 +127,7 @@ def test_lifted_obstacles_are_not_on_the_page() -> None:
 
 
 def test_a_hole_shows_what_lies_below() -> None:
-    at = view(shown=frozenset())
+    at = build_view(shown=frozenset())
     page = Sheet().draw(at, sheet(*SHAPES))
 
     def color(point: tuple[float, float]) -> tuple[int, ...]:
@@ -153,14 +154,14 @@ def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
     for turn in (0.0, 90.0):
         corner = (0.0, 0.0) if turn == 0.0 else (10.0, 0.0)
         sketch = replace(sheet(*SHAPES), background=replace(laid, turn=turn, corner=corner))
-        at = view(shown=frozenset({"picture"}))
+        at = build_view(shown=frozenset({"picture"}))
         page = Sheet().draw(at, sketch)
         x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
         assert page.get_at((round(x), round(y)))[0] > 200 > 60 > page.get_at((round(x), round(y)))[1]
         x, y = at.camera.to_pixels(np.array([1.5, 1.5]))
         mixed = page.get_at((round(x), round(y)))
         assert mixed[1] > 40  # the picture shines through
-    hidden = Sheet().draw(view(shown=frozenset()), sketch)
+    hidden = Sheet().draw(build_view(shown=frozenset()), sketch)
     x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
     assert hidden.get_at((round(x), round(y)))[:3] == LIGHT.background
 
@@ -170,7 +171,7 @@ def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
     Image.new(mode, (40, 30)).save(tmp_path / "one.png")
     page = Sheet()
     sketch = replace(sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
-    page.draw(view(), sketch)
+    page.draw(build_view(), sketch)
     assert page.reference_image.error == ""
 
 
@@ -178,7 +179,7 @@ def test_an_unreadable_picture_is_reported_and_the_rest_is_drawn(tmp_path: Path)
     (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     page = Sheet()
     sketch = replace(sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
-    page.draw(view(), sketch)
+    page.draw(build_view(), sketch)
     assert "bad.png" in page.reference_image.error
 
 
@@ -201,7 +202,8 @@ def test_names_are_written_where_they_fit() -> None:
 
 
 def test_outlines_are_built_once_for_each_obstacle() -> None:
-    outlines, sketch = Outlines(), sheet(*SHAPES)
+    outlines = Outlines()
+    sketch = sheet(*SHAPES)
     first = outlines.get(sketch.obstacles[0])
     moved = transform.move(sketch, Selection.of(1), 1, 0).sketch
     assert outlines.get(moved.obstacles[0]) is first and first.has_holes

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, sound_sketches
+from drawn_sketches import HALL, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,19 +14,19 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 
 
-def wobbly(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
+def build_wobbly_ring(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
     """A ring that goes round a middle, so that it does not cross itself."""
     rng = np.random.default_rng(seed)
     angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, count))
-    away = radius * (1.0 + 0.2 * np.sin(3 * angle)) + rng.uniform(-noise, noise, count)
-    points = np.column_stack([np.cos(angle), np.sin(angle)]) * away[:, None] + 5.0
+    distance = radius * (1.0 + 0.2 * np.sin(3 * angle)) + rng.uniform(-noise, noise, count)
+    points = np.column_stack([np.cos(angle), np.sin(angle)]) * distance[:, None] + 5.0
     return tuple((round(x, 4), round(y, 4)) for x, y in points.tolist())
 
 
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(8, 120), st.sampled_from([0.001, 0.02, 0.1, 0.5, 2.0]))
 def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
-    ring = wobbly(count, seed)
+    ring = build_wobbly_ring(count, seed)
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     try:
         change = simplify(sketch, Selection.of(key), tolerance)
@@ -45,7 +45,8 @@ def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
 
 def test_holes_do_not_cross_their_outline():
     # a thin frame: a coarse tolerance would let the hole stick out
-    outer, inner = wobbly(120, 0, 3.0, 0.0), wobbly(120, 1, 2.9, 0.0)
+    outer = build_wobbly_ring(120, 0, 3.0, 0.0)
+    inner = build_wobbly_ring(120, 1, 2.9, 0.0)
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(outer, (inner,))])
     assert sketch.get_item(key).shape.polygon.is_valid
     change = simplify(sketch, Selection.of(key), 2.0)
@@ -92,7 +93,7 @@ def test_traced_plans_become_straight():
     )
 
 
-@given(sound_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
+@given(valid_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
 def test_straightening_is_idempotent(sketch, degrees):
     try:
         change = straighten(sketch, Selection(), degrees)

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 import shapely
-from drawn_sketches import HALL, drafts, problems, sound_sketches
+from drawn_sketches import HALL, drafts, list_problems, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,7 +29,7 @@ def hall(*shapes, starts=(), **others) -> Sketch:
     )
 
 
-def runs(sketch: Sketch) -> bool:
+def is_valid(sketch: Sketch) -> bool:
     try:
         sketch.build_environment()
     except MapError:
@@ -38,10 +38,12 @@ def runs(sketch: Sketch) -> bool:
 
 
 @settings(max_examples=200)
-@given(st.one_of(drafts(), sound_sketches()))
+@given(st.one_of(drafts(), valid_sketches()))
 def test_there_is_an_error_exactly_if_the_map_is_invalid(sketch):
-    found = problems(sketch)
-    assert any(problem.is_error for problem in found) != runs(sketch), [problem.message for problem in found]
+    found = list_problems(sketch)
+    assert any(problem.is_error for problem in found) != is_valid(sketch), [
+        problem.message for problem in found
+    ]
     keys = {item.key for item in sketch.obstacles} | {name for name, _ in sketch.starts} | {BOUNDARY, None}
     for problem in found:
         assert problem.owner in keys
@@ -54,7 +56,7 @@ def test_there_is_an_error_exactly_if_the_map_is_invalid(sketch):
 
 @pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps_have_no_errors(name):
-    assert not any(each.is_error for each in problems(Sketch.from_environment(load_map(name))))
+    assert not any(each.is_error for each in list_problems(Sketch.from_environment(load_map(name))))
 
 
 BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
@@ -62,7 +64,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
 
 
 @pytest.mark.parametrize(
-    ("sketch", "words", "where", "of"),
+    ("sketch", "message", "where", "of"),
     [
         (Sketch("n"), "there is no boundary: draw one around the free space", None, BOUNDARY),
         (hall(name=""), "the map has no name", None, None),
@@ -199,12 +201,12 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
     ],
 )
-def test_problems_are_reported_at_their_position(sketch, words, where, of):
+def test_problems_are_reported_at_their_position(sketch, message, where, of):
     (found, *_) = [
-        problem for problem in problems(sketch) if problem.is_error and problem.message == words
-    ] or [pytest.fail(str([problem.message for problem in problems(sketch)]))]
+        problem for problem in list_problems(sketch) if problem.is_error and problem.message == message
+    ] or [pytest.fail(str([problem.message for problem in list_problems(sketch)]))]
     assert found.owner == of
-    assert not runs(sketch)
+    assert not is_valid(sketch)
     if where is None:
         assert found.geometry is None
     else:
@@ -218,8 +220,8 @@ def test_a_broken_object_does_not_hide_other_problems():
         WallObstacle((), 0.1),
         starts=(("a", PointsStart(((6.0, 6.0),))), ("b", PointsStart(((1.5, 2.0), (2.0, 1.5))))),
     )
-    words = [problem.message for problem in problems(sketch) if problem.is_error]
-    assert words == [
+    message = [problem.message for problem in list_problems(sketch) if problem.is_error]
+    assert message == [
         "polygon 1: its outline crosses or touches itself at (2, 2)",
         "wall 3: it has no length: it needs two points that are apart",
         "start “a”: position 1 at (6, 6) is inside circle 2",
@@ -228,38 +230,38 @@ def test_a_broken_object_does_not_hide_other_problems():
     ]
 
 
-def warned(sketch: Sketch, radius: float = 0.15) -> list[str]:
-    found = problems(sketch, radius)
+def list_warnings(sketch: Sketch, radius: float = 0.15) -> list[str]:
+    found = list_problems(sketch, radius)
     assert not any(problem.is_error for problem in found)
     return [problem.message for problem in found]
 
 
 def test_possible_mistakes_are_warnings():
-    assert warned(hall()) == []
-    assert warned(hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
+    assert list_warnings(hall()) == []
+    assert list_warnings(hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
         "circle “lamp” lies outside the boundary"
     ]
     # one that only touches from outside does nothing either
     beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
-    assert warned(hall(beside)) == ["polygon 1 lies outside the boundary"]
+    assert list_warnings(hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")
-    assert warned(hall(twice, replace(twice, name="b"))) == ["circle “b” duplicates another obstacle"]
+    assert list_warnings(hall(twice, replace(twice, name="b"))) == ["circle “b” duplicates another obstacle"]
     doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
-    assert warned(hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
+    assert list_warnings(hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
-    assert not [words for words in warned(hall(ended)) if "two vertices" in words]
+    assert not [message for message in list_warnings(hall(ended)) if "two vertices" in message]
 
 
 def test_paths_through_obstacles_are_reported_at_the_overlap():
     wall = WallObstacle(((6.0, 0.0), (6.0, 4.0)), 0.2, "screen")
     cart = CircleObstacle((2.0, 2.0), 0.5, "cart", ObstaclePath(((2.0, 2.0), (10.0, 2.0)), 1.0))
-    assert warned(hall(cart)) == []
-    (problem,) = problems(hall(wall, cart))
+    assert list_warnings(hall(cart)) == []
+    (problem,) = list_problems(hall(wall, cart))
     assert problem.message == "circle “cart” moves through wall “screen”"
     assert problem.owner == 1 and not problem.is_error
     assert problem.geometry.bounds == pytest.approx((5.9, 1.5, 6.1, 2.5), abs=1e-3)
     out = replace(cart, path=ObstaclePath(((2.0, 2.0), (14.0, 2.0)), 1.0))
-    assert warned(hall(out)) == ["circle “cart” moves through the boundary"]
+    assert list_warnings(hall(out)) == ["circle “cart” moves through the boundary"]
 
 
 def test_sealed_rooms_and_pockets_are_reported():
@@ -269,8 +271,8 @@ def test_sealed_rooms_and_pockets_are_reported():
     box = PolygonObstacle(
         ((8.0, 2.0), (9.0, 2.0), (9.0, 3.0), (8.0, 3.0)), (((8.4, 2.4), (8.6, 2.4), (8.6, 2.6), (8.4, 2.6)),)
     )
-    words = warned(hall(frame, box))
-    assert words == [
+    message = list_warnings(hall(frame, box))
+    assert message == [
         "the room of 9 m² around (4, 4) is sealed: it has no entrance",
         "1 sealed pocket is smaller than a robot, 0.04 m² in total",
     ]
@@ -283,19 +285,19 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     sketch = hall(
         room, starts=(("a", DiscStart((3.4, 3.4), 0.2)), ("b", PointsStart(((1.0, 1.0), (1.5, 1.0)))))
     )
-    assert not [words for words in warned(sketch, 0.2) if "start" in words]
-    words = [words for words in warned(sketch, 0.5) if "start" in words]
-    assert words[0] == "start “a”: its disc has no room for a robot of radius 0.5 m"
-    assert words[1] == "start “b”: position 1 at (1, 1) and position 2 are 0.5 m apart: robots need 1 m"
-    assert warned(hall(starts=(("all", UniformStart()),)), 3.9) == []
-    assert warned(hall(starts=(("all", UniformStart()),)), 4.0) == [
+    assert not [message for message in list_warnings(sketch, 0.2) if "start" in message]
+    message = [message for message in list_warnings(sketch, 0.5) if "start" in message]
+    assert message[0] == "start “a”: its disc has no room for a robot of radius 0.5 m"
+    assert message[1] == "start “b”: position 1 at (1, 1) and position 2 are 0.5 m apart: robots need 1 m"
+    assert list_warnings(hall(starts=(("all", UniformStart()),)), 3.9) == []
+    assert list_warnings(hall(starts=(("all", UniformStart()),)), 4.0) == [
         "start “all”: the free space has no room for a robot of radius 4 m"
     ]
 
 
 def test_tight_positions_are_reported_at_their_position():
     spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
-    found = problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
+    found = list_problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
     assert [(problem.message, problem.geometry.centroid.coords[0]) for problem in found] == [
         ("start “a”: position 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
         (
@@ -312,7 +314,7 @@ def test_tight_positions_are_reported_at_their_position():
 def test_messages_name_objects_instead_of_paths():
     pillar = CircleObstacle((1.0, 1.0), 0.3, "pillar")
     sketch = hall(pillar, PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 3.0))))
-    for message, words in [
+    for message, message in [
         ("map: obstacles[0]: is odd", "circle “pillar”: is odd"),
         ("map: obstacles[1].vertices[0]: is odd", "polygon 2, corner 1: is odd"),
         ("map: obstacles[1].vertices[2][1]: is odd", "polygon 2, corner 3: is odd"),
@@ -324,4 +326,4 @@ def test_messages_name_objects_instead_of_paths():
         ("starts.corner.positions[1]: is odd", "start “corner”, position 2: is odd"),
         ("boundary[3]: is odd", "boundary, corner 4: is odd"),
     ]:
-        assert translate_message(message, sketch) == words
+        assert translate_message(message, sketch) == message

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, sound_sketches
+from drawn_sketches import HALL, valid_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,7 +32,7 @@ def sketch() -> Sketch:
     return Sketch("Hall", boundary=HALL, starts=STARTS).with_obstacles([FRAME, PILLAR, WALL])[0]
 
 
-def picked(*chosen: Vertex) -> Selection:
+def select_vertices(*chosen: Vertex) -> Selection:
     return Selection(vertices=frozenset(chosen))
 
 
@@ -41,7 +41,7 @@ def picked(*chosen: Vertex) -> Selection:
 
 @given(st.data())
 def test_a_placed_vertex_has_its_position(data):
-    sketch = data.draw(sound_sketches(least=1))
+    sketch = data.draw(valid_sketches(least=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
     vertex, before = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-5, 15), st.integers(-5, 15)))
@@ -62,7 +62,7 @@ def test_a_placed_vertex_has_its_position(data):
 
 
 def test_vertices_of_several_objects_move_together(sketch):
-    chosen = picked(
+    chosen = select_vertices(
         Vertex(0, 0, 2),
         Vertex(0, 1, 0),
         Vertex(1, 0, 1),
@@ -97,30 +97,45 @@ def test_center_and_rim_of_discs_are_vertices(sketch):
     ("deed", "words"),
     [
         (lambda s: vertices.move_vertices(s, Selection.of(0), 1, 1), "select vertices"),
-        (lambda s: vertices.move_vertices(s, picked(Vertex(0, 0, 9)), 1, 1), "vertex no longer exists"),
-        (lambda s: vertices.move_vertices(s, picked(Vertex(99, 0, 0)), 1, 1), "vertex no longer exists"),
-        (lambda s: vertices.move_vertices(s, picked(Vertex("none", 0, 0)), 1, 1), "vertex no longer exists"),
+        (
+            lambda s: vertices.move_vertices(s, select_vertices(Vertex(0, 0, 9)), 1, 1),
+            "vertex no longer exists",
+        ),
+        (
+            lambda s: vertices.move_vertices(s, select_vertices(Vertex(99, 0, 0)), 1, 1),
+            "vertex no longer exists",
+        ),
+        (
+            lambda s: vertices.move_vertices(s, select_vertices(Vertex("none", 0, 0)), 1, 1),
+            "vertex no longer exists",
+        ),
         (lambda s: vertices.place_vertices(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
         (lambda s: vertices.insert_vertex(s, Edge(2, 0, 2, (9.0, 2.0))), "edge no longer exists"),
         (lambda s: vertices.insert_vertex(s, Edge(1, 0, 0, (9.0, 2.0))), "edge no longer exists"),
         (lambda s: vertices.extend_wall(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),
         (lambda s: vertices.extend_wall(s, Vertex(0, 0, 1), (1.0, 1.0)), "not a wall"),
         (lambda s: vertices.delete_vertices(s, Selection.of(0)), "select vertices"),
-        (lambda s: vertices.delete_vertices(s, picked(Vertex(1, 0, 1))), "delete the circle itself"),
-        (lambda s: vertices.delete_vertices(s, picked(Vertex("disc", 0, 1))), "delete the start itself"),
+        (lambda s: vertices.delete_vertices(s, select_vertices(Vertex(1, 0, 1))), "delete the circle itself"),
         (
-            lambda s: vertices.delete_vertices(s, picked(Vertex(-1, 0, 1), Vertex(-1, 0, 2))),
+            lambda s: vertices.delete_vertices(s, select_vertices(Vertex("disc", 0, 1))),
+            "delete the start itself",
+        ),
+        (
+            lambda s: vertices.delete_vertices(s, select_vertices(Vertex(-1, 0, 1), Vertex(-1, 0, 2))),
             "three corners at least",
         ),
-        (lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0)), 0.0), "length above 0"),
-        (lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0)), 4.5), "of an edge that is 4 m long"),
+        (lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0)), 0.0), "length above 0"),
         (
-            lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),
+            lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0)), 4.5),
+            "of an edge that is 4 m long",
+        ),
+        (
+            lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),
             "5 m of .* both ends",
         ),
-        (lambda s: vertices.bevel_corners(s, picked(Vertex(2, 0, 0)), 0.1), "select corners"),
-        (lambda s: vertices.bevel_corners(s, picked(Vertex(1, 0, 0)), 0.1), "select corners"),
-        (lambda s: vertices.round_corners(s, picked(Vertex(0, 0, 0)), -1.0), "radius above 0"),
+        (lambda s: vertices.bevel_corners(s, select_vertices(Vertex(2, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.bevel_corners(s, select_vertices(Vertex(1, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.round_corners(s, select_vertices(Vertex(0, 0, 0)), -1.0), "radius above 0"),
         (lambda s: vertices.fill_hole(s, 0, 2), "no such hole"),
         (lambda s: vertices.split_wall(s, Vertex(2, 0, 0)), "between its ends"),
         (lambda s: vertices.split_wall(s, Vertex(0, 0, 0)), "not a wall"),
@@ -139,7 +154,7 @@ def test_impossible_edits_raise_a_map_error(sketch, deed, words):
 
 @given(st.data())
 def test_inserting_on_an_edge_keeps_the_shape(data):
-    sketch = data.draw(sound_sketches(least=1))
+    sketch = data.draw(valid_sketches(least=1))
     edges = [
         Edge(owner, ring, k, (0.0, 0.0))
         for owner in (BOUNDARY, *(item.key for item in sketch.obstacles))
@@ -161,18 +176,18 @@ def test_inserting_on_an_edge_keeps_the_shape(data):
 
 
 def test_rings_with_too_few_vertices_are_removed(sketch):
-    gone = vertices.delete_vertices(sketch, picked(Vertex(0, 1, 0), Vertex(0, 1, 1)))
+    gone = vertices.delete_vertices(sketch, select_vertices(Vertex(0, 1, 0), Vertex(0, 1, 1)))
     assert gone.sketch.get_item(0).shape.holes == ()
     assert gone.description == "2 vertices deleted"
-    gone = vertices.delete_vertices(sketch, picked(*(Vertex(0, 0, k) for k in (0, 1))))
+    gone = vertices.delete_vertices(sketch, select_vertices(*(Vertex(0, 0, k) for k in (0, 1))))
     assert 0 not in gone.sketch.index_by_key
-    gone = vertices.delete_vertices(sketch, picked(Vertex(2, 0, 0), Vertex(2, 0, 1)))
+    gone = vertices.delete_vertices(sketch, select_vertices(Vertex(2, 0, 0), Vertex(2, 0, 1)))
     assert 2 not in gone.sketch.index_by_key
-    gone = vertices.delete_vertices(sketch, picked(Vertex("two", 0, 0)))
+    gone = vertices.delete_vertices(sketch, select_vertices(Vertex("two", 0, 0)))
     assert gone.sketch.get_start("two").positions == ((8.0, 6.0),)
-    gone = vertices.delete_vertices(gone.sketch, picked(Vertex("two", 0, 0)))
+    gone = vertices.delete_vertices(gone.sketch, select_vertices(Vertex("two", 0, 0)))
     assert "two" not in dict(gone.sketch.starts)
-    assert len(vertices.delete_vertices(sketch, picked(Vertex(BOUNDARY, 0, 0))).sketch.boundary) == 3
+    assert len(vertices.delete_vertices(sketch, select_vertices(Vertex(BOUNDARY, 0, 0))).sketch.boundary) == 3
 
 
 # corners
@@ -183,7 +198,7 @@ def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, len
     angle = math.radians(degrees)
     corner = ((2.0, 0.0), (0.0, 0.0), (2.0 * math.cos(angle), 2.0 * math.sin(angle)))
     sketch, (key,) = Sketch().with_obstacles([WallObstacle(corner, 0.1)])
-    change = vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), length)
+    change = vertices.bevel_corners(sketch, select_vertices(Vertex(key, 0, 1)), length)
     points = np.array(change.sketch.get_item(key).shape.points)
     assert len(points) == 4
     np.testing.assert_allclose(points[1], (length, 0.0), atol=1e-4)
@@ -191,7 +206,7 @@ def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, len
     # the circle that touches both edges there: its center lies on the bisector
     radius = length * math.tan(angle / 2)
     center = np.array([length, radius])
-    rounded = vertices.round_corners(sketch, picked(Vertex(key, 0, 1)), radius)
+    rounded = vertices.round_corners(sketch, select_vertices(Vertex(key, 0, 1)), radius)
     points = np.array(rounded.sketch.get_item(key).shape.points)
     np.testing.assert_allclose(np.hypot(*(points[1:-1] - center).T), radius, atol=2e-4)
     middles = (points[1:-2] + points[2:-1]) / 2
@@ -199,7 +214,7 @@ def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, len
 
 
 def test_corners_of_rings_are_cut_all_at_once(sketch):
-    corners = picked(*(Vertex(0, 0, k) for k in range(4)), *(Vertex(0, 1, k) for k in range(4)))
+    corners = select_vertices(*(Vertex(0, 0, k) for k in range(4)), *(Vertex(0, 1, k) for k in range(4)))
     change = vertices.bevel_corners(sketch, corners, 0.5)
     shape = change.sketch.get_item(0).shape
     assert change.description == "8 corners bevelled"
@@ -208,10 +223,10 @@ def test_corners_of_rings_are_cut_all_at_once(sketch):
     assert len(shape.vertices) == 8
     # cuts that meet in the middle of an edge leave one vertex there
     assert len(shape.holes[0]) == 4
-    bounded = vertices.bevel_corners(sketch, picked(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
+    bounded = vertices.bevel_corners(sketch, select_vertices(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
     assert bounded == ((0.0, 1.0), (1.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
     disc = (
-        vertices.round_corners(sketch, picked(*(Vertex(0, 0, k) for k in range(4))), 2.0)
+        vertices.round_corners(sketch, select_vertices(*(Vertex(0, 0, k) for k in range(4))), 2.0)
         .sketch.get_item(0)
         .shape
     )
@@ -222,11 +237,11 @@ def test_a_straight_vertex_is_no_corner():
     ring = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0))
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     with pytest.raises(MapError, match="select corners"):
-        vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), 0.1)
+        vertices.bevel_corners(sketch, select_vertices(Vertex(key, 0, 1)), 0.1)
     spike = WallObstacle(((0.0, 0.0), (1.0, 0.0), (0.2, 0.0)), 0.1)
     sketch, (key,) = Sketch().with_obstacles([spike])
     with pytest.raises(MapError, match="turns right back"):
-        vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), 0.1)
+        vertices.bevel_corners(sketch, select_vertices(Vertex(key, 0, 1)), 0.1)
 
 
 # edges
@@ -244,10 +259,10 @@ def test_holes_are_filled(sketch):
 def test_a_wall_is_extended_split_and_joined(sketch):
     longer = vertices.extend_wall(sketch, Vertex(2, 0, 2), (11.0, 3.0))
     assert longer.sketch.get_item(2).shape.points[-1] == (11.0, 3.0)
-    assert longer.selection == picked(Vertex(2, 0, 3))
+    assert longer.selection == select_vertices(Vertex(2, 0, 3))
     before = vertices.extend_wall(sketch, Vertex(2, 0, 0), (6.0, 0.0))
     assert before.sketch.get_item(2).shape.points[0] == (6.0, 0.0)
-    assert before.selection == picked(Vertex(2, 0, 0))
+    assert before.selection == select_vertices(Vertex(2, 0, 0))
     halves = vertices.split_wall(longer.sketch, Vertex(2, 0, 1))
     first, second = (halves.sketch.get_item(key).shape for key in sorted(halves.selection.items))
     assert first.points == ((6.0, 1.0), (9.0, 1.0))

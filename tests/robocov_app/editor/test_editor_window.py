@@ -230,7 +230,8 @@ def test_space_and_the_pan_tool_move_the_sheet(driver: EditorDriver) -> None:
     driver.drag((300, 300), (330, 310), (360, 320))
     assert driver.window.canvas.camera.center != center
     driver.press_key("v")
-    before, center = driver.sketch, driver.window.canvas.camera.center
+    before = driver.sketch
+    center = driver.window.canvas.camera.center
     driver.post(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
     driver.settle()
     driver.drag_at((3, 3), (3.5, 3.5), (4, 4))
@@ -375,12 +376,14 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
     shapes = [PolygonObstacle(tuple(map(tuple, ring.tolist()))) for ring in rings]
     sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).with_obstacles(shapes)[0]
     with open_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as driver:
-        window, sheet = driver.window, driver.window.canvas.sheet
+        window = driver.window
+        sheet = driver.window.canvas.sheet
         driver.editor.snapper.waits_for_targets = False
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = driver.find_pixel((spot.x, spot.y))
         driver.press(x, y)
-        paint, boxes = sheet._paint, []
+        paint = sheet._paint
+        boxes = []
         sheet._paint = lambda *what: (boxes.append(what[-1]), paint(*what))  # type: ignore[method-assign]
         for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
@@ -462,7 +465,8 @@ def test_an_idle_window_is_not_redrawn(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_a_fitted_map_stays_fitted_when_the_window_is_resized(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
-        shown, zooms = driver.window.canvas, [driver.window.canvas.camera.zoom]
+        shown = driver.window.canvas
+        zooms = [driver.window.canvas.camera.zoom]
         for size in ((1700, 1300), (900, 600)):
             pygame.display.set_mode(size, pygame.RESIZABLE)
             driver.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])

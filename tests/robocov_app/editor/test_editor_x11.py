@@ -35,11 +35,11 @@ def display() -> Iterator[str]:
 
 
 @contextmanager
-def edited(display: str, folder: Path, *words: object) -> Iterator[Hands]:
+def run_editor(display: str, folder: Path, *words: object) -> Iterator[Hands]:
     size = f"{SIZE[0]}x{SIZE[1]}"
     command = [*COMMAND, "edit", *words, "--folder", folder, "--size", size, "--scale", "1"]
-    places = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
-    with run_window(display, folder, command, **places) as hands:
+    variables = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
+    with run_window(display, folder, command, **variables) as hands:
         hands.take_screenshot()  # now it listens
         yield hands
 
@@ -59,7 +59,7 @@ class Sheet:
 
 
 def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> None:
-    with edited(display, tmp_path) as hands:
+    with run_editor(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))  # the boundary that is offered
         hands.press("b")
         hands.click(*at(0, 0))
@@ -98,8 +98,8 @@ def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> 
         hands.wait_until((tmp_path / "plan.json").exists, "saved map")
 
         hands.press("F5")
-        tried = differs(hands, drawn, 0.3)  # cells are colored
-        differs(hands, tried, 0.0)  # robots move
+        tried = wait_for_change(hands, drawn, 0.3)  # cells are colored
+        wait_for_change(hands, tried, 0.0)  # robots move
         hands.press("F5")
         time.sleep(0.5)
 
@@ -122,29 +122,29 @@ def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> 
     assert not list((tmp_path / "drafts").rglob("*.json"))
 
 
-def differs(hands: Hands, from_picture: np.ndarray, part: float) -> np.ndarray:
+def wait_for_change(hands: Hands, from_picture: np.ndarray, part: float) -> np.ndarray:
     """Return the first picture whose arena is different in more than a part of its pixels."""
     arena = np.s_[: SIZE[1] - 210, : SIZE[0] - 320]
-    began = time.monotonic()
+    started_at = time.monotonic()
     while True:
         picture = hands.take_screenshot()
         if (np.abs(picture - from_picture)[arena].max(axis=2) > 30).mean() > part:
             return picture
-        assert time.monotonic() - began < MAX_WAIT_S, "nothing happens"
+        assert time.monotonic() - started_at < MAX_WAIT_S, "nothing happens"
         time.sleep(0.2)
 
 
 def test_a_killed_editor_loses_nothing(display: str, tmp_path: Path) -> None:
-    with edited(display, tmp_path) as hands:
+    with run_editor(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         hands.press("r")
         hands.drag(at(1, 1), at(2, 2), at(3, 3))
         hands.drag(at(5, 5), at(6, 6), at(7, 7))
-        hands.wait_until(lambda: kept(tmp_path) == 2, "draft with both rectangles")
+        hands.wait_until(lambda: count_saved_obstacles(tmp_path) == 2, "draft with both rectangles")
         hands.process.send_signal(signal.SIGKILL)
         assert wait_for_end(hands.process) == -signal.SIGKILL
 
-    with edited(display, tmp_path) as hands:
+    with run_editor(display, tmp_path) as hands:
         hands.press("Return")  # Recover
         time.sleep(0.3)
         hands.press("ctrl+s", "ctrl+BackSpace")
@@ -160,24 +160,24 @@ def test_a_killed_editor_loses_nothing(display: str, tmp_path: Path) -> None:
     ]
 
 
-def kept(folder: Path) -> int:
+def count_saved_obstacles(folder: Path) -> int:
     """Return how many obstacles the draft has: not what is still being written, which has another name."""
     found = [0]
     for path in (folder / "drafts").rglob("[!.]*.json"):
-        held = json.loads(path.read_text())
-        found.append(len((held.get("sketch") or {}).get("obstacles", ())))
+        document = json.loads(path.read_text())
+        found.append(len((document.get("sketch") or {}).get("obstacles", ())))
     return max(found)
 
 
 def test_closing_unsaved_work_asks_first(display: str, tmp_path: Path) -> None:
-    with edited(display, tmp_path, tmp_path / "fresh.json") as hands:
+    with run_editor(display, tmp_path, tmp_path / "fresh.json") as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         hands.press("c")
         empty = hands.take_screenshot()
         hands.drag(at(5, 5), at(5.5, 5), at(6, 5))
-        drawn = differs(hands, empty, 0.002)
+        drawn = wait_for_change(hands, empty, 0.002)
         hands.press("ctrl+q")
-        differs(hands, drawn, 0.002)  # there is a question
+        wait_for_change(hands, drawn, 0.002)  # there is a question
         assert hands.process.poll() is None
         hands.press("Escape")  # cancel
         hands.take_screenshot()
@@ -188,13 +188,13 @@ def test_closing_unsaved_work_asks_first(display: str, tmp_path: Path) -> None:
 
 
 def test_copies_go_from_one_window_to_another(display: str, tmp_path: Path) -> None:
-    with edited(display, tmp_path) as first:
+    with run_editor(display, tmp_path) as first:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         first.press("r")
         first.drag(at(1, 1), at(2, 2), at(3, 3))
         first.press("ctrl+c")
         first.take_screenshot()
-        with edited(display, tmp_path, tmp_path / "second.json") as second:
+        with run_editor(display, tmp_path, tmp_path / "second.json") as second:
             second.press("ctrl+shift+v", "ctrl+s")
             second.wait_until((tmp_path / "second.json").exists, "saved map")
             second.press("ctrl+q")
@@ -207,19 +207,19 @@ def test_a_picture_is_imported_with_the_room_that_was_clicked(display: str, tmp_
     walls = np.zeros((100, 200), dtype=np.uint8)
     walls[10:90, 10:110] = walls[10:90, 120:190] = 255
     Image.fromarray(walls).save(tmp_path / "plan.png")
-    with edited(display, tmp_path, tmp_path / "plan.png") as hands:
+    with run_editor(display, tmp_path, tmp_path / "plan.png") as hands:
         hands.type("0.1")
 
-        def left_out() -> tuple[float, float]:
+        def find_red_area() -> tuple[float, float]:
             """Return the middle of what is red, px; (0, 0) for nothing."""
             red, green, blue = np.moveaxis(hands.take_screenshot(), 2, 0)
             found = np.argwhere((red > 180) & (green < 160) & (blue < 160))
             return (0.0, 0.0) if len(found) < 1000 else (np.median(found[:, 1]), np.median(found[:, 0]))
 
-        hands.wait_until(lambda: left_out()[0], "room that is left out")
-        x, y = left_out()
+        hands.wait_until(lambda: find_red_area()[0], "room that is left out")
+        x, y = find_red_area()
         hands.click(x, y)
-        hands.wait_until(lambda: 0 < left_out()[0] < x - 50, "other room that is left out")
+        hands.wait_until(lambda: 0 < find_red_area()[0] < x - 50, "other room that is left out")
         hands.press("Return", "ctrl+s")
         hands.press("Return")
         hands.wait_until((tmp_path / "plan.json").exists, "saved map")

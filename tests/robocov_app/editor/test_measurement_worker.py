@@ -2,7 +2,7 @@ import time
 from contextlib import closing
 
 import pytest
-from drawn_sketches import HALL, changes, sound_sketches
+from drawn_sketches import HALL, changes, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +26,7 @@ SKETCH, _ = Sketch("Hall", boundary=HALL).with_obstacles(
 )
 
 
-def same(a, b) -> bool:
+def are_equal(a, b) -> bool:
     """Whether two measurements say the same."""
     numbers = ("free_area", "components", "reached", "gap", "vertices", "radius")
     words = [[problem.message for problem in each.problems] for each in (a, b)]
@@ -52,18 +52,21 @@ def test_the_worker_agrees_with_the_function_after_every_change():
         for sketch in history:
             for each in (worker, direct):
                 each.put((sketch, 0.2))
-                result, end = each.poll(), time.monotonic() + PATIENCE
+                result = each.poll()
+                end = time.monotonic() + PATIENCE
                 while each.is_busy and time.monotonic() < end:
                     result = each.poll()
                     time.sleep(0.002)
-                assert same(result, measure(sketch, 0.2))
+                assert are_equal(result, measure(sketch, 0.2))
 
 
 @settings(max_examples=20)
 @given(st.data())
 def test_changes_are_enough_to_rebuild_the_sketch(data):
-    measuring, wire = SketchMeasurer(), MeasurementWire()
-    sketch, known = data.draw(sound_sketches(least=1)), {}
+    measuring = SketchMeasurer()
+    wire = MeasurementWire()
+    sketch = data.draw(valid_sketches(least=1))
+    known = {}
     questions = []
     for _ in range(4):
         questions.append(wire.encode((sketch, 0.2)))
@@ -71,8 +74,10 @@ def test_changes_are_enough_to_rebuild_the_sketch(data):
             item.key for item in sketch.obstacles if known.get(item.key) is not item
         ]
         known = {item.key: item for item in sketch.obstacles}
-        last, change = sketch, data.draw(changes(sketch))
+        last = sketch
+        change = data.draw(changes(sketch))
         sketch = sketch if change is None else change.sketch
     measuring(questions[:2], Channel())
-    answer, wanted = measuring(questions[2:], Channel()), measure(last, 0.2)
-    assert (answer.vertices, answer.free_area) == (wanted.vertices, wanted.free_area)
+    answer = measuring(questions[2:], Channel())
+    expected = measure(last, 0.2)
+    assert (answer.vertices, answer.free_area) == (expected.vertices, expected.free_area)

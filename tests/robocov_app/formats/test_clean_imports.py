@@ -54,7 +54,7 @@ def test_seeds_of_every_format_are_clean(name: str, tmp_path: Path) -> None:
         require_clean(environment, report)
 
 
-def _require_made_clean(factory: pytest.TempPathFactory, name: str, case: Case) -> None:
+def _require_generated_clean(factory: pytest.TempPathFactory, name: str, case: Case) -> None:
     try:
         environment, report = import_file(case, name, factory.mktemp("made"))
     except RobocovError:
@@ -71,7 +71,7 @@ _CHECKS = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_
 def test_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
 ) -> None:
-    _require_made_clean(tmp_path_factory, *given_case)
+    _require_generated_clean(tmp_path_factory, *given_case)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_generated_files_are_clean(
 def test_many_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
 ) -> None:
-    _require_made_clean(tmp_path_factory, *given_case)
+    _require_generated_clean(tmp_path_factory, *given_case)
 
 
 _NUMBER = st.integers(0, 10**7).map(lambda value: value / 1e6)
@@ -228,7 +228,7 @@ def test_the_deviation_is_measured_along_edges_too() -> None:
 WALLS = [(-2.05, 1.95, 4.1, 0.1), (-2.05, -2.05, 4.1, 0.1), (1.95, -2.05, 0.1, 4.1), (-2.05, -2.05, 0.1, 4.1)]
 
 
-def walled_files() -> dict[str, str]:
+def build_walled_files() -> dict[str, str]:
     """Return the same room, 3.9 x 3.9 m within walls of 0.1 m, in several formats."""
     boxes = [
         f'<box id="{k}" size="{w},{h},1" movable="false"><body position="{x + w / 2},{y + h / 2},0"/></box>'
@@ -249,9 +249,9 @@ def walled_files() -> dict[str, str]:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", walled_files())
+@pytest.mark.parametrize("name", build_walled_files())
 def test_walls_around_the_free_space_are_the_boundary(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text(walled_files()[name])
+    (tmp_path / name).write_text(build_walled_files()[name])
     options = ReadOptions(cell=0.1) if name.endswith(".map") else ReadOptions()
     environment, _, _ = import_map(tmp_path / name, options=options)
     assert environment.free_area == pytest.approx(3.9**2, abs=1e-6)

@@ -23,24 +23,24 @@ ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
 CLOSET = box(20, 0, 23, 3)
 
 
-def foreign(*free: Polygon, **others: Any) -> ForeignMap:
+def build_foreign_map(*free: Polygon, **others: Any) -> ForeignMap:
     given = {"name": "plan", "description": "A plan.", "format": "test", "vertices_read": 12} | others
     return ForeignMap(free=MultiPolygon(list(free)), **given)
 
 
-def lines(report: Any) -> str:
+def join_lines(report: Any) -> str:
     return "\n".join(report.format_lines())
 
 
 def test_the_largest_part_is_kept_with_its_obstacles() -> None:
-    environment, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan.wkt")
+    environment, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(), "plan.wkt")
     assert (environment.name, environment.description) == ("plan", "A plan.")
     assert environment.boundary == ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
     assert [shape.polygon.area for shape in environment.obstacles] == pytest.approx([4, 0.0025])
     assert report.dropped == ("1 separate part of the free space, 9 m²",)
     assert (report.area_read, report.area_kept) == (pytest.approx(84.9975), pytest.approx(75.9975))
     assert (report.size, report.obstacles, report.vertices_kept) == ((10.0, 8.0), 2, 12)
-    assert lines(report).splitlines()[:2] == [
+    assert join_lines(report).splitlines()[:2] == [
         "test: 12 vertices read, 12 kept; free area 85 m² read, 76 m² kept",
         "10 x 8 m, 2 obstacles",
     ]
@@ -49,7 +49,7 @@ def test_the_largest_part_is_kept_with_its_obstacles() -> None:
 
 def test_inside_keeps_the_part_around_a_position() -> None:
     track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
-    whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
+    whole = build_foreign_map(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
     environment, report = build_environment(whole, Shaping(inside=(21.0, 1.0)), "plan")
     # the boundary is around all of the file, and not around this part
     assert environment.boundary_polygon.equals(CLOSET)
@@ -67,24 +67,26 @@ def test_inside_keeps_the_part_around_a_position() -> None:
 
 
 def test_a_large_omitted_part_is_noted() -> None:
-    _, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan")
+    _, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(), "plan")
     assert report.notes[0].startswith(
         "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
     )
-    assert build_environment(foreign(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
-    assert "stays" not in lines(build_environment(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")[1])
+    assert build_environment(build_foreign_map(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
+    assert "stays" not in join_lines(
+        build_environment(build_foreign_map(CLOSET, ROOM), Shaping(keep="all"), "plan")[1]
+    )
 
 
 @pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
 def test_coordinates_near_zero_become_zero(tiny: float) -> None:
     environment, _ = build_environment(
-        foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan"
+        build_foreign_map(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan"
     )
     assert sorted(environment.boundary) == [(0, 0), (0, 7), (6, 7)]
 
 
 def test_all_parts_lie_in_their_convex_hull() -> None:
-    environment, report = build_environment(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")
+    environment, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(keep="all"), "plan")
     assert environment.free_area == pytest.approx(ROOM.area + 9)
     assert len(environment.free.geoms) == 2
     assert environment.boundary_polygon.equals(shapely.union(ROOM, CLOSET).convex_hull)
@@ -95,72 +97,78 @@ def test_all_parts_lie_in_their_convex_hull() -> None:
 
 
 def test_specks_are_removed() -> None:
-    environment, report = build_environment(foreign(ROOM), Shaping(specks=0.01), "plan")
+    environment, report = build_environment(build_foreign_map(ROOM), Shaping(specks=0.01), "plan")
     assert len(environment.obstacles) == 1
     assert report.dropped == ("1 obstacle smaller than 0.01 m², 0.0025 m² (--specks 0 keeps them)",)
     parts = [box(20 + k, 0, 20.05 + k, 0.05) for k in range(3)]
-    environment, _ = build_environment(foreign(ROOM, *parts), Shaping(specks=0.01, keep="all"), "plan")
+    environment, _ = build_environment(
+        build_foreign_map(ROOM, *parts), Shaping(specks=0.01, keep="all"), "plan"
+    )
     assert len(environment.free.geoms) == 1
     many = ROOM
     for k in range(12):
         many -= box(2 + k / 4, 7, 2.04 + k / 4, 7.04)
-    _, report = build_environment(foreign(many), Shaping(), "plan")
+    _, report = build_environment(build_foreign_map(many), Shaping(), "plan")
     assert report.notes == ("13 obstacles are smaller than 0.01 m² (--specks 0.01 drops them)",)
     crumb = ROOM - box(7, 7, 7.001, 7.02)
-    environment, report = build_environment(foreign(crumb), Shaping(), "plan")
+    environment, report = build_environment(build_foreign_map(crumb), Shaping(), "plan")
     assert len(environment.obstacles) == 2
     assert report.dropped == ("1 hole of 2e-05 m², which come of rounding",)
 
 
 def test_noise_depends_on_the_format() -> None:
-    noisy = foreign(ROOM, specks=0.003)
+    noisy = build_foreign_map(ROOM, specks=0.003)
     assert len(build_environment(noisy, Shaping(), "plan")[0].obstacles) == 1
     assert len(build_environment(noisy, Shaping(specks=0.0), "plan")[0].obstacles) == 2
 
 
 def test_hull_and_margin_are_applied() -> None:
     corner = box(0, 0, 10, 8) - box(5, 4, 10, 8)
-    environment, _ = build_environment(foreign(corner), Shaping(hull=True), "plan")
+    environment, _ = build_environment(build_foreign_map(corner), Shaping(hull=True), "plan")
     assert environment.boundary_polygon.equals(corner.convex_hull)
     assert environment.free.equals(corner)
-    environment, _ = build_environment(foreign(corner), Shaping(margin=0.5), "plan")
+    environment, _ = build_environment(build_foreign_map(corner), Shaping(margin=0.5), "plan")
     assert environment.boundary_polygon.bounds == (-0.5, -0.5, 10.5, 8.5)
     assert environment.free.equals(corner)
     assert len(environment.obstacles) == 1
-    environment, _ = build_environment(foreign(corner), Shaping(margin=0.25, hull=True), "plan")
+    environment, _ = build_environment(build_foreign_map(corner), Shaping(margin=0.25, hull=True), "plan")
     assert environment.free.equals(corner)
     assert environment.region.area == pytest.approx(environment.area)
 
 
 def test_a_given_boundary_is_kept() -> None:
     outer = box(-1, -1, 11, 9)
-    named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="the shape called 'hall'")
+    named = build_foreign_map(
+        ROOM, boundary=outer, has_named_boundary=True, boundary_source="the shape called 'hall'"
+    )
     environment, report = build_environment(named, Shaping(), "plan")
     assert report.notes == ("the boundary is the shape called 'hall'",)
     assert environment.boundary_polygon.equals(outer)
     assert environment.free_area == pytest.approx(ROOM.area)
     assert [len(shape.holes) for shape in environment.obstacles if hasattr(shape, "holes")] == [1, 0, 0]
-    environment, report = build_environment(foreign(ROOM, boundary=box(0, 0, 10, 7)), Shaping(), "plan")
+    environment, report = build_environment(
+        build_foreign_map(ROOM, boundary=box(0, 0, 10, 7)), Shaping(), "plan"
+    )
     assert environment.area == 70
     assert report.dropped == ("10 m² of free space outside the boundary",)
     crossed = Polygon([(-1, -1), (11, -1), (11, 9), (-1, 9), (-1, 3), (-2, 4), (-2, 3), (-1, 4)])
-    environment, report = build_environment(foreign(ROOM, boundary=crossed), Shaping(), "plan")
+    environment, report = build_environment(build_foreign_map(ROOM, boundary=crossed), Shaping(), "plan")
     assert report.repaired[0].startswith("the boundary met itself: self-intersection at [")
     assert environment.free_area == pytest.approx(ROOM.area)
 
 
 def test_walls_replace_a_boundary_behind_them() -> None:
     outer = box(-1, -1, 11, 9)
-    environment, report = build_environment(foreign(ROOM, boundary=outer), Shaping(), "plan")
+    environment, report = build_environment(build_foreign_map(ROOM, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(box(0, 0, 10, 8))
     assert report.notes == ("the boundary is the inner edge of the walls around the free space",)
     # it stays as far as the free space reaches it
     door = ROOM | box(4, 7, 6, 9)
-    environment, report = build_environment(foreign(door, boundary=outer), Shaping(), "plan")
+    environment, report = build_environment(build_foreign_map(door, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(outer)
     # and where several parts stay, walls are among them
     environment, _ = build_environment(
-        foreign(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan"
+        build_foreign_map(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan"
     )
     assert environment.boundary_polygon.equals(box(-1, -1, 24, 9))
 
@@ -170,51 +178,51 @@ def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
     wavy = [(x / 10, 0.008 * math.sin(x)) for x in range(101)]
     outer = Polygon([*wavy, (10, 8), (0, 8)])
     room = outer - box(3, -1, 4, 2) - box(5, 5, 6, 6)
-    environment, _ = build_environment(foreign(room, boundary=outer), Shaping(), "plan")
+    environment, _ = build_environment(build_foreign_map(room, boundary=outer), Shaping(), "plan")
     assert len(environment.obstacles) == 2
     assert environment.free_area == pytest.approx(room.area, abs=0.2)
 
 
 def test_self_crossing_outlines_are_repaired() -> None:
     bow = Polygon([(0, 0), (0, 4), (6, -2), (6, 0)])
-    environment, report = build_environment(foreign(bow), Shaping(), "plan")
+    environment, report = build_environment(build_foreign_map(bow), Shaping(), "plan")
     assert environment.area == pytest.approx(8.0)
     assert report.repaired == ("outlines met themselves or each other: self-intersection at [4, 0]",)
     assert report.area_read == pytest.approx(10.0)
-    overlapping = foreign(box(0, 0, 4, 4), box(3, 3, 6, 6))
+    overlapping = build_foreign_map(box(0, 0, 4, 4), box(3, 3, 6, 6))
     environment, report = build_environment(overlapping, Shaping(), "plan")
     assert environment.area == pytest.approx(16 + 9 - 1)
     assert len(report.repaired) == 1
 
 
 def test_starts_are_added() -> None:
-    environment, _ = build_environment(foreign(ROOM), Shaping(), "plan")
+    environment, _ = build_environment(build_foreign_map(ROOM), Shaping(), "plan")
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
     assert len(environment.start().sample(6)) == 6
-    environment, _ = build_environment(foreign(ROOM), Shaping(default_start="uniform"), "plan")
+    environment, _ = build_environment(build_foreign_map(ROOM), Shaping(default_start="uniform"), "plan")
     assert list(environment.starts) == ["uniform", "room"]
-    narrow, _ = build_environment(foreign(box(0, 0, 9, 0.21)), Shaping(), "plan")
+    narrow, _ = build_environment(build_foreign_map(box(0, 0, 9, 0.21)), Shaping(), "plan")
     assert list(narrow.starts) == ["uniform"]
 
 
 def test_cells_larger_than_robots_are_noted() -> None:
-    _, report = build_environment(foreign(ROOM, cell=1.0), Shaping(), "plan")
+    _, report = build_environment(build_foreign_map(ROOM, cell=1.0), Shaping(), "plan")
     assert report.tolerance == 0.2
     assert (
         "cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 1)" in report.notes
     )
-    assert build_environment(foreign(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
-    assert build_environment(foreign(ROOM), Shaping(), "plan")[1].tolerance == 0.02
-    assert build_environment(foreign(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
+    assert build_environment(build_foreign_map(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
+    assert build_environment(build_foreign_map(ROOM), Shaping(), "plan")[1].tolerance == 0.02
+    assert build_environment(build_foreign_map(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
 
 
 def test_unreachable_regions_are_noted() -> None:
     rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
-    _, report = build_environment(foreign(rooms), Shaping(), "plan")
+    _, report = build_environment(build_foreign_map(rooms), Shaping(), "plan")
     (note,) = report.notes
     assert note.startswith("1 part of 6.8")
     assert note.endswith("m² cannot be reached by a robot of radius 0.1 m from the largest one")
-    assert build_environment(foreign(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
+    assert build_environment(build_foreign_map(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
 
 
 @pytest.mark.parametrize(
@@ -235,7 +243,7 @@ def test_unusable_maps_are_refused(
     parts: tuple[Polygon, ...], shaping: dict[str, Any], expected: str
 ) -> None:
     with pytest.raises(MapError) as caught:
-        build_environment(foreign(*parts), Shaping(**shaping), "plan")
+        build_environment(build_foreign_map(*parts), Shaping(**shaping), "plan")
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -289,7 +297,7 @@ def test_any_rings_give_a_map_or_a_map_error(
     outer = box(1, 1, 9, 9) if given else None
     shaping = Shaping(simplify=tolerance, keep=keep, hull=hull, margin=margin)
     try:
-        environment, report = build_environment(foreign(*parts, boundary=outer), shaping, "plan")
+        environment, report = build_environment(build_foreign_map(*parts, boundary=outer), shaping, "plan")
     except MapError as error:
         assert str(error).startswith("plan: ")
         assert "\n" not in str(error)
@@ -319,7 +327,7 @@ def test_boundary_and_obstacles_preserve_the_free_space(
 def test_the_deviation_of_walls_is_measured() -> None:
     # a bump of 15 mm goes: a triangle of 30 cm² changes sides
     bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
-    _, report = build_environment(foreign(bumpy), Shaping(), "plan")
+    _, report = build_environment(build_foreign_map(bumpy), Shaping(), "plan")
     assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
     assert report.changed == (
         "walls moved by at most 0.015 m; 0.003 m² changed sides, 0.0038 % of the free area",
@@ -328,20 +336,20 @@ def test_the_deviation_of_walls_is_measured() -> None:
         report.moved,
         report.moved_area,
     )
-    _, report = build_environment(foreign(bumpy), Shaping(simplify=0.0), "plan")
+    _, report = build_environment(build_foreign_map(bumpy), Shaping(simplify=0.0), "plan")
     assert (report.changed, report.moved, report.moved_area) == ((), 0.0, 0.0)
 
 
 def test_a_map_of_many_vertices_has_a_note() -> None:
     angle = [k * math.tau / 6000 for k in range(6000)]
     round_room = Polygon([(400 * math.cos(a), 400 * math.sin(a)) for a in angle])
-    _, report = build_environment(foreign(round_room), Shaping(simplify=0.0), "plan")
+    _, report = build_environment(build_foreign_map(round_room), Shaping(simplify=0.0), "plan")
     assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbors
     assert report.notes[-1].startswith(
         f"This map has many vertices ({report.vertices_kept}): computing the distances between them takes "
         "about"
     )
-    assert "many" not in lines(build_environment(foreign(round_room), Shaping(), "plan")[1])
+    assert "many" not in join_lines(build_environment(build_foreign_map(round_room), Shaping(), "plan")[1])
 
 
 @pytest.mark.parametrize(("most", "expected"), [("MAX_OBSTACLES", "obstacles"), ("MAX_VERTICES", "vertices")])
@@ -350,7 +358,7 @@ def test_a_map_that_takes_too_long_is_refused(
 ) -> None:
     monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.environment.{most}", 0)
     with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {expected}: --specks AREA"):
-        build_environment(foreign(ROOM), Shaping(), "plan")
+        build_environment(build_foreign_map(ROOM), Shaping(), "plan")
 
 
 _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)

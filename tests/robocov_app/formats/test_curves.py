@@ -21,13 +21,13 @@ _NUMBER = st.integers(-5000, 5000).map(lambda number: number / 100)
 _POINT = st.tuples(_NUMBER, _NUMBER)
 
 
-def farthest(exact: np.ndarray, drawn: np.ndarray) -> float:
+def measure_max_distance(exact: np.ndarray, points: np.ndarray) -> float:
     """Return the largest distance of points of a curve from the line that stands for it."""
-    line = shapely.LineString(drawn) if len(np.unique(drawn, axis=0)) > 1 else shapely.Point(drawn[0])
+    line = shapely.LineString(points) if len(np.unique(points, axis=0)) > 1 else shapely.Point(points[0])
     return float(shapely.distance(line, shapely.points(exact)).max())
 
 
-def alone(control: np.ndarray, tolerance: float) -> np.ndarray:
+def flatten_single(control: np.ndarray, tolerance: float) -> np.ndarray:
     return flatten_beziers(control[None], tolerance)[0]
 
 
@@ -38,9 +38,9 @@ def test_bezier_curves_stay_within_the_tolerance(
     points = np.array(control)
     weights = [(1 - _FINE) ** 3, 3 * _FINE * (1 - _FINE) ** 2, 3 * _FINE**2 * (1 - _FINE), _FINE**3]
     exact = sum(weight * point for weight, point in zip(weights, points, strict=True))
-    drawn = np.concatenate([points[:1], alone(points, tolerance)])
-    assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-12
-    assert (drawn[-1] == points[-1]).all()
+    points = np.concatenate([points[:1], flatten_single(points, tolerance)])
+    assert measure_max_distance(exact, points) <= tolerance * (1 + 1e-6) + 1e-12
+    assert (points[-1] == points[-1]).all()
 
 
 @given(
@@ -59,12 +59,14 @@ def test_arcs_stay_within_the_tolerance(
     sweep: float,
     tolerance: float,
 ) -> None:
-    c, p, q = np.array(center), np.array(u), np.array(v)
+    c = np.array(center)
+    p = np.array(u)
+    q = np.array(v)
     angle = begin + sweep * _FINE
     exact = c + np.cos(angle) * p + np.sin(angle) * q
-    drawn = np.concatenate([exact[:1], flatten_arc(c, p, q, start=begin, sweep=sweep, tolerance=tolerance)])
-    assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-9
-    assert np.allclose(drawn[-1], exact[-1])
+    points = np.concatenate([exact[:1], flatten_arc(c, p, q, start=begin, sweep=sweep, tolerance=tolerance)])
+    assert measure_max_distance(exact, points) <= tolerance * (1 + 1e-6) + 1e-9
+    assert np.allclose(points[-1], exact[-1])
 
 
 def flatten_circle(radius: float, sweep: float) -> np.ndarray:
@@ -75,10 +77,10 @@ def flatten_circle(radius: float, sweep: float) -> np.ndarray:
 
 def test_no_more_points_than_a_circle_needs() -> None:
     for radius in (0.5, 5.0, 500.0):
-        drawn = flatten_circle(radius, sweep=math.tau)
+        points = flatten_circle(radius, sweep=math.tau)
         needed = math.pi / math.acos(1.0 - 1e-3 / radius)
-        assert needed <= len(drawn) <= needed + 1
-    straight = alone(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), 1e-3)
+        assert needed <= len(points) <= needed + 1
+    straight = flatten_single(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), 1e-3)
     assert straight.tolist() == [[3.0, 0.0]]
 
 
@@ -87,7 +89,7 @@ def test_batches_agree_with_single_curves() -> None:
     points, count = flatten_beziers(curves, 1e-2)
     assert len(set(count.tolist())) > 2
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
-        assert (part == alone(curves[k], 1e-2)).all()
+        assert (part == flatten_single(curves[k], 1e-2)).all()
     center, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
     angle, sweep = np.random.default_rng(4).random((2, 7)) * 6 - 3
     points, count = flatten_arcs(center, u, v, angle, sweep, tolerance=1e-2)
@@ -101,7 +103,7 @@ def test_huge_curves_are_refused(radius: float) -> None:
     with pytest.raises(ValueError, match=f"expected at most {MAX_POINTS} points, got more"):
         flatten_circle(radius, sweep=math.tau)
     with pytest.raises(ValueError, match="expected at most 250000 points"):
-        alone(np.array([[0.0, 0.0], [1e5 * radius, 1.0], [0.0, 2.0], [0.0, 0.0]]), 1e-3)
+        flatten_single(np.array([[0.0, 0.0], [1e5 * radius, 1.0], [0.0, 2.0], [0.0, 0.0]]), 1e-3)
     if radius < 1e40:
         part = flatten_circle(radius, sweep=1 / radius)
         assert len(part) == 1
@@ -111,7 +113,7 @@ def test_a_sampled_curve_stays_within_the_tolerance() -> None:
     def wave(t: np.ndarray) -> np.ndarray:
         return np.column_stack([t, np.sin(3 * t) + np.maximum(t - 2, 0)])
 
-    drawn = sample_curve(wave, np.array([0.0, 2.0, 5.0]), 1e-3)
-    assert farthest(wave(np.linspace(0, 5, 5001)), drawn) <= 1e-3
-    assert len(drawn) < 200
+    points = sample_curve(wave, np.array([0.0, 2.0, 5.0]), 1e-3)
+    assert measure_max_distance(wave(np.linspace(0, 5, 5001)), points) <= 1e-3
+    assert len(points) < 200
     assert len(sample_curve(lambda t: np.column_stack([t, 0 * t]), np.array([0.0, 1.0]), 1e-3)) == 9

@@ -82,9 +82,9 @@ obstacles: st.SearchStrategy[Obstacle] = st.one_of(
 )  # fmt: skip
 
 
-def drawn_room(slant: float, things: list[Obstacle]) -> Environment:
+def build_slanted_room(slant: float, obstacles: list[Obstacle]) -> Environment:
     corners = ((0.0, 0.0), (8.0, slant), (8.0 - slant, 6.0), (slant / 2, 6.0 - slant))
-    return Environment("drawn", corners, tuple(things))
+    return Environment("drawn", corners, tuple(obstacles))
 
 
 @pytest.mark.slow
@@ -94,17 +94,21 @@ def drawn_room(slant: float, things: list[Obstacle]) -> Environment:
     st.sampled_from(["ros", "scale", "raw", "png-of-ros", "movingai", "picture"]),
 )  # fmt: skip
 def test_out_and_in_again_changes_less_than_a_row_of_cells(
-    tmp_path_factory: pytest.TempPathFactory, slant: float, things: list[Obstacle], cell: float, way: str
+    tmp_path_factory: pytest.TempPathFactory,
+    slant: float,
+    obstacles: list[Obstacle],
+    cell: float,
+    format_name: str,
 ) -> None:
     folder = tmp_path_factory.getbasetemp()
-    environment = drawn_room(slant, things)
+    environment = build_slanted_room(slant, obstacles)
     if not Polygon(environment.boundary).is_valid or environment.free.is_empty:
         return
-    form = {"scale": "ros", "raw": "ros", "png-of-ros": "ros"}.get(way, way)
+    form = {"scale": "ros", "raw": "ros", "png-of-ros": "ros"}.get(format_name, format_name)
     options = WriteOptions(
         cell=cell,
-        mode=way if way in ("scale", "raw") else None,  # type: ignore[arg-type]
-        image="png" if way == "png-of-ros" else None,
+        mode=format_name if format_name in ("scale", "raw") else None,  # type: ignore[arg-type]
+        image="png" if format_name == "png-of-ros" else None,
     )
     path = folder / f"drawn{EXPORTERS[form].suffixes[0]}"
     written = export_map(environment, path, options=options)
@@ -131,7 +135,7 @@ PLACES = {
     "the equator": (-78.5, 0.0), "the north": (8.4, 49.0), "the south": (151.2, -33.9),
     "the antimeridian": (179.9999, 60.0), "a pole": (30.0, -89.0),
 }  # fmt: skip
-WAYS: dict[str, tuple[str, WriteOptions]] = {
+FORMATS: dict[str, tuple[str, WriteOptions]] = {
     "ROS": (".yaml", WriteOptions()),
     "MovingAI": (".map", WriteOptions()),
     "a picture": (".png", WriteOptions()),
@@ -148,7 +152,7 @@ QUICK = ("rooms", "campus", "generated polygons")
 
 
 @functools.cache
-def a_map(name: str) -> Environment:
+def get_map(name: str) -> Environment:
     kind = name.removeprefix("generated ")
     return load_map(name) if kind == name else generate_map(1, kind=kind)
 
@@ -156,9 +160,10 @@ def a_map(name: str) -> Environment:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MAPS]
 )
-@pytest.mark.parametrize("way", WAYS)
-def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
-    environment, (suffix, options) = a_map(name), WAYS[way]
+@pytest.mark.parametrize("format_name", FORMATS)
+def test_maps_go_out_and_in(tmp_path: Path, name: str, format_name: str) -> None:
+    environment = get_map(name)
+    (suffix, options) = FORMATS[format_name]
     path = tmp_path / f"map{suffix}"
     read = ReadOptions()
     if "cell" in choose_exporter(path).options:

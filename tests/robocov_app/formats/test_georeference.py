@@ -18,10 +18,14 @@ PLAIN = ReadOptions()
 _GLOBE = pyproj.Geod(ellps="WGS84")
 
 
-def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
+def project_points(
+    points: Any, options: ReadOptions = PLAIN, **defaults: Any
+) -> tuple[np.ndarray, list[str]]:
     shapes = Shapes("plan", options)
-    given = {"crs": None, **given}
-    (figure,) = convert_to_meters([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
+    defaults = {"crs": None, **defaults}
+    (figure,) = convert_to_meters(
+        [SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **defaults
+    )
     return figure.rings[0], shapes.notes
 
 
@@ -35,7 +39,7 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     narrow = max(np.cos(np.radians(latitude)), 0.05)
     degrees = np.array([(longitude + 0.02 / narrow * x, latitude + 0.02 * y) for x, y in places])
     degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # across the antimeridian as well
-    meters, (note,) = moved(degrees, may_be_degrees=True)
+    meters, (note,) = project_points(degrees, may_be_degrees=True)
     assert note.startswith("degrees projected to meters about longitude")
     azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
     step = np.diff(meters, axis=0)
@@ -48,36 +52,38 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
 
 
 def test_wide_coordinates_are_meters() -> None:
-    meters, (note,) = moved([[0, 0], [20, 10]], may_be_degrees=True)
+    meters, (note,) = project_points([[0, 0], [20, 10]], may_be_degrees=True)
     assert meters.tolist() == [[0, 0], [20, 10]]
     assert "as degrees the map would be larger than 10 km" in note
-    assert moved([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
-    assert moved([[0, 0], [20, 10]])[1] == []
-    assert moved([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
+    assert project_points([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
+    assert project_points([[0, 0], [20, 10]])[1] == []
+    assert project_points([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
     # ten kilometers are more degrees near the pole
-    assert "degrees projected" in moved([[10, 85], [10.9, 85.05]], may_be_degrees=True)[1][0]
-    assert "degrees projected" in moved([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
+    assert "degrees projected" in project_points([[10, 85], [10.9, 85.05]], may_be_degrees=True)[1][0]
+    assert (
+        "degrees projected" in project_points([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
+    )
 
 
 def test_a_given_reference_system_is_used() -> None:
     degrees = np.array([[8.4, 49.0], [8.41, 49.005]])
     to_utm = pyproj.Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
     utm = np.column_stack(to_utm.transform(*degrees.T))
-    here = {"origin": (8.4, 49.0)}
-    direct, _ = moved(degrees, may_be_degrees=True, **here)
+    location = {"origin": (8.4, 49.0)}
+    direct, _ = project_points(degrees, may_be_degrees=True, **location)
     assert direct[0] == pytest.approx([0, 0], abs=1e-9)
     for name in ("EPSG:25832", "urn:ogc:def:crs:EPSG::25832", "http://www.opengis.net/def/crs/EPSG/0/25832"):
-        meters, (note,) = moved(utm, crs=name, **here)
+        meters, (note,) = project_points(utm, crs=name, **location)
         assert meters == pytest.approx(direct, abs=1e-3)
         assert note.startswith("EPSG:25832 projected")
     for name in ("EPSG:4326", "urn:ogc:def:crs:OGC:1.3:CRS84"):
-        assert moved(degrees, crs=name, **here)[0] == pytest.approx(direct)
-    plain, notes = moved(utm, ReadOptions(units="meters"), crs="EPSG:25832")
+        assert project_points(degrees, crs=name, **location)[0] == pytest.approx(direct)
+    plain, notes = project_points(utm, ReadOptions(units="meters"), crs="EPSG:25832")
     assert (plain == utm).all()
     assert notes == ["coordinates of EPSG:25832 taken as they are"]
     # Mercator's meters are not meters
     mercator = np.column_stack(pyproj.Transformer.from_crs(4326, 3857, always_xy=True).transform(*degrees.T))
-    assert moved(mercator, crs="EPSG:3857", **here)[0] == pytest.approx(direct, abs=1e-3)
+    assert project_points(mercator, crs="EPSG:3857", **location)[0] == pytest.approx(direct, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -97,15 +103,18 @@ def test_a_given_reference_system_is_used() -> None:
 )
 def test_impossible_coordinates_are_refused(crs: str, points: Any, expected: str) -> None:
     with pytest.raises(MapError, match=rf"^plan: {expected}.*--units meters") as caught:
-        moved(points, crs=crs)
+        project_points(points, crs=crs)
     assert "\n" not in str(caught.value)
 
 
 def test_a_missing_pyproj_is_reported_with_the_command_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(MapError, match=r'^plan: coordinates in degrees: .*pip install "robocov\[geo\]"'):
-        moved([[8, 49], [8.001, 49.001]], may_be_degrees=True)
-    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="meters"), may_be_degrees=True)[0][0, 0] == 8.0
+        project_points([[8, 49], [8.001, 49.001]], may_be_degrees=True)
+    assert (
+        project_points([[8, 49], [8.001, 49.001]], ReadOptions(units="meters"), may_be_degrees=True)[0][0, 0]
+        == 8.0
+    )
 
 
 def test_projected_geometries_keep_their_rings() -> None:

@@ -51,7 +51,7 @@ def measure_import(files: list[tuple[Path, float | None]]) -> list[tuple[str, fl
     return [(said, seconds, memory) for said, seconds, memory in json.loads(done.stdout)]
 
 
-def sparse(path: Path, head: bytes, size: int) -> Path:
+def write_sparse_file(path: Path, head: bytes, size: int) -> Path:
     with path.open("wb") as file:
         file.write(head)
         file.truncate(size)
@@ -84,7 +84,7 @@ def deep_yaml() -> bytes:
     return b"image: a.pgm\nresolution: 1\norigin: " + b"[" * 30_000
 
 
-def laughs() -> bytes:
+def build_yaml_bomb() -> bytes:
     lines = [b"image: a.pgm", b"resolution: 1", b"a: &a [lol, lol, lol, lol, lol, lol, lol, lol, lol]"]
     lines += [b"%c: &%c [%s]" % (k, k, b", ".join([b"*%c" % (k - 1)] * 9)) for k in range(98, 107)]
     return b"\n".join(lines)
@@ -126,7 +126,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     ),
     "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "cut off after 333"),
     "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "complete PPM"),
-    "laughs": ("a.yaml", laughs, "", "more than 50000 values, aliases followed"),
+    "laughs": ("a.yaml", build_yaml_bomb, "", "more than 50000 values, aliases followed"),
     "depth": ("a.yaml", deep_yaml, "", "nested too deeply"),
     "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "most 0.262 MB"),
     "a terabyte": ("a.pgm", None, "cell", "expected at most 256 MB"),
@@ -142,7 +142,7 @@ def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
         folder.mkdir()
         (folder / "a.pgm").touch()
         if content is None:
-            sparse(folder / file, b"P5 4000 4000 255\n", 10**12)
+            write_sparse_file(folder / file, b"P5 4000 4000 255\n", 10**12)
         else:
             (folder / file).write_bytes(content())
         files.append((folder / file, 1.0 if options == "cell" else None))

@@ -17,7 +17,8 @@ from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_ma
 # with the corners of the rooms beside it
 WALKWAY = [(0, 8), (30, 8), (30, 12), (20, 12), (10, 12), (0, 12)]
 PLANE = pyproj.Proj(proj="aeqd", lon_0=8.4, lat_0=49.0, ellps="WGS84")
-GROUND, UPSTAIRS = "11111111-0000", "11111111-0001"
+GROUND = "11111111-0000"
+UPSTAIRS = "11111111-0001"
 
 
 def degrees(points: list[tuple[float, float]]) -> list[list[float]]:
@@ -79,18 +80,18 @@ def venue() -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def as_folder(folder: Path, given: dict[str, list[dict[str, Any]]]) -> Path:
+def write_folder(folder: Path, files: dict[str, list[dict[str, Any]]]) -> Path:
     folder.mkdir()
-    for name, features in given.items():
+    for name, features in files.items():
         document = {"type": "FeatureCollection", "features": features}
         (folder / f"{name}.geojson").write_text(json.dumps(document))
     (folder / "manifest.json").write_text('{"version": "1.0.0"}')
     return folder
 
 
-def as_zip(path: Path, given: dict[str, list[dict[str, Any]]], within: str = "") -> Path:
+def write_zip(path: Path, files: dict[str, list[dict[str, Any]]], within: str = "") -> Path:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, features in given.items():
+        for name, features in files.items():
             document = {"type": "FeatureCollection", "features": features}
             archive.writestr(f"{within}{name}.geojson", json.dumps(document))
     return path
@@ -101,20 +102,20 @@ def read(path: Path, **options: Any) -> Any:
     return IMPORTERS["imdf"].read(path, ReadOptions(**options))
 
 
-def moved(free: Any) -> Any:
+def move_to_corner(free: Any) -> Any:
     """Return free space with the lower left corner of the floor at [0, 0]: it is about the middle."""
     return shapely.transform(free, lambda points: points + [15, 10])
 
 
 @pytest.mark.parametrize("kind", ["folder", "zip", "zip in a folder"])
 def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -> None:
-    given = venue()
+    files = venue()
     if kind == "folder":
-        path = as_folder(tmp_path / "mill", given)
+        path = write_folder(tmp_path / "mill", files)
     else:
-        path = as_zip(tmp_path / "mill.zip", given, "mill/" if kind.endswith("folder") else "")
+        path = write_zip(tmp_path / "mill.zip", files, "mill/" if kind.endswith("folder") else "")
     foreign = read(path, thickness=0.1)
-    free = moved(foreign.free)
+    free = move_to_corner(foreign.free)
     part = next(part for part in free.geoms if part.contains(Point(1, 10)))
     assert part.contains(Point(5, 15)), "A has an edge in common with the walkway, and an opening"
     assert part.contains(Point(5, 4)), "B is behind a wall of 20 cm, with an opening in it"
@@ -129,29 +130,30 @@ def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -
 
 
 def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:
-    environment, report, _ = import_map(as_folder(tmp_path / "mill", venue()))
+    environment, report, _ = import_map(write_folder(tmp_path / "mill", venue()))
     # the walls stand on the outlines, half of them in each room
-    walkway, rooms = 30 * 4 - 1, 10 * 8 + 10 * 7.8 - 4
+    walkway = 30 * 4 - 1
+    rooms = 10 * 8 + 10 * 7.8 - 4
     assert environment.free_area == pytest.approx(walkway + rooms, abs=8)
     assert report.format == "imdf"
 
 
 @pytest.mark.parametrize("asked", ["1", "1.0", "OG", "upper floor", UPSTAIRS])
 def test_a_level_is_chosen_by_number_or_name(tmp_path: Path, asked: str) -> None:
-    foreign = read(as_folder(tmp_path / "mill", venue()), level=asked)
+    foreign = read(write_folder(tmp_path / "mill", venue()), level=asked)
     assert foreign.free.area == pytest.approx(600, rel=1e-4)
 
 
 def test_a_missing_level_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got '7'"):
-        read(as_folder(tmp_path / "mill", venue()), level="7")
+        read(write_folder(tmp_path / "mill", venue()), level="7")
 
 
 def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:
-    given = venue()
-    del given["opening"]
-    foreign = read(as_folder(tmp_path / "mill", given))
-    part = next(part for part in moved(foreign.free).geoms if part.contains(Point(1, 10)))
+    files = venue()
+    del files["opening"]
+    foreign = read(write_folder(tmp_path / "mill", files))
+    part = next(part for part in move_to_corner(foreign.free).geoms if part.contains(Point(1, 10)))
     assert part.contains(Point(5, 15)) and part.contains(Point(25, 16))
     assert "no door or opening on this level: 3 rooms are open to adjacent spaces" in foreign.notes
 
@@ -206,7 +208,7 @@ def test_invalid_content_is_refused(tmp_path: Path) -> None:
         ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
     ]
     for k, (name, features, expected) in enumerate(cases):
-        path = as_folder(tmp_path / f"mill{k}", {**venue(), name: features})
+        path = write_folder(tmp_path / f"mill{k}", {**venue(), name: features})
         with pytest.raises(MapError) as caught:
             read(path)
         assert expected in str(caught.value)
@@ -221,17 +223,17 @@ def test_other_folders_and_archives_are_not_imdf(tmp_path: Path) -> None:
         archive.writestr("readme.txt", b"hello")
     with pytest.raises(MapError, match="zip archive"):
         detect_format(other)
-    half = as_zip(tmp_path / "half.zip", {"unit": venue()["unit"]})
+    half = write_zip(tmp_path / "half.zip", {"unit": venue()["unit"]})
     with pytest.raises(MapError, match=r"expected level\.geojson in it"):
         read(half)
 
 
 def test_hairlines_between_units_are_closed(tmp_path: Path) -> None:
-    given = venue()
-    del given["opening"]
+    files = venue()
+    del files["opening"]
     # without the corners of the rooms beside it, and askew: edges miss each other by some micrometers
-    given["unit"][0]["geometry"] = polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
-    given["unit"][1]["geometry"] = polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
-    foreign = read(as_folder(tmp_path / "mill", given))
+    files["unit"][0]["geometry"] = polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
+    files["unit"][1]["geometry"] = polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
+    foreign = read(write_folder(tmp_path / "mill", files))
     assert any(part.contains(Point(-10, 0)) and part.contains(Point(-10, 5)) for part in foreign.free.geoms)
     assert "1 gap between outlines closed" in foreign.repaired[-1]

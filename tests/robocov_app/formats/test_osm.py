@@ -29,25 +29,25 @@ class Extract:
         longitude, latitude = PLANE(x, y, inverse=True)
         number = len(self.nodes) + 1
         self.nodes.append(
-            f'<node id="{number}" lat="{latitude:.9f}" lon="{longitude:.9f}">{said(tags)}</node>'
+            f'<node id="{number}" lat="{latitude:.9f}" lon="{longitude:.9f}">{format_tags(tags)}</node>'
         )
         return number
 
     def way(self, points: list[tuple[float, float]], closed: bool = True, **tags: str) -> int:
         nodes = [self.node(*point) for point in points]
         nodes += nodes[:1] if closed else []
-        return self.way_of(nodes, **tags)
+        return self.way_through(nodes, **tags)
 
-    def way_of(self, nodes: list[int], **tags: str) -> int:
+    def way_through(self, nodes: list[int], **tags: str) -> int:
         number = 100 + len(self.ways)
         refs = "".join(f'<nd ref="{k}"/>' for k in nodes)
-        self.ways.append(f'<way id="{number}">{refs}{said(tags)}</way>')
+        self.ways.append(f'<way id="{number}">{refs}{format_tags(tags)}</way>')
         return number
 
     def relation(self, *members: tuple[int, str], **tags: str) -> None:
         ways = "".join(f'<member type="way" ref="{k}" role="{role}"/>' for k, role in members)
         self.ways.append(
-            f'<relation id="{len(self.ways)}">{ways}{said({"type": "multipolygon"} | tags)}</relation>'
+            f'<relation id="{len(self.ways)}">{ways}{format_tags({"type": "multipolygon"} | tags)}</relation>'
         )
 
     def text(self, half: tuple[float, float] | None = (40.0, 30.0)) -> str:
@@ -61,7 +61,7 @@ class Extract:
         return HEAD + bounds + "\n".join([*self.nodes, *self.ways]) + "\n</osm>\n"
 
 
-def said(tags: dict[str, str]) -> str:
+def format_tags(tags: dict[str, str]) -> str:
     return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
 
 
@@ -92,8 +92,8 @@ def test_buildings_are_projected_with_north_up(tmp_path: Path) -> None:
 def test_a_relation_is_made_up_of_ways(tmp_path: Path, roles: tuple[str, str, str]) -> None:
     extract = Extract()
     corners = [extract.node(*place) for place in square(0, 0, 20)]
-    one = extract.way_of(corners[:3])
-    other = extract.way_of([corners[0], corners[3], corners[2]])  # against its direction
+    one = extract.way_through(corners[:3])
+    other = extract.way_through([corners[0], corners[3], corners[2]])  # against its direction
     court = extract.way(square(5, 5, 10))
     extract.relation(*zip((one, other, court), roles, strict=True), building="school")
     found = solid(tmp_path, extract)
@@ -124,7 +124,7 @@ def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     extract.way(square(20, 0, 10), building="roof")
     extract.way(square(20, 0, 10), building="yes", layer="-1")
     extract.way(square(-20, 0, 10), highway="residential")
-    extract.way_of([1, 2, 999, 1], building="yes")
+    extract.way_through([1, 2, 999, 1], building="yes")
     extract.way([(0, 20), (5, 20), (5, 25)], closed=False, building="yes")
     assert solid(tmp_path, extract).area == pytest.approx(100, abs=0.05)
     assert solid(tmp_path, extract, water="free").area < 0.05
@@ -146,7 +146,7 @@ def test_data_without_bounds_gets_a_rectangle(tmp_path: Path) -> None:
     assert free.area == pytest.approx(24 * 24 - 50, abs=0.1)
 
 
-def crowd() -> str:
+def build_crowded_extract() -> str:
     """Return 3,000 relations of one way of 3,000 nodes."""
     extract = Extract()
     way = extract.way([(20 * math.cos(k / 500), 20 * math.sin(k / 500)) for k in range(3000)])
@@ -168,7 +168,7 @@ def crowd() -> str:
         (HEAD + "<way id='1'><nd ref='a'/></way></osm>", "3: <nd>: invalid literal for int()"),
         (HEAD + "</osm>", "no closed outline and no line"),
         (HEAD + "<node id='1' lat='0' lon='0'/>" * 500_001, "expected at most 500000, got about 500001"),
-        (crowd(), "expected at most 500000, got about 2001667 vertices"),
+        (build_crowded_extract(), "expected at most 500000, got about 2001667 vertices"),
         (HEAD.replace("UTF-8", "UTF-99"), "not XML: unknown encoding"),
         (HEAD + "<bounds minlat='0' minlon='0' maxlat='9' maxlon='9'/></osm>", "expected at most 10 km"),
     ],
@@ -190,7 +190,7 @@ def test_invalid_data_is_refused(tmp_path: Path, text: str, expected: str) -> No
 def test_a_way_of_one_repeated_node_is_omitted(tmp_path: Path, tags: dict[str, str]) -> None:
     extract = Extract()
     node = extract.node(0, 0)
-    extract.way_of([node] * 4, **tags)
+    extract.way_through([node] * 4, **tags)
     path = tmp_path / "town.osm"
     path.write_text(extract.text(None))
     with pytest.raises(MapError, match="no closed outline and no line"):
@@ -200,8 +200,8 @@ def test_a_way_of_one_repeated_node_is_omitted(tmp_path: Path, tags: dict[str, s
 def test_a_degenerate_way_is_omitted(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(square(0, 0, 5), building="yes")
-    extract.way_of([1, 1, 1], building="yes")
-    extract.way_of([1, 2, 1], building="yes")
+    extract.way_through([1, 1, 1], building="yes")
+    extract.way_through([1, 2, 1], building="yes")
     extract.relation((999, "outer"), building="yes")
     extract.ways.append('<way id="999">' + '<nd ref="1"/>' * 3 + "</way>")
     assert solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
@@ -229,7 +229,7 @@ def geometry(points: list[tuple[float, float]]) -> list[dict[str, float]]:
     return [{"lat": each["lat"], "lon": each["lon"]} for each in nodes(points)]
 
 
-def bounds_of(points: list[tuple[float, float]]) -> dict[str, float]:
+def compute_bounds(points: list[tuple[float, float]]) -> dict[str, float]:
     low, _, high, _ = geometry(points)
     return {"minlat": low["lat"], "minlon": low["lon"], "maxlat": high["lat"], "maxlon": high["lon"]}
 
@@ -251,7 +251,9 @@ def test_overpass_json_agrees_with_xml(tmp_path: Path, style: str) -> None:
     if style != "out":
         way["geometry"] = geometry(ring)
     path = tmp_path / "town.json"
-    path.write_text(overpass(*before, way, bounds=bounds_of(ROOM), remark="runtime error: Query timed out"))
+    path.write_text(
+        overpass(*before, way, bounds=compute_bounds(ROOM), remark="runtime error: Query timed out")
+    )
     assert detect_format(path) is IMPORTERS["osm"]
     foreign = IMPORTERS["osm"].read(path, ReadOptions(pillar=0.5))
     assert foreign.free.area == pytest.approx(1600 - 100 - math.pi / 4, rel=1e-3)
@@ -267,7 +269,7 @@ def test_overpass_relations_contain_their_ways(tmp_path: Path) -> None:
     tags = {"type": "multipolygon", "building": "yes"}
     path = tmp_path / "town.json"
     house = {"type": "relation", "id": 1, "members": members, "tags": tags}
-    path.write_text(overpass(house, bounds=bounds_of(square(-30, -30, 60))))
+    path.write_text(overpass(house, bounds=compute_bounds(square(-30, -30, 60))))
     foreign = IMPORTERS["osm"].read(path, ReadOptions())
     assert foreign.free.area == pytest.approx(3600 - 1600 + 100, rel=1e-3)
 
@@ -316,11 +318,13 @@ def floor_plan(doors: bool = True) -> Extract:
     north = extract.node(10, 10)
     south = [extract.node(0, -6), extract.node(20, -6)]
     corridor = [corner[name] for name in ("a", "b", "c", "d")] + [door, corner["e"], corner["a"]]
-    extract.way_of(corridor, indoor="corridor", level="0")
-    extract.way_of(
+    extract.way_through(corridor, indoor="corridor", level="0")
+    extract.way_through(
         [corner["e"], door, corner["d"], north, corner["f"], corner["e"]], indoor="room", level="0"
     )
-    extract.way_of([corner["a"], *south, corner["b"], corner["a"]], indoor="room", level="0;1", name="store")
+    extract.way_through(
+        [corner["a"], *south, corner["b"], corner["a"]], indoor="room", level="0;1", name="store"
+    )
     extract.way([(16, 1), (18, 1), (18, 3), (16, 3)], indoor="area", room="stairs", level="0")
     extract.way([(0, 0), (20, 0), (20, 4), (0, 4)], indoor="corridor", level="2")
     extract.way([(0, -6), (20, -6), (20, 10), (0, 10)], building="yes")
@@ -333,14 +337,14 @@ def indoors(folder: Path, extract: Extract, **options: Any) -> Any:
     return IMPORTERS["osm"].read(path, ReadOptions(**options))
 
 
-def in_plan(free: Any) -> Any:
+def move_to_plan(free: Any) -> Any:
     """Return free space of the whole ground floor as `floor_plan` has it."""
     return shapely.transform(free, lambda points: points + [10, 2])
 
 
 def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
     foreign = indoors(tmp_path, floor_plan(), thickness=0.1)
-    free = in_plan(foreign.free)
+    free = move_to_plan(foreign.free)
     corridor = next(part for part in free.geoms if part.contains(shapely.Point(5, 2)))
     assert corridor.contains(shapely.Point(5, 8)), "the north room has a door"
     assert not corridor.contains(shapely.Point(5, -3)), "the south room has none"

@@ -11,7 +11,7 @@ from robocov_app.formats import ForeignMap, ImportReport, ReadOptions, Shaping, 
 from robocov_app.formats.geometry.cells.strokes import remove_thin_strokes
 
 
-def paper(width: int = 200, height: int = 120) -> tuple[Image.Image, ImageDraw.ImageDraw]:
+def create_paper(width: int = 200, height: int = 120) -> tuple[Image.Image, ImageDraw.ImageDraw]:
     picture = Image.new("RGB", (width, height), "white")
     return picture, ImageDraw.Draw(picture)
 
@@ -27,9 +27,9 @@ def import_picture(
     return environment.free_area, report, foreign
 
 
-def flat() -> Image.Image:
+def draw_flat() -> Image.Image:
     """A flat of 7.4 x 3.4 m with a wall that parts it, amid paper of 20 x 12 m."""
-    picture, draw = paper()
+    picture, draw = create_paper()
     draw.rectangle((60, 40, 139, 79), fill="black")
     draw.rectangle((63, 43, 136, 76), fill="white")
     draw.line((100, 40, 100, 64), fill="black", width=2)
@@ -37,17 +37,17 @@ def flat() -> Image.Image:
 
 
 def test_a_plan_on_paper_is_taken_without_the_paper(tmp_path: Path) -> None:
-    area, report, _ = import_picture(tmp_path, flat())
+    area, report, _ = import_picture(tmp_path, draw_flat())
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.05)
     (note,) = [note for note in report.notes if "paper around a plan" in note]
     assert "the largest part of the free space, 208 m²" in note and "100 % of the edge" in note
     assert "--inside" in note
     place = report.others[0]
-    assert import_picture(tmp_path, flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
+    assert import_picture(tmp_path, draw_flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
 
 
 def test_the_inside_of_a_small_obstacle_is_not_a_plan(tmp_path: Path) -> None:
-    picture, draw = paper()
+    picture, draw = create_paper()
     draw.rectangle((60, 40, 84, 64), outline="black", width=3)
     area, report, _ = import_picture(tmp_path, picture)
     assert area > 200.0
@@ -55,7 +55,7 @@ def test_the_inside_of_a_small_obstacle_is_not_a_plan(tmp_path: Path) -> None:
 
 
 def test_free_space_within_walls_at_the_edge_stays(tmp_path: Path) -> None:
-    picture, draw = paper()
+    picture, draw = create_paper()
     draw.rectangle((0, 0, 199, 119), outline="black", width=2)
     draw.rectangle((90, 0, 99, 5), fill="white")  # a door to the edge of the picture
     draw.rectangle((150, 60, 199, 119), outline="black", width=2)
@@ -65,7 +65,7 @@ def test_free_space_within_walls_at_the_edge_stays(tmp_path: Path) -> None:
 
 
 def test_an_open_outer_door_is_reported_as_the_cause(tmp_path: Path) -> None:
-    picture = flat()
+    picture = draw_flat()
     ImageDraw.Draw(picture).rectangle((110, 76, 119, 82), fill="white")
     area, report, _ = import_picture(tmp_path, picture)
     assert area > 200.0
@@ -73,7 +73,7 @@ def test_an_open_outer_door_is_reported_as_the_cause(tmp_path: Path) -> None:
 
 
 def test_thin_strokes_are_dropped_and_walls_keep_their_corners(tmp_path: Path) -> None:
-    picture = flat()
+    picture = draw_flat()
     draw = ImageDraw.Draw(picture)
     draw.arc((104, 46, 124, 66), 180, 360, fill="black")
     draw.line((104, 56, 124, 56), fill="black")
@@ -98,7 +98,7 @@ def test_invalid_stroke_widths_are_refused(text: str) -> None:
 
 def test_a_stroke_as_wide_as_a_hall_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="min_stroke: expected at most 200 pixels, got 201"):
-        import_picture(tmp_path, flat(), min_stroke="201px")
+        import_picture(tmp_path, draw_flat(), min_stroke="201px")
 
 
 @pytest.mark.parametrize("width", range(1, 10))
@@ -118,9 +118,9 @@ def test_an_opening_does_not_depend_on_strips(monkeypatch: pytest.MonkeyPatch) -
     assert all((one == other).all() for one, other in zip(whole, strips, strict=True))
 
 
-def colored() -> Image.Image:
+def draw_colored_room() -> Image.Image:
     """A room of 20 x 12 m with a pale gray bench, a dark blue rug, and a red line across everything."""
-    picture, draw = paper()
+    picture, draw = create_paper()
     draw.rectangle((0, 0, 199, 119), outline="black", width=3)
     draw.rectangle((20, 20, 59, 39), fill="#c8c8c8")
     draw.rectangle((100, 60, 139, 79), fill="#000080")
@@ -130,12 +130,14 @@ def colored() -> Image.Image:
 
 @pytest.mark.parametrize("name", ["plan.png", "plan.ppm", "plan.jpg"])
 def test_colors_of_a_picture_have_their_declared_roles(tmp_path: Path, name: str) -> None:
-    room, bench, rug = 19.4 * 11.4, 8.0, 8.0
+    room = 19.4 * 11.4
+    bench = 8.0
+    rug = 8.0
     above = 9.7 * 19.4
-    area, _, _ = import_picture(tmp_path, colored(), name)
+    area, _, _ = import_picture(tmp_path, draw_colored_room(), name)
     assert area == pytest.approx(above - rug, abs=1.0)
     declared = {"free_color": ("navy", "white"), "solid_color": ("#c8c8c8",), "ignore_color": ("red",)}
-    area, report, _ = import_picture(tmp_path, colored(), name, **declared, color_tolerance=90.0)
+    area, report, _ = import_picture(tmp_path, draw_colored_room(), name, **declared, color_tolerance=90.0)
     assert area == pytest.approx(room - bench, abs=1.0)
     shares = [note for note in report.notes if "of the pixels are" in note]
     assert [note.rpartition(" ")[2] for note in shares] == ["free", "obstacles", "out"]
@@ -153,13 +155,13 @@ def test_soft_edges_of_a_dark_color_are_not_walls(tmp_path: Path, role: str) -> 
 
 
 def test_an_ignored_line_leaves_the_wall_below_it(tmp_path: Path) -> None:
-    _, _, foreign = import_picture(tmp_path, colored(), ignore_color=("red",))
+    _, _, foreign = import_picture(tmp_path, draw_colored_room(), ignore_color=("red",))
     low_x, _, high_x, _ = foreign.free.bounds
     assert (low_x, high_x) == pytest.approx((0.3, 19.7))
 
 
 def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
-    picture, draw = paper(40, 40)
+    picture, draw = create_paper(40, 40)
     draw.rectangle((0, 0, 39, 39), outline="black", width=2)
     draw.rectangle((10, 10, 19, 19), fill=(200, 200, 200))
     draw.rectangle((25, 25, 34, 34), fill=(210, 210, 210))
@@ -186,18 +188,18 @@ def test_invalid_colors_are_refused(options: dict[str, object], message: str) ->
         ReadOptions(**options)  # type: ignore[arg-type]
 
 
-def drawn_on_nothing() -> Image.Image:
+def draw_on_transparency() -> Image.Image:
     picture = Image.new("RGBA", (80, 60), (0, 0, 0, 0))
     ImageDraw.Draw(picture).rectangle((5, 5, 74, 54), outline=(0, 0, 0, 255), width=3)
     return picture
 
 
 def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: Path) -> None:
-    area, report, _ = import_picture(tmp_path, drawn_on_nothing())
+    area, report, _ = import_picture(tmp_path, draw_on_transparency())
     assert area == pytest.approx(6.4 * 4.4)
     assert any(note.startswith("only dark paint on a transparent ground") for note in report.notes)
     with pytest.raises(MapError, match=r"no cell is free: .* % of the pixels are transparent"):
-        import_picture(tmp_path, drawn_on_nothing(), unknown="obstacle")
+        import_picture(tmp_path, draw_on_transparency(), unknown="obstacle")
 
 
 def test_transparency_is_reported_if_nothing_is_solid(tmp_path: Path) -> None:
@@ -218,7 +220,7 @@ def test_brightness_is_reported_if_everything_is_solid_or_free(tmp_path: Path) -
 
 
 def test_light_lines_on_a_dark_ground_are_reported(tmp_path: Path) -> None:
-    blueprint = ImageOps.invert(flat())
+    blueprint = ImageOps.invert(draw_flat())
     ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
     _, report, _ = import_picture(tmp_path, blueprint)
     assert any("if they are the walls, --invert takes them as such" in note for note in report.notes)
@@ -230,7 +232,7 @@ def test_light_lines_on_a_dark_ground_are_reported(tmp_path: Path) -> None:
 
 
 def test_a_thin_frame_at_the_edge_is_dropped(tmp_path: Path) -> None:
-    picture = flat()
+    picture = draw_flat()
     ImageDraw.Draw(picture).rectangle((0, 0, 199, 119), outline="black")
     assert import_picture(tmp_path, picture)[0] > 200.0
     area, report, _ = import_picture(tmp_path, picture, min_stroke="2px")

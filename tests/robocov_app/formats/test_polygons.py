@@ -122,7 +122,8 @@ def test_crossings_of_all_shapes_are_counted_together() -> None:
 
 
 def test_ineffective_holes_are_counted() -> None:
-    outer, hole = box(0, 0, 9, 9).exterior, box(1, 1, 2, 2).exterior
+    outer = box(0, 0, 9, 9).exterior
+    hole = box(1, 1, 2, 2).exterior
     nothing = [
         [(3, 3), (4, 4)],
         [(3, 3), (3, 3), (3, 3)],

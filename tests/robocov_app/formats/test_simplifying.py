@@ -20,7 +20,8 @@ CELL = 0.05
 def build_cells(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> MultiPolygon:
     """Return the outline of the cells whose centers are in `shape`."""
     low_x, low_y, high_x, high_y = shape.bounds
-    columns, rows = int((high_x - low_x) / cell) + 2 * rim, int((high_y - low_y) / cell) + 2 * rim
+    columns = int((high_x - low_x) / cell) + 2 * rim
+    rows = int((high_y - low_y) / cell) + 2 * rim
     x, y = np.meshgrid(
         low_x + (np.arange(columns) - rim + 0.5) * cell, low_y + (np.arange(rows) - rim + 0.5) * cell
     )

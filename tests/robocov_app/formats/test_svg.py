@@ -15,7 +15,8 @@ from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_forma
 from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, MAX_NESTING
 
 PAGE = '<rect width="1000" height="600" fill="white"/>'
-BLOCK, WALL = box(1, 4, 3, 5), box(1, 4.9, 3, 5.1)
+BLOCK = box(1, 4, 3, 5)
+WALL = box(1, 4.9, 3, 5.1)
 XLINK = 'xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 

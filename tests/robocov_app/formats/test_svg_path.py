@@ -85,7 +85,8 @@ def test_arcs_satisfy_the_equation_of_their_ellipse(
     flat = found @ to_circle.T
     chord = math.dist(flat[0], flat[-1])
     if chord >= 2.0:  # it has to grow
-        flat, chord = flat * (2.0 / chord), 2.0
+        flat = flat * (2.0 / chord)
+        chord = 2.0
     a, b = flat[0], flat[-1]
     height = math.sqrt(max(1.0 - chord**2 / 4, 0.0))
     across = np.array([a[1] - b[1], b[0] - a[0]]) / chord

@@ -72,7 +72,8 @@ def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
 
 def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:
     plain = '<tileset firstgid="1" tilewidth="16" tileheight="16"/>'
-    floor, upper = tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1"), ROWS.replace("1", "0")
+    floor = tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1")
+    upper = ROWS.replace("1", "0")
     for name in ("Walls", "collision", "Collision Layer 2", "is_solid"):
         assert are_equal(compute_obstacles(read(tmp_path, plain, floor, tiles(name, upper))), WALLS)
     marked = tiles("Things", upper).replace("<data", SOLID.format("collides", "") + "<data")

@@ -21,27 +21,27 @@ from robocov_app.formats.unsupported import describe_unsupported_file
 XML = b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- a comment -->\n'
 
 
-def zipped() -> bytes:
+def build_zip() -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         archive.writestr("a.txt", "a")
     return stream.getvalue()
 
 
-def tarred() -> bytes:
+def build_tar() -> bytes:
     stream = io.BytesIO()
     with tarfile.open(fileobj=stream, mode="w") as archive:
         archive.addfile(tarfile.TarInfo("a"))
     return stream.getvalue()
 
 
-def picture(kind: str) -> bytes:
+def build_picture(kind: str) -> bytes:
     stream = io.BytesIO()
     Image.new("L", (2, 2)).save(stream, kind)
     return stream.getvalue()
 
 
-def array() -> bytes:
+def build_npy() -> bytes:
     stream = io.BytesIO()
     np.save(stream, np.zeros(3))
     return stream.getvalue()
@@ -79,13 +79,13 @@ def array() -> bytes:
         ("a.bt", b"# Octomap OcTree binary file", "an octree of OctoMap, .*octomap_server"),
         ("a.bag", b"#ROSBAG V2.0\n", "a bag of ROS, .*map_saver"),
         ("a.mcap", b"\x89MCAP0\r\n", "a bag of ROS,"),
-        ("a.gif", picture("GIF"), "a picture, .*: save it as a PNG"),
-        ("a.webp", picture("WEBP"), "a picture,"),
+        ("a.gif", build_picture("GIF"), "a picture, .*: save it as a PNG"),
+        ("a.webp", build_picture("WEBP"), "a picture,"),
         *(("a.pkl", pickle.dumps([1, 2], protocol), "a pickle of Python,") for protocol in (2, 3, 4, 5)),
-        ("a.npy", array(), "an array of numpy,"),
-        ("a.zip", zipped(), "a zip archive, .*: unpack it first"),
+        ("a.npy", build_npy(), "an array of numpy,"),
+        ("a.zip", build_zip(), "a zip archive, .*: unpack it first"),
         ("a.svg.gz", gzip.compress(b"<svg/>", mtime=0), "a packed file, .*: unpack it first"),
-        ("a.tar", tarred(), "a packed file,"),
+        ("a.tar", build_tar(), "a packed file,"),
         ("plan.svg", b"<!DOCTYPE html>\n<html><svg>", "a web page, not the file itself, .*raw file"),
         ("plan.dxf", b"version https://git-lfs.github.com/spec/v1", "a pointer of Git LFS,"),
         ("a.xyz", b"Once upon a time there was a map", "text that begins with 'Once upon a time"),

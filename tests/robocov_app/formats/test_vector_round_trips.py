@@ -31,7 +31,7 @@ FORMATS = [("svg", {}), ("wkt", {}), ("geojson", {}), ("geojson", {"origin": (18
 AS_IT_IS = Shaping(simplify=0.0, keep="all")
 
 
-def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignMap:
+def export_and_read(environment: Environment, path: Path, **options: Any) -> ForeignMap:
     """Write and read a map, and compare what is free."""
     report = export_map(environment, path, options=WriteOptions(**options))
     foreign = detect_format(path).read(path, ReadOptions())
@@ -51,7 +51,7 @@ def test_bundled_maps_survive_every_format(
     tmp_path: Path, name: str, kind: str, options: dict[str, Any]
 ) -> None:
     environment = load_map(name)
-    foreign = out_and_in(environment, tmp_path / f"{name}.{kind}", **options)
+    foreign = export_and_read(environment, tmp_path / f"{name}.{kind}", **options)
     again, _ = build_environment(foreign, AS_IT_IS, name)
     # maps that are imported have tenths of millimeters
     assert again.free.symmetric_difference(environment.free).area <= 1e-4 * environment.free.length
@@ -60,7 +60,8 @@ def test_bundled_maps_survive_every_format(
     assert (tmp_path / f"{name}.{kind}").read_bytes() == first
 
 
-_X, _Y = st.integers(0, 2000).map(lambda n: n / 100), st.integers(0, 1000).map(lambda n: n / 100)
+_X = st.integers(0, 2000).map(lambda n: n / 100)
+_Y = st.integers(0, 1000).map(lambda n: n / 100)
 _SIZE = st.integers(10, 300).map(lambda n: n / 100)
 
 
@@ -96,7 +97,7 @@ def test_any_map_survives_every_format(
     if environment.free_area < 1.0 or environment.free.buffer(-0.12).is_empty:
         return
     kind, options = how
-    out_and_in(environment, tmp_path_factory.getbasetemp() / f"drawn.{kind}", **options)
+    export_and_read(environment, tmp_path_factory.getbasetemp() / f"drawn.{kind}", **options)
 
 
 def test_few_digits_round_with_a_note(tmp_path: Path, cluttered: Environment) -> None:
@@ -150,7 +151,8 @@ def test_geojson_in_degrees_keeps_its_origin(tmp_path: Path, empty: Environment)
     export_map(empty, path, options=WriteOptions(origin=(8.4, 49.0)))
     ring = json.loads(path.read_text())["features"][0]["geometry"]["coordinates"][0]
     globe = pyproj.Geod(ellps="WGS84")
-    east, north = ([8.4, 49.0] in ring), max(ring, key=lambda point: point[1])
+    east = [8.4, 49.0] in ring
+    north = max(ring, key=lambda point: point[1])
     assert east
     assert globe.inv(8.4, 49.0, 8.4, north[1])[2] == pytest.approx(10.0, abs=1e-3)
     assert abs(globe.geometry_area_perimeter(shapely.Polygon(ring))[0]) == pytest.approx(100.0, abs=1e-4)

@@ -18,22 +18,28 @@ from robocov_app.formats.geometry.cells.vectorize import NECK, trace_outline
 grids = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.booleans())
 
 
-def touching(free: np.ndarray) -> list[tuple[int, int]]:
+def find_diagonal_corners(free: np.ndarray) -> list[tuple[int, int]]:
     """Return the corners (x, y) at which two cells meet that are as free as each other, and no more."""
-    found = []
+    corners = []
     rows, columns = free.shape
     for y in range(1, rows):
         for x in range(1, columns):
-            a, b, c, d = free[y - 1, x - 1], free[y - 1, x], free[y, x - 1], free[y, x]
+            a = free[y - 1, x - 1]
+            b = free[y - 1, x]
+            c = free[y, x - 1]
+            d = free[y, x]
             if a == d and b == c and a != b:
-                found.append((x, y))
-    return found
+                corners.append((x, y))
+    return corners
 
 
-def expected(free: np.ndarray) -> shapely.Geometry:
+def unite_cells(free: np.ndarray) -> shapely.Geometry:
     """Return the union of the cells' squares, less the necks."""
     cells = [shapely.box(x, y, x + 1, y + 1) for y, x in zip(*free.nonzero(), strict=True)]
-    necks = [Polygon([(x - NECK, y), (x, y - NECK), (x + NECK, y), (x, y + NECK)]) for x, y in touching(free)]
+    necks = [
+        Polygon([(x - NECK, y), (x, y - NECK), (x + NECK, y), (x, y + NECK)])
+        for x, y in find_diagonal_corners(free)
+    ]
     return shapely.union_all(cells) - shapely.union_all(necks)
 
 
@@ -43,8 +49,8 @@ def test_the_outline_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> 
     with mock.patch("robocov_app.formats.geometry.cells.vectorize._STRIP", strip):
         outline = trace_outline(free, "grid")
     assert outline.is_valid
-    assert shapely.equals(outline, expected(free)) if free.any() else outline.is_empty
-    assert outline.area == free.sum() - len(touching(free)) * NECK**2
+    assert shapely.equals(outline, unite_cells(free)) if free.any() else outline.is_empty
+    assert outline.area == free.sum() - len(find_diagonal_corners(free)) * NECK**2
     assert len(outline.geoms) == ndimage.label(free)[1]
     for part in outline.geoms:
         assert part.exterior.is_ccw
@@ -58,7 +64,8 @@ def test_rings_are_apart_and_every_vertex_is_a_corner(free: np.ndarray) -> None:
     for k, ring in enumerate(rings):
         assert not shapely.intersects(ring, rings[:k]).any()
         points = shapely.get_coordinates(ring)[:-1]
-        ahead, behind = np.roll(points, -1, axis=0) - points, points - np.roll(points, 1, axis=0)
+        ahead = np.roll(points, -1, axis=0) - points
+        behind = points - np.roll(points, 1, axis=0)
         assert (ahead[:, 0] * behind[:, 1] != ahead[:, 1] * behind[:, 0]).all()
 
 

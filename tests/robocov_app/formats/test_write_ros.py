@@ -48,7 +48,8 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
     assert pixels(tmp_path / "corner.pgm").tolist() != []
     found = pixels(tmp_path / "corner.pgm")
     expected = np.array([[values[c] for c in line] for line in drawing])
-    expected[6, 2], expected[6, 3] = 254, 0
+    expected[6, 2] = 254
+    expected[6, 3] = 0
     np.testing.assert_array_equal(found, expected)
     assert report.area == CORNER.free_area
     assert report.area_written == pytest.approx(CORNER.free_area)

@@ -317,7 +317,7 @@ class EditorCanvas:
 
 
 def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
-    """Return the keys of obstacles that are not drawn on the sheet: they are dragged, changed or gone."""
+    """Return the keys of obstacles that are not drawn on the sheet: they are dragged, changed or removed."""
     carried = state.carried
     if carried is not None and not carried.are_copies:
         return carried.selection.items

@@ -330,7 +330,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     plane = None
     if origin is None:
         header["units"] = "meters"
-        remark = "other programs take GeoJSON for degrees (--origin makes them)"
+        remark = "other programs expect degrees in GeoJSON (--origin writes them)"
         notes = [f"in meters, {digits} decimals; {remark}"]
     else:
         plane = _build_plane(environment, origin)
@@ -340,9 +340,9 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         notes = [f"in degrees about longitude {longitude:.10g}, latitude {latitude:.10g}"]
     written = _format_shapes(environment, plane, digits)
     if written.crosses_antimeridian:
-        notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
+        notes.append("longitudes continue beyond 180 degrees: shapes are not cut at the antimeridian")
     if written.lost:
-        notes.append(f"{written.lost} shapes are nothing with {digits} decimals")
+        notes.append(f"{written.lost} shapes vanish with {digits} decimals")
     members = json.dumps(header, ensure_ascii=False, indent=1).removesuffix("\n}")
     lines = ",\n".join(written.features)
     with replace_file(path) as temporary:

@@ -56,7 +56,7 @@ class CrossingCounter:
         Raises
         ------
         MapError
-            At more than `MAX_CROSSINGS`.
+            If there are more than `MAX_CROSSINGS`.
         """
         edges = shapely.linestrings(extract_edges(lines))
         if len(edges) <= _MAX_PAIRWISE_EDGES:
@@ -65,8 +65,8 @@ class CrossingCounter:
         else:
             self.count += self._estimate(edges)
         if self.count > MAX_CROSSINGS:
-            got = f"about {self.count:.1g}"
-            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {got}")
+            actual = f"about {self.count:.1g}"
+            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}")
 
     def _estimate(self, edges: Array) -> float:
         """Estimate the number of crossings from those of a sample of edges."""

@@ -51,7 +51,7 @@ class GridFrame:
     yaw: float = 0.0
 
     def place(self, points: Array) -> Array:
-        """Return positions in the grid, (n, 2) in cells from its lower left corner, on the map, m."""
+        """Convert positions in the grid, (n, 2) in cells from its lower left corner, to positions in m."""
         x, y = (points * self.cell).T
         if self.yaw:
             cos = math.cos(self.yaw)

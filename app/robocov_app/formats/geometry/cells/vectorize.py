@@ -209,7 +209,7 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
 
 
 def _connect_rings(vertical: IntArray, is_outer: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the corners ring by ring, and where each ring starts, which is at its first corner.
+    """Return the corners ring by ring, and the index of the first corner of each ring.
 
     From there an outer ring leaves along its horizontal side, a hole along the vertical one.
     """

@@ -77,7 +77,7 @@ class SimplificationCheck:
         wrong : (k,) array of bool
             Vertices of rings with another area.
         far : (k,) array of bool
-            Of the vertices that a side stands for, the farthest one, if it is beyond the tolerance.
+            The farthest of the vertices that a side replaces, if it is beyond the tolerance.
         """
         allowed = self.allowed
         far = self._find_far()
@@ -95,7 +95,7 @@ class SimplificationCheck:
         return wrong, far
 
     def _find_far(self) -> BoolArray:
-        """Return the farthest vertex of each side, where it is farther away than allowed."""
+        """Return for each vertex whether it is the farthest of its side and farther away than allowed."""
         drawing = self.drawing
         points = self.outline.points
         allowed = self.allowed

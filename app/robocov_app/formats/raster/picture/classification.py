@@ -72,7 +72,7 @@ def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
 
 
 def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]:
-    """Return how much of the picture each declared role covers."""
+    """Return a note on the fraction of the picture that each declared role covers."""
     notes = []
     for role in ROLES:
         names = getattr(options, f"{role}_color")

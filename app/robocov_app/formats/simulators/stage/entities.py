@@ -92,7 +92,7 @@ def parse_world(tokens: deque[Token], where: str) -> World:
     Parameters
     ----------
     tokens : deque of Token
-        They are consumed.
+        They are removed from it.
     where : str
         The file, for messages.
 

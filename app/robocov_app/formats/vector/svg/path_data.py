@@ -159,7 +159,7 @@ class _Pen:
         if command in "MmLl":
             self._draw(command, values[:2])
             if len(values) > 2:
-                # Lines through all positions that follow.
+                # Lines through all remaining positions.
                 self._draw_polyline(values[2:], is_relative=command.islower())
             return
         count = _ARGUMENTS[command.upper()]
