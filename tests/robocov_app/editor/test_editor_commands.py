@@ -162,7 +162,7 @@ def test_copies_go_through_the_clipboard_also_to_another_window(driver: EditorDr
         assert other.editor.has_error_message and len(other.shapes) == 2
         other.editor.clipboard.put("")
         other.press_key("ctrl+v")
-        assert "empty" in other.said
+        assert "empty" in other.message
 
 
 def test_commands_delete_and_duplicate(driver: EditorDriver) -> None:
