@@ -204,3 +204,20 @@ def test_the_command_starts_more_robots_than_fit_uniformly(capsys: pytest.Captur
     assert "no space for 200 robots at start 'market': they start uniformly" in capsys.readouterr().err
     with pytest.raises(StartError, match="room for about"):
         demo.build_session(replace(options, start="market"))
+
+
+def test_the_trajectory_of_a_failed_robot_stays_visible(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, shown={"trajectories"}, size=(1200, 800)) as driver:
+        color = np.array(driver.window.theme.failed_robot)
+
+        def count_pixels() -> int:
+            left, top, width, height = driver.window.layout.arena
+            arena = driver.copy_frame()[top : top + height, left : left + width]
+            return int((np.abs(arena - color).max(axis=2) < 12).sum())
+
+        driver.session.playback.is_playing = True
+        driver.run_frames(60)
+        before = count_pixels()
+        driver.viewer.attempt(lambda: driver.session.fail_robot(1))
+        driver.run_frames(2)
+        assert count_pixels() > before + 20

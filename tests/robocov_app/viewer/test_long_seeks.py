@@ -10,7 +10,7 @@ import pytest
 from driven_window import open_viewer
 from sample_sessions import RAPF, advance_session, start_session
 
-from robocov_app.viewer.session import playback, present, timeline
+from robocov_app.viewer.session import playback, present, seek
 from robocov_app.viewer.session.files.session_file import build_session_content, load_session, save_session
 from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.session import Session
@@ -20,7 +20,7 @@ from robocov_app.viewer.session.session import Session
 def slow_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """A frame computes one step on the way to another state, and shows the progress at once."""
     monkeypatch.setattr(playback, "SEEK_SLICE_S", 0.0)
-    monkeypatch.setattr(timeline, "MIN_NOTICED_SEEK_S", 0.0)
+    monkeypatch.setattr(seek, "MIN_NOTICED_SEEK_S", 0.0)
 
 
 def build_long_session() -> Session:
@@ -101,10 +101,11 @@ def test_a_saved_session_opens_at_once_and_is_recomputed_afterwards(
     assert opened.timeline.is_seeking
     assert opened.displayed.time == 0.0
     assert not opened.playback.is_playing
-    progress = [opened.timeline.seek_progress]
+    pending = opened.timeline.pending_seek
+    assert pending is not None
+    assert pending.progress == pytest.approx(0.0, abs=0.05)
     assert play_until_there(opened) > 100
-    assert progress[0] is not None
-    assert opened.timeline.seek_progress is None
+    assert pending.progress == 1.0
     assert opened.displayed.time == pytest.approx(3.0)
     assert opened.displayed.numbers == (3,)
 

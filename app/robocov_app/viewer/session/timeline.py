@@ -1,7 +1,6 @@
 """The timeline of a session: the present, the recorded past, and the branches of the document."""
 
-from collections.abc import Callable, Generator
-from time import perf_counter
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,10 +14,9 @@ from robocov_app.viewer.session.past.ghosts import build_ghost_curves
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.present import Present, build_present, cache_present
 from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.seek import Seek
 
 STEPS_BETWEEN_SETTLED_CHECKS = 12
-MIN_NOTICED_SEEK_S = 0.3
-"""Time after which the progress of a seek is shown."""
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -54,6 +52,8 @@ class Timeline:
         Whether no robot has moved noticeably for some time.
     past_version : int
         Number that grows when the past is replaced.
+    pending_seek : Seek or None
+        The seek in progress.
     """
 
     head: Node
@@ -76,10 +76,7 @@ class Timeline:
         self.record_end_time = record_end_time
         self.is_record_reproducible = is_record_reproducible
         self.past_version = 0
-        self._seeking: Generator[float, None, Present] | None = None
-        self._destination = (document.nodes[0], 0)
-        self._seek_start_s = 0.0
-        self._seek_fraction = 0.0
+        self.pending_seek: Seek | None = None
         self._followed_path: list[Node] = []
         self.replace_present(present or Present.start(document.nodes[0]))
 
@@ -133,21 +130,14 @@ class Timeline:
     @property
     def is_seeking(self) -> bool:
         """Whether a seek is in progress."""
-        return self._seeking is not None
+        return self.pending_seek is not None
 
     @property
     def destination(self) -> tuple[Node, int]:
         """Node and step to which the seek in progress leads; without one, those of the present."""
-        if self._seeking is None:
+        if self.pending_seek is None:
             return self.head, self.step
-        return self._destination
-
-    @property
-    def seek_progress(self) -> float | None:
-        """Fraction of the seek that is done, if it has been in progress for a noticeable time."""
-        if self._seeking is None or perf_counter() - self._seek_start_s < MIN_NOTICED_SEEK_S:
-            return None
-        return self._seek_fraction
+        return self.pending_seek.node, self.pending_seek.step
 
     @property
     def events(self) -> list[SessionEvent]:
@@ -259,10 +249,7 @@ class Timeline:
         old = Present(self.head, self.run, self.history)
         if step is None:
             step = node.last_step
-        self._seeking = build_present(self.document, old, node, step, edit)
-        self._destination = (node, step)
-        self._seek_start_s = perf_counter()
-        self._seek_fraction = 0.0
+        self.pending_seek = Seek(build_present(self.document, old, node, step, edit), node, step)
         self.continue_seek(seconds)
 
     def finish_seek(self) -> None:
@@ -271,27 +258,22 @@ class Timeline:
 
     def continue_seek(self, seconds: float) -> None:
         """Continue the seek that is in progress, if there is one, for some time, s."""
-        seeking = self._seeking
-        if seeking is None:
+        pending = self.pending_seek
+        if pending is None:
             return
         # Any exception ends the seek.
-        self._seeking = None
-        started = perf_counter()
-        while True:
-            try:
-                self._seek_fraction = next(seeking)
-            except StopIteration as end:
-                self.replace_present(end.value)
-                return
-            if perf_counter() - started > seconds:
-                self._seeking = seeking
-                return
+        self.pending_seek = None
+        present = pending.advance(seconds)
+        if present is None:
+            self.pending_seek = pending
+        else:
+            self.replace_present(present)
 
     def replace_present(self, present: Present) -> None:
         """Replace the present, and display the new one, as the last step of `seek`."""
         if present.head.number == len(self.document.nodes):
             self.document.nodes.append(present.head)
-        self._seeking = None
+        self.pending_seek = None
         self.head = present.head
         self.run = present.run
         self.history = present.history

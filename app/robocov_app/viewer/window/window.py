@@ -217,7 +217,7 @@ class ViewerWindow(CommandWindow):
             session.timeline.past_version,
             session.playback.is_playing,
             self._cost_curves.answer_count,
-            session.timeline.seek_progress,
+            self._get_seek_progress(),
             viewer.costs.state,
             self._arranged,
             self.panel.ui.needs_redraw,
@@ -288,11 +288,17 @@ class ViewerWindow(CommandWindow):
             hint = hint.replace("Space pause", "Space play")
         draw_status(self.screen, self.layout.status, self.theme, self.layout.scale, facts=facts, hint=hint)
 
+    def _get_seek_progress(self) -> float | None:
+        pending = self.viewer.session.timeline.pending_seek
+        if pending is None:
+            return None
+        return pending.progress
+
     def _draw_message(self, *, can_suggest: bool) -> None:
         viewer = self.viewer
         message = viewer.message
         is_error = bool(message) and viewer.has_error_message
-        progress = viewer.session.timeline.seek_progress
+        progress = self._get_seek_progress()
         if progress is not None and not is_error:
             message = f"Recomputing the session: {100 * progress:.0f} %"
         if not message and can_suggest and not self.is_unattended:
