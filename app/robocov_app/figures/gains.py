@@ -197,7 +197,7 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
     Returns
     -------
     float or None
-        Position of no limit; None if all gains have a limit.
+        Position that stands for no limit; None if all gains have a limit.
     """
     levels = np.unique(gains[np.isfinite(gains)])
     low, high = 0.0, 0.0

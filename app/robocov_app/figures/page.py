@@ -309,7 +309,7 @@ class FigurePage:
         aspect : float
             Width by height of a panel.
         caption_width : float, px
-            Width of the widest lines. They have this if there is enough space.
+            Width of the widest lines; columns are this wide if there is enough space.
         caption_height : float, px
         top, bottom : float, px
             Space above and below all panels.

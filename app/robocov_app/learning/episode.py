@@ -320,17 +320,17 @@ class Episode:
             The present cost, if it is known.
         """
         self.trail.append(self.positions)
-        gains = self._compute_gains(is_rewarded, result) / self.reference
+        shares = self._share_cost_change(is_rewarded, result) / self.reference
         penalties = self.task.contact_penalty * contact_time
-        return ActionOutcome(np.asarray(gains - penalties), contact_time)
+        return ActionOutcome(np.asarray(shares - penalties), contact_time)
 
-    def _compute_gains(self, is_rewarded: bool, result: CoverageResult | None) -> Array:
+    def _share_cost_change(self, is_rewarded: bool, result: CoverageResult | None) -> Array:
         """Update the cost, and return the share of each robot in its change, (n,) m.
 
         A failure is not the result of any action. If robots fail or join, only those that were available all
         the time share the change of their own cost.
         """
-        gains = np.zeros(len(self.team))
+        shares = np.zeros(len(self.team))
         time = self.time
         positions = self.trail[-1]
         previous_positions = self.trail[self._rewarded_cycle]
@@ -342,7 +342,7 @@ class Episode:
             remaining = available & self._available
             self._available = available
         if not (is_rewarded or has_changed):
-            return gains
+            return shares
         cycles = self.cycle - self._rewarded_cycle
         self._rewarded_cycle = self.cycle
         before = self.result
@@ -350,14 +350,14 @@ class Episode:
             self.result = result or self._cost_over_time.get_cost(time)(positions[self._available])
         after = self.result
         if not remaining.any():
-            return gains
+            return shares
         if has_changed:
             previous_time = time - cycles * self.task.period
             before = self._cost_over_time.get_cost(previous_time)(previous_positions[remaining])
             after = self._cost_over_time.get_cost(time)(positions[remaining])
         elapsed_fraction = cycles / self.task.cycles
-        gains[remaining] = share_reward(self.task.reward, before, after, elapsed_fraction)
-        return gains
+        shares[remaining] = share_reward(self.task.reward, before, after, elapsed_fraction)
+        return shares
 
     def record(self) -> Record:
         """Return the episode so far as a record, without forces at its end.

@@ -92,7 +92,7 @@ def choose_curve_styles(controllers: Sequence[str]) -> list[CurveStyle]:
     Parameters
     ----------
     controllers : sequence of str
-        Name of the controller of each curve. The same name stands for other gains.
+        Name of the controller of each curve. A name may occur several times, for several choices of gains.
 
     Returns
     -------

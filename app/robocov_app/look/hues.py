@@ -38,8 +38,8 @@ def choose_robot_hues(
     n : int
         Number of robots.
     adjacency : (m, 2) int array, optional
-        Pairs of robots whose cells share an edge. If given, the two hues differ, except where a cell has so
-        many neighbors that all hues are taken.
+        Pairs of robots whose cells share an edge. Their hues differ, unless all hues are taken by other
+        neighbors.
     previous : (n,) int array, optional
         Hues of the previous frame. They are changed as little as possible, so that cells do not flicker.
 
@@ -124,7 +124,7 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
     """Choose the color of the trajectory of each robot.
 
     In a team that is too large for a hue of each robot, trajectories would have the colors of the cells that
-    they cross. They are all red then, as in the scheme of the paper, but paler, since they are many.
+    they cross. Then all are red, as in the scheme of the paper, but paler, since there are many.
 
     Parameters
     ----------

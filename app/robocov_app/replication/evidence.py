@@ -201,6 +201,7 @@ def collect_evidence(
 
 
 def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -> list[Duel]:
+    """List the comparisons of the own controllers with all other contenders."""
     duels = []
     for own in OWN:
         for summary in summaries:

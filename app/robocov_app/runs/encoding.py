@@ -173,7 +173,7 @@ def find_encoder() -> str:
     Raises
     ------
     OutputError
-        If there is none.
+        If ffmpeg was not found.
     """
     with contextlib.suppress(ModuleNotFoundError, RuntimeError):
         from imageio_ffmpeg import get_ffmpeg_exe

@@ -105,7 +105,7 @@ class Executor(ABC):
         Raises
         ------
         OutputError
-            If workers end again and again.
+            If workers end repeatedly.
         """
         self._start_tasks()
         result = self._wait_for_result(timeout)

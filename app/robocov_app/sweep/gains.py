@@ -172,7 +172,7 @@ def _parse_range(known: Mapping[str, Gain | Option], name: str, given: Range, pa
 
 
 def _parse_range_end(gain: Gain, value: float | None, path: JsonPath) -> float:
-    """Check one end of a range, which needs a limit also if the gain may have none."""
+    """Check one end of a range, which must be finite even if the gain itself may be unlimited."""
     if value is None:
         raise ParameterError(f"{format_path(path)}: expected a number, got {quote(None)}")
     return validate_at(path, partial(gain.validate, value, "")) or 0.0

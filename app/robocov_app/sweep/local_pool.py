@@ -104,7 +104,7 @@ class _WorkerProcess:
         return LostWorker(cause, output, is_caused_by_task=status != _KILLED_STATUS)
 
     def _start(self) -> subprocess.Popen[bytes]:
-        """Start a process; raise OutputError if that fails again and again."""
+        """Start a process; raise OutputError if that fails repeatedly."""
         for _ in range(_MAX_STARTS):
             self._end()
             self._error_output.truncate(0)
@@ -121,7 +121,7 @@ class _WorkerProcess:
         lines = output.strip().splitlines()
         if lines:
             reason = f"{reason}: {lines[-1]}"
-        raise OutputError(f"no process for the runs can be started: {reason}")
+        raise OutputError(f"a worker process cannot be started: {reason}")
 
     def _end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its exit status and the end of its error output."""

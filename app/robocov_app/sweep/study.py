@@ -119,7 +119,7 @@ class Study:
     record_hz : float, Hz
         Rate at which trajectories are saved; 0 for the first and the last step only.
     metrics : bool
-        Whether the table contains the metrics of `robocov.metrics.run_metrics`, too.
+        Whether the table also contains the metrics of `robocov.metrics.run_metrics`.
     sampling : Sampling or None
         How ranges of gains are sampled.
     max_runs : int

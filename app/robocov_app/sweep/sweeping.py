@@ -114,7 +114,7 @@ def sweep(
     InputError
         If the folder contains something else, or the scheduler cannot be reached.
     OutputError
-        If workers end again and again, or something cannot be written. Finished runs are kept.
+        If workers end repeatedly, or something cannot be written. Finished runs are kept.
     """
     if workers is not None:
         require_number("workers", workers, 1, MAX_WORKERS, whole=True)

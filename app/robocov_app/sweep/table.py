@@ -153,7 +153,7 @@ class Table:
     study : bytes, optional
         Content of ``study.json``.
     parquet : bool
-        Whether a Parquet file is written, too. One that exists is replaced in any case.
+        Whether a Parquet file is also written. One that exists is replaced in any case.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ class Task:
     cost_hz, record_hz : float, Hz
         Rates at which the cost is evaluated and the trajectories are saved.
     metrics : bool
-        Whether the metrics of `robocov.metrics.run_metrics` are computed, too.
+        Whether the metrics of `robocov.metrics.run_metrics` are also computed.
     input_hash : str
         SHA-256 of all inputs. Tasks with the same hash have the same result.
     """

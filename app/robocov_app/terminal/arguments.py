@@ -408,6 +408,6 @@ def _parse_gain_value(name: str, text: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        # Numbers of thousands of digits and deeply nested brackets fail, too.
+        # Numbers of thousands of digits and deeply nested brackets also fail.
         expected = "expected a number (or null), or a word"
         raise ParameterError(f"--set {name}: {expected}, got {quote(text)}") from error

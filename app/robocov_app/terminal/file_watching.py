@@ -42,7 +42,7 @@ def watch_files(
         for path, old, new, newest in zip(paths, known, first, settled, strict=True):
             if not old == new == newest:
                 changed.append(path)
-        # Anything that is written from now on is another change, also while this one is handled.
+        # Writes from now on are reported as another change, even while the caller handles this one.
         known = settled
         yield tuple(changed)
 

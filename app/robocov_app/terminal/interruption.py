@@ -16,7 +16,7 @@ _received_signals: set[int] = set()
 
 
 def was_interrupted() -> bool:
-    """Return whether a `KeyboardInterrupt` comes from Ctrl-C, rather than from a user's controller."""
+    """Return whether a `KeyboardInterrupt` was caused by Ctrl-C, not by a user's controller."""
     return bool(_received_signals)
 
 

@@ -83,7 +83,7 @@ def find_free_path(folder: Path, stem: str, suffix: str) -> Path:
     """
     stem = stem.rstrip("0123456789").rstrip("-") or stem
     paths = (folder / f"{stem}-{number}{suffix}" for number in count(1))
-    # A link that points to nothing exists, too.
+    # A broken symbolic link also counts as an existing file.
     return next(path for path in paths if not os.path.lexists(path))
 
 

@@ -223,7 +223,7 @@ def test_the_reason_is_reported_if_no_process_can_start(
     )
     with (
         LocalPool(1) as pool,
-        pytest.raises(OutputError, match=r"no process for the runs can be started: .*nothing"),
+        pytest.raises(OutputError, match=r"a worker process cannot be started: .*nothing"),
     ):
         execute(pool, tasks[:1])
 

@@ -110,7 +110,7 @@ def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
     """Return the map that the selected robot has discovered; None if its controller has no maps."""
     if scene.snapshot is None or scene.selected is None:
         return None
-    # Memories of controllers, also of those of users, have no common base class.
+    # Memories have no common base class, since users write controllers of their own.
     maps = getattr(scene.snapshot.decision.memory, "maps", ())
     if scene.selected >= len(maps):
         return None

@@ -38,7 +38,7 @@ CLUSTERED = CONVEX_KINDS[:-1]
 
 # The goals of our own controller. Its gains were tuned on other generated maps, but its outcomes on those of
 # the study were inspected while its rules were made. The claim "goal-unseen" is on maps of other kinds. They
-# are also kinds of the benchmark, whose results were inspected, too.
+# are also kinds of the benchmark, whose results were inspected as well.
 MAX_GAP = 0.01
 """Maximum median of J / J_ref - 1."""
 MAX_MAP_GAP = 0.05

@@ -215,7 +215,7 @@ def _run_claims_only(
     gains: dict[str, GainOutcomes] = {}
     references: References = {}
     if is_gain_grid_finished(folder, plan):
-        # All runs are there. This makes sure that the table is, too.
+        # All runs are there. This makes sure that the table exists as well.
         gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
     papers = build_paper_contenders(find_best_gains(gains))
     contest = studies.build_claims_contest(plan, papers)

@@ -81,6 +81,7 @@ def plan_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw 
 
 
 def _draw_pairs(pairs: Sequence[Pairs], label: str, theme: Theme) -> Figure:
+    """Plot pairs, with at least `_MIN_TICKS` ticks."""
     figure = plot_pairs(pairs, label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     low, high = axes.get_xlim()

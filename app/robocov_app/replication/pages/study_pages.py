@@ -73,7 +73,7 @@ class ShownFailure(NamedTuple):
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, which is replaced as a whole or not at all."""
+    """Write or replace a text file, completely or not at all."""
     with replace_file(path) as part:
         part.write_text(text, encoding="utf-8")
 

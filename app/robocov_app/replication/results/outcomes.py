@@ -79,7 +79,7 @@ class Outcomes:
         return self.select(np.all(is_finite, axis=0))
 
     def select_starts(self, *starts: str) -> Outcomes:
-        """Return the outcomes from some kinds of starts."""
+        """Return the outcomes of the runs from given kinds of starts."""
         return self.select([start in starts for start in self.starts])
 
     def compute_medians_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:

@@ -39,13 +39,17 @@ class RunSelection(NamedTuple):
 
 
 def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_panes: int = 4) -> RunSelection:
-    """Select runs to show: all, or the best, worst and middle ones of each map, or of all maps.
+    """Select the runs to show.
+
+    These are all runs if there are few, else the best, worst and middle ones of each map, or of all maps
+    together if those are still too many.
 
     Parameters
     ----------
     result : ReportedResult
     max_runs : int
     max_panes : int
+        Maximum number of runs side by side.
 
     Returns
     -------

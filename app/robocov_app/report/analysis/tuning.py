@@ -110,7 +110,7 @@ def _get_start_and_seed(run: ReportedRun) -> _Fold:
 
 
 def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]:
-    """Return the runs of a controller with tuned gains, and a text on the chosen gains."""
+    """Return the runs of a controller with tuned gains, and a description of the chosen gains."""
     runs: list[ReportedRun] = []
     labels = []
     for fold in tuning.folds:

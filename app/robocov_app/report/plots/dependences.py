@@ -103,7 +103,7 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     for number, (name, controllers) in enumerate(varying_gains.items()):
         gain_groups = [group for group in groups if group.controller in controllers]
         plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}"))
-    # The setting includes the team, so that distances over its parameters are divided by medians of maps.
+    # Settings include the team, which varies here, so these distances are divided by medians of maps.
     map_axis = _choose_axis(result, "final distance / median of map", attrgetter("map"))
     for number, parameter in enumerate(_list_team_parameters(result)):
         if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
