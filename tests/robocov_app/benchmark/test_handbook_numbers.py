@@ -53,3 +53,32 @@ def test_the_study_of_the_paper_has_the_goals_of_the_handbook() -> None:
     assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g} %"
     assert f"median above {100 * MAX_MAP_GAP:g} % on no map" in expected
     assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g} %"
+
+
+FAILURES_PAGE = Path(__file__).parents[3] / "app/handbook/where-controllers-fail.md"
+FAILURES_OF_ATLAS = (
+    ("ideal", "offices-7005"),
+    ("ideal", "blocks-7004"),
+    ("ideal", "offices-7001"),
+    ("ideal", "courtyard"),
+    ("short-range", "caves-7003"),
+    ("failures", "offices-7001"),
+    ("large-team", "large-blocks-7001"),
+)
+
+
+def build_failure_row(track: str, map_name: str) -> str:
+    """Return the median gap and path length of some controllers on a map."""
+    cells = [suite.format_heading(track), map_name]
+    for controller in ("atlas", "atlas-shared", "greedy-submodular", "rapf"):
+        rows = read_result(ENTRIES / f"{controller}.json.gz")["rows"]
+        selected = [row for row in rows if (row["track"], row["map"]) == (track, map_name)]
+        gap = 100.0 * np.median([row["gap"] for row in selected])
+        path_length = np.median([row["path_length_m"] for row in selected])
+        cells.append(f"{gap:.1f} %, {path_length:.1f} m")
+    return f"| {' | '.join(cells)} |"
+
+
+@pytest.mark.parametrize(("track", "map_name"), FAILURES_OF_ATLAS)
+def test_failures_of_atlas_are_those_of_the_entries(track: str, map_name: str) -> None:
+    assert f"{build_failure_row(track, map_name)}\n" in FAILURES_PAGE.read_text(encoding="utf-8")
