@@ -1,4 +1,4 @@
-"""Sketches drawn by hypothesis, sound ones and broken ones, and all that the editor can do to them."""
+"""Strategies of hypothesis: sketches, valid and broken ones, and all edits of the editor."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def list_problems(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> tuple[Pro
 
 
 def renumber(sketch: Sketch) -> Sketch:
-    """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
+    """Return the sketch with keys 0, 1, ..., as after reading it from a file."""
     items = tuple(replace(item, key=key) for key, item in enumerate(sketch.obstacles))
     return replace(sketch, obstacles=items)
 
@@ -48,7 +48,7 @@ _sizes = st.integers(-2, 30).map(lambda k: k / 10)
 
 
 def shapes(points=places, sizes=_sizes):
-    """Obstacles, many of them broken."""
+    """Return a strategy for obstacles, many of them broken."""
     return st.one_of(
         st.builds(PolygonObstacle, rings(points), st.lists(rings(points), max_size=2).map(tuple), names),
         st.builds(CircleObstacle, points, sizes, names),
@@ -58,7 +58,7 @@ def shapes(points=places, sizes=_sizes):
 
 @st.composite
 def valid_shapes(draw):
-    """Obstacles that break no rule; they may overlap and stick out."""
+    """Draw obstacles that break no rule; they may overlap and extend beyond the boundary."""
     x, y = draw(places)
     size = draw(st.integers(2, 30)) / 10
     kind = draw(st.sampled_from(["box", "ring", "triangle", "star", "circle", "wall", "bent"]))
@@ -111,7 +111,7 @@ backgrounds = st.builds(
 
 @st.composite
 def drafts(draw, shape_strategy=None):
-    """Sketches of all kinds, many of them broken."""
+    """Draw sketches of all kinds, many of them broken."""
     held = draw(st.lists(shapes() if shape_strategy is None else shape_strategy, max_size=5))
     notes = draw(st.lists(st.sampled_from(["", "", "ask Ada", "2 m high"]), min_size=5, max_size=5))
     return Sketch(
@@ -130,7 +130,7 @@ def drafts(draw, shape_strategy=None):
 
 @st.composite
 def valid_sketches(draw, least=0, most=5):
-    """Sketches whose parts are sound, in a hall; starts may still be blocked."""
+    """Draw sketches with valid obstacles in a hall; starts may be blocked."""
     held = draw(st.lists(valid_shapes(), min_size=least, max_size=most))
     return Sketch(
         name="Hall",
@@ -150,7 +150,7 @@ def valid_sketches(draw, least=0, most=5):
 
 @st.composite
 def selections(draw, sketch):
-    """Parts of a sketch."""
+    """Draw selections of a sketch."""
     keys = [item.key for item in sketch.obstacles]
     chosen = draw(st.sets(st.sampled_from(keys), max_size=4)) if keys else set()
     named = [name for name, _ in sketch.starts if draw(st.booleans())]
@@ -166,7 +166,7 @@ _SHIFTS = st.sampled_from([-1.3, -0.1, 0.0, 0.0333, 0.7, 3.0])
 
 @st.composite
 def changes(draw, sketch):
-    """A change of a sketch by anything that the editor can do; None where it cannot be done."""
+    """Draw a change by any edit of the editor; None if the edit is impossible."""
     selection = draw(selections(sketch))
     owners = [*(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
     owner = draw(st.sampled_from(owners)) if owners else BOUNDARY

@@ -26,7 +26,7 @@ SIZE = (900, 600)
 
 
 def sheet(*shapes: Any, **more: Any) -> Sketch:
-    """Return a sketch of 10 x 10 m with these obstacles."""
+    """Return a sketch of 10 x 10 m with some obstacles."""
     return Sketch(boundary=DEFAULT_BOUNDARY, **more).with_obstacles(shapes)[0]
 
 
@@ -84,7 +84,7 @@ class EditorDriver(Driver):
         self.at = (5, 5)
 
     def settle(self) -> None:
-        """Let what was posted arrive, also while a map is tried."""
+        """Handle the posted events, also during a trial."""
         if self.window.trial is None:
             super().settle()
         for _ in range(4 if self.window.trial is not None else 0):
@@ -102,22 +102,22 @@ class EditorDriver(Driver):
         return self.window.canvas.to_pixel(point)
 
     def hold_keys(self, *names: str) -> None:
-        """Hold keys down, or none."""
+        """Hold modifier keys down; without names, release all."""
         pygame.key.set_mods(sum(MODIFIERS[name] for name in names))
 
     def move_to(self, *points: tuple[float, float], held: int = 0) -> None:
-        """Move to places, m."""
+        """Move the mouse to positions, m."""
         for point in points:
             self.move(*self.find_pixel(point), held=held)
 
     def click_all(self, *points: tuple[float, float]) -> None:
-        """Click places one after the other, too slowly for double clicks."""
+        """Click positions, m, one after the other, too slowly for double clicks."""
         for point in points:
             self.wait()
             self.click_at(point)
 
     def double_click(self, point: tuple[float, float]) -> None:
-        """Click a place twice, quickly."""
+        """Double-click a position, m."""
         self.wait()
         self.click_at(point)
         self.click_at(point)
@@ -126,19 +126,20 @@ class EditorDriver(Driver):
         self.window.run_frame(seconds)
 
     def click_answer(self, text: str) -> None:
-        """Click a button of the question that is asked."""
+        """Click a button of the open question."""
         self.settle()
-        shown = self.window.dialogs.ui.widgets
-        found = next(each for each in shown.values() if each.kind == "button" and each.text == text)
-        self.click(*found.rect.center)
+        widgets = self.window.dialogs.ui.widgets.values()
+        button = next(widget for widget in widgets if widget.kind == "button" and widget.text == text)
+        self.click(*button.rect.center)
 
     def read_refusal(self) -> str:
-        """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
-        asked = self.editor.dialogs.current
-        assert isinstance(asked, Choice) and asked.error, "nothing was refused"
+        """Return the error that the open dialog shows for the typed text, and close the dialog."""
+        dialog = self.editor.dialogs.current
+        assert isinstance(dialog, Choice)
+        assert dialog.error, "nothing was refused"
         self.press_key("escape")
         assert self.editor.dialogs.current is None
-        return asked.error
+        return dialog.error
 
     def select(self, *keys: Any) -> None:
         self.editor.select(Selection.of(*keys))

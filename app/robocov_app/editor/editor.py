@@ -172,13 +172,16 @@ class Editor(EditorContext):
     def undo_steps(self, steps: int) -> None:
         """Undo a number of changes, or redo them if it is negative."""
         history = self.document.history
-        change: Change | None = None
-        for _ in range(abs(steps)):
-            change = history.undo() if steps > 0 else history.redo()
+        undone: Change | None = None
+        redone: Change | None = None
+        for _ in range(steps):
+            undone = history.undo()
+        for _ in range(-steps):
+            redone = history.redo()
         if steps == 1:
-            self.show_message(f"undone: {change.description}" if change else "nothing to undo")
+            self.show_message("nothing to undo" if undone is None else f"undone: {undone.description}")
         elif steps == -1:
-            self.show_message(f"redone: {change.description}" if change else "nothing to redo")
+            self.show_message("nothing to redo" if redone is None else f"redone: {redone.description}")
         self._handle_change()
 
     def open_document(self, document: Document) -> None:

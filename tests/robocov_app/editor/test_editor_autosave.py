@@ -1,4 +1,4 @@
-"""Maps that are kept aside, and what is offered of them after a crash."""
+"""Drafts of maps, and their recovery after a crash."""
 
 import json
 from dataclasses import replace

@@ -67,7 +67,7 @@ def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, nam
     assert not [
         problem for problem in list_problems(change.sketch) if problem.is_error and problem.owner in keys
     ]
-    # by places: in as many of the shapes as it takes, but for a hair's breadth at the edges
+    # Random points agree, except for a hair's breadth at the edges.
     rng = np.random.default_rng(0)
     low_x, low_y, high_x, high_y = shapely.union_all(raw).bounds
     points = shapely.points(rng.uniform((low_x, low_y), (high_x, high_y), size=(200, 2)))
@@ -215,7 +215,7 @@ def test_crossing_outlines_are_repaired():
     assert change.selection.boundary
     with pytest.raises(MapError, match="nothing to repair"):
         boolean.repair_outlines(change.sketch, Selection())
-    # of what is selected only
+    # Only selected obstacles are repaired.
     only = boolean.repair_outlines(sketch, Selection.of(keys[0]))
     assert only.sketch.boundary == sketch.boundary
 

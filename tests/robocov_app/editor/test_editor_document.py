@@ -30,7 +30,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch, build_geomet
 EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 
 
-# there and back
+# writing and reading
 
 
 @settings(max_examples=150)
@@ -90,7 +90,7 @@ def test_a_draft_may_contain_numbers_that_no_map_can_have():
         sketch.build_environment()
 
 
-# what is no draft
+# invalid documents
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_a_header_is_a_draft():
     assert sketch.bounds is None
 
 
-# files that compare well
+# small differences between files
 
 
 @settings(max_examples=60)
@@ -164,7 +164,7 @@ def test_numbers_are_written_without_rounding_errors():
     assert line == '  "boundary": [[0.3, 0], [3, 0], [0.5, 2]],'
 
 
-# notes and what else lies in the free keys
+# notes and other free keys
 
 
 def build_annotated_sketch() -> Sketch:
@@ -192,11 +192,11 @@ def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
     document["obstacles"] = [second, third, first]
     notes = [item.note for item in build_sketch(document).obstacles]
     assert notes[2] == "ask Ada"
-    # one without a name is where it was
+    # A note of an obstacle without a name stays at its index.
     document["obstacles"] = [first]
     again = build_sketch(document)
     assert [item.note for item in again.obstacles] == ["ask Ada"]
-    # nothing is lost, even so
+    # The other note is not lost.
     assert "no name" in json.dumps(again.extra)
     assert build_sketch(to_document(again)) == again
 
@@ -233,7 +233,7 @@ MARKS = {"note": "x", "group": "desks", "locked": True}
 def test_notes_are_separated_from_other_free_keys(extra):
     notes, background, others = read_marks(write_marks(extra, {1: MARKS}, ["a", "b"], None), ["a", "b"])
     assert (notes, background) == ({1: MARKS}, None)
-    # an empty object of the editor's own is none
+    # An empty object of the editor is dropped.
     assert {**others, **{key: {} for key in extra if key not in others}} == extra
 
 

@@ -1,4 +1,4 @@
-"""Drawing: what the tools put down, by clicks, drags and typed numbers."""
+"""Drawing with the tools by clicks, drags and typed numbers."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -59,7 +59,7 @@ def test_changes_on_disk_are_noticed(tmp_path):
         write_sketch(SKETCH, path, disk)
     path.unlink()
     assert check_file(disk) == "gone"
-    # what has gone can be written again
+    # A removed file can be written again.
     assert check_file(write_sketch(SKETCH, path, disk)) == "same"
 
 

@@ -1,4 +1,4 @@
-"""What was found out about a map, and what is being done, seen in the window."""
+"""Problems, measurements and previews of the tools as drawn in the window."""
 
 import time
 from collections.abc import Callable
@@ -21,7 +21,7 @@ CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
 def count_pixels(
     picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, int], distance: int
 ) -> int:
-    """Return how many pixels around one are of a color."""
+    """Return the number of pixels of a color around a pixel."""
     x, y = (round(value) for value in at)
     part = picture[y - distance : y + distance + 1, x - distance : x + distance + 1]
     return int((np.abs(part - np.array(color)).max(axis=2) < 40).sum())
@@ -126,7 +126,7 @@ def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) 
 
 
 def wait_until(driver: EditorDriver, condition: Callable[[], bool]) -> None:
-    """Let the window run until a thread beside it has done something."""
+    """Run the window until a condition holds that depends on a thread."""
     end = time.monotonic() + 30.0
     while not condition():
         driver.window.run_frame(0.02)

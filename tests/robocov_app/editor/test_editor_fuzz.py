@@ -1,4 +1,4 @@
-"""Thousands of random keys, clicks, drags and letters: the editor must bear them all."""
+"""Thousands of random keys, clicks, drags and texts do not break the editor."""
 
 import random
 from collections.abc import Callable
@@ -8,7 +8,7 @@ import pygame
 import pytest
 from drawn_sketches import renumber
 from driven_editor import EditorDriver, load_sketch, open_editor, sheet
-from driven_window import KEYS, MODIFIERS
+from driven_window import MODIFIERS, build_key_event
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.measurement import measure
@@ -20,8 +20,6 @@ from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS
 EVENTS_PER_SEED = 2_500
 EVENTS_PER_STEP = 6
 STEPS_PER_FRAME = 5
-"""Events of one seed, events between two frames, and frames of which one is drawn."""
-
 MAX_RUNS = {
     "screenshot": 2,
     "save": 6,
@@ -32,7 +30,7 @@ MAX_RUNS = {
     "open": 6,
     "background": 4,
 }
-"""What is done so often at most, since it writes files or takes long."""
+"""Maximum number of runs of commands that write files or take long."""
 
 WORDS = (
     *(f"{word} {value}" for word in TYPED_COMMANDS for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
@@ -58,8 +56,8 @@ SHEETS: dict[str, Callable[[], object]] = {
 }
 
 
-class SeldomReadings:
-    """Measures now and then: the measurement has tests of its own."""
+class RareMeasurer:
+    """Measures every fortieth time only: the measurement has tests of its own."""
 
     is_busy = False
 
@@ -82,8 +80,8 @@ class SeldomReadings:
         pass
 
 
-class Monkey:
-    """Does one random thing after the other."""
+class RandomUser:
+    """Does random actions one after the other."""
 
     def __init__(self, driver: EditorDriver, seed: int) -> None:
         self.driver = driver
@@ -91,32 +89,28 @@ class Monkey:
         self.done: dict[str, int] = {}
         self.held = 0
 
-    def somewhere(self) -> tuple[int, int]:
+    def choose_position(self) -> tuple[int, int]:
         width, height = self.driver.window.screen.get_size()
         if self.random.random() < 0.25:
             return self.random.randrange(width), self.random.randrange(height)
-        # near the map, where things are
+        # Near the map, where the objects are.
         x, y = self.driver.find_pixel((self.random.uniform(-1, 11), self.random.uniform(-1, 11)))
         return int(min(max(x, 0), width - 1)), int(min(max(y, 0), height - 1))
 
-    def key(self) -> None:
+    def press_key(self) -> None:
         commands = self.driver.window.commands.commands
-        name, key = self.random.choice([(each.name, key) for each in commands for key in each.keys])
+        name, key = self.random.choice([(command.name, key) for command in commands for key in command.keys])
         self.done[name] = self.done.get(name, 0) + 1
         if self.done[name] > MAX_RUNS.get(name, 10**9):
             return
-        plus = key == "+" or key.endswith("++")
-        *held, last = [*key[:-1].split("+"), "+"] if plus else key.split("+")
-        code = KEYS.get(last) or pygame.key.key_code(last)
-        text = last if len(last) == 1 and "ctrl" not in held else ""
-        mod = sum(MODIFIERS[each] for each in held if each)
-        self.driver.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
-        if text:
-            self.driver.post(pygame.TEXTINPUT, text=text)
+        attributes = build_key_event(key)
+        self.driver.post(pygame.KEYDOWN, **attributes)
+        if attributes["unicode"]:
+            self.driver.post(pygame.TEXTINPUT, text=attributes["unicode"])
         if self.random.random() < 0.9:
-            self.driver.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
+            self.driver.post(pygame.KEYUP, **attributes)
 
-    def letters(self) -> None:
+    def type_text(self) -> None:
         for letter in self.random.choice(WORDS):
             code = ord(letter) if letter.isascii() else 0
             self.driver.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
@@ -125,7 +119,7 @@ class Monkey:
             self.driver.post(pygame.KEYDOWN, key=pygame.K_RETURN, mod=0, unicode="\r", scancode=0)
 
     def move(self) -> None:
-        at = self.somewhere()
+        at = self.choose_position()
         rel = at[0] - self.driver.at[0], at[1] - self.driver.at[1]
         pygame.mouse.set_pos(at)
         self.driver.at = at
@@ -140,13 +134,13 @@ class Monkey:
         self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.at, button=button)
         self.held = 0
 
-    def wheel(self) -> None:
+    def turn_wheel(self) -> None:
         amount = self.random.choice((-3, -1, 1, 2))
         self.driver.post(
             pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False
         )
 
-    def odd(self) -> None:
+    def disturb_window(self) -> None:
         window = self.driver.window
         which = self.random.randrange(6)
         if which == 0:
@@ -171,33 +165,33 @@ class Monkey:
         elif dice < 0.62:
             (self.press if not self.held else self.release)()
         elif dice < 0.87:
-            self.key()
+            self.press_key()
         elif dice < 0.91:
-            self.letters()
+            self.type_text()
         elif dice < 0.94:
-            self.wheel()
+            self.turn_wheel()
         else:
-            self.odd()
+            self.disturb_window()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 @pytest.mark.parametrize("name", SHEETS)
 def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
-    play(name, seed, tmp_path, EVENTS_PER_SEED)
+    play_events(name, seed, tmp_path, EVENTS_PER_SEED)
 
 
 def test_some_random_events_do_no_harm(tmp_path: Path) -> None:
-    play("rooms", 3, tmp_path, EVENTS_PER_SEED // 20)
+    play_events("rooms", 3, tmp_path, EVENTS_PER_SEED // 20)
 
 
-def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
-    readings = SeldomReadings()
-    with open_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=readings) as driver:
-        monkey = Monkey(driver, seed)
+def play_events(name: str, seed: int, tmp_path: Path, events: int) -> None:
+    measurer = RareMeasurer()
+    with open_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=measurer) as driver:
+        user = RandomUser(driver, seed)
         for step in range(events // EVENTS_PER_STEP):
             for _ in range(EVENTS_PER_STEP):
-                monkey.act()
+                user.act()
             window = driver.window
             if window.trial is not None or step % STEPS_PER_FRAME == 0:
                 window.run_frame(1 / 50)

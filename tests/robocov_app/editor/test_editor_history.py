@@ -21,7 +21,7 @@ def test_undo_is_the_exact_inverse_of_any_change(data):
         change = data.draw(changes(history.sketch))
         if change is not None and history.apply(change):
             was.append((history.sketch, history.selection))
-            # whatever an edit makes can be kept, and comes back
+            # The result of any edit can be saved and read.
             assert build_sketch(to_document(change.sketch)) == renumber(change.sketch)
             assert change.selection == change.selection.restrict_to(change.sketch)
             assert len(change.sketch.index_by_key) == len(change.sketch.obstacles)
@@ -81,7 +81,7 @@ def test_a_drag_is_one_step():
     history.undo()
     history.undo()
     assert history.sketch == before
-    # and after undoing, the same drag begins anew
+    # After undoing, the same drag starts a new step.
     history.apply(transform.move(before, selection, 0.1, 0.0), drag="drag 1")
     assert history.undo_descriptions == ("circle moved", "circle drawn")
 

@@ -55,7 +55,7 @@ def test_clicks_cycle_a_color_through_its_roles(drawing: Path) -> None:
         import_dialog.form.cycle_color((224, 224, 255))
         assert find_role(import_dialog.form.entries, (224, 224, 255)) == role
         assert free_area(import_dialog) == pytest.approx(area)
-        # what is left out can still be clicked
+        # Ignored shapes can still be clicked.
         assert import_dialog.imported is not None and import_dialog.imported.sheet is not None
         assert import_dialog.imported.sheet.find_color(*RUG) == (224, 224, 255)
     assert import_dialog.form.entries == {}
@@ -70,7 +70,7 @@ def test_clicked_colors_are_added_to_typed_ones() -> None:
     assert list_declared_colors(entries) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
     set_role(entries, (255, 0, 0), None)
     assert "solid_color" not in entries
-    # half a name is no color yet
+    # Half a name is not a color.
     entries["free_color"] = "lightbl"
     assert list_declared_colors(entries) == []
     assert choose_next_role(choose_next_role(choose_next_role(choose_next_role(None)))) is None
@@ -87,7 +87,7 @@ def test_a_click_finds_the_topmost_shape(drawing: Path) -> None:
 
 
 def save_picture(folder: Path) -> Path:
-    """A plan whose edges are soft, with a pale blue rug and a red line."""
+    """Save a plan with soft edges, a pale blue rug and a red line."""
     large = Image.new("RGB", (800, 480), "white")
     draw = ImageDraw.Draw(large)
     draw.rectangle((0, 0, 799, 479), outline="black", width=16)

@@ -20,7 +20,7 @@ FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 
 def build_hall_with_doors(*widths: float) -> Sketch:
-    """A hall 12 m by 8 m in rooms side by side, with doors of some widths in their walls, at y = 4."""
+    """Build a hall of 12 x 8 m divided into rooms, with doors of some widths in the walls at y = 4."""
     shapes = []
     for k, width in enumerate(widths):
         x = 12.0 * (k + 1) / (len(widths) + 1)
@@ -30,7 +30,7 @@ def build_hall_with_doors(*widths: float) -> Sketch:
 
 
 def rasterize_reach(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the center of a robot can be, by parts, on a raster; and where it sweeps."""
+    """Return the possible centers of a robot on a raster, labelled by part, and the cells that it sweeps."""
     xs = np.arange(cell / 2, 12.0, cell)
     ys = np.arange(cell / 2, 8.0, cell)
     x, y = np.meshgrid(xs, ys)
@@ -55,14 +55,14 @@ def test_reach_agrees_with_a_raster(sketch, radius):
     opened = shapely.union_all(reached)
     perimeter = free.length
     assert opened.area == pytest.approx(swept.sum() * cell**2, abs=2.0 * perimeter * cell)
-    # what a raster sees clearly of the parts is there
+    # Parts that are clear on a raster are found.
     sizes = ndimage.sum_labels(np.ones_like(parts), parts, np.arange(1, parts.max() + 1))
     assert len(reached) >= (sizes * cell**2 > 4 * cell).sum() - 1
     assert free.buffer(1e-6).covers(opened)
     assert (untouched - free).area < 1e-6
     # no robot touches what it never touches
     assert shapely.intersection(opened, untouched).area < 1e-3 * perimeter
-    # what is neither is crumbs: no point of them is farther from where robots are than their radius
+    # The remainder is small: none of its points is farther from the swept space than the radius.
     crumbs = free - opened - untouched.buffer(2e-3)
     for part in shapely.get_parts(crumbs):
         if part.area > 1e-4:

@@ -1,4 +1,4 @@
-"""The page under the editor: what is drawn in patches is what is drawn as a whole, pixel by pixel."""
+"""The page under the editor: drawing it in patches gives the same pixels as drawing it at once."""
 
 from collections.abc import Iterator
 from dataclasses import replace

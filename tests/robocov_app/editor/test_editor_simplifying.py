@@ -15,7 +15,7 @@ from robocov_app.editor.model.sketch import Sketch
 
 
 def build_wobbly_ring(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
-    """A ring that goes round a middle, so that it does not cross itself."""
+    """Build a ring around a center, so that it does not cross itself."""
     rng = np.random.default_rng(seed)
     angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, count))
     distance = radius * (1.0 + 0.2 * np.sin(3 * angle)) + rng.uniform(-noise, noise, count)

@@ -1,4 +1,4 @@
-"""What tools share: directions, lengths and places in words."""
+"""Directions, lengths and positions that tools share."""
 
 import numpy as np
 from hypothesis import given

@@ -122,7 +122,7 @@ def test_center_and_rim_of_discs_are_vertices(sketch):
         ),
         (
             lambda s: vertices.delete_vertices(s, select_vertices(Vertex(-1, 0, 1), Vertex(-1, 0, 2))),
-            "three corners at least",
+            "at least three corners",
         ),
         (lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0)), 0.0), "length above 0"),
         (

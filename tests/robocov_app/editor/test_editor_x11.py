@@ -103,7 +103,7 @@ def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> 
         hands.press("F5")
         time.sleep(0.5)
 
-        # nothing was lost: what was done before can still be undone and done again
+        # Earlier changes can still be undone and redone.
         hands.press("ctrl+z", "ctrl+y", "ctrl+s")
         hands.press("ctrl+q")
         assert wait_for_end(hands.process) == 0, read_errors(hands.process)
@@ -161,7 +161,7 @@ def test_a_killed_editor_loses_nothing(display: str, tmp_path: Path) -> None:
 
 
 def count_saved_obstacles(folder: Path) -> int:
-    """Return how many obstacles the draft has: not what is still being written, which has another name."""
+    """Return the number of obstacles in the draft; temporary files do not count."""
     found = [0]
     for path in (folder / "drafts").rglob("[!.]*.json"):
         document = json.loads(path.read_text())
@@ -211,7 +211,7 @@ def test_a_picture_is_imported_with_the_room_that_was_clicked(display: str, tmp_
         hands.type("0.1")
 
         def find_red_area() -> tuple[float, float]:
-            """Return the middle of what is red, px; (0, 0) for nothing."""
+            """Return the middle of the red area, px; (0, 0) if there is none."""
             red, green, blue = np.moveaxis(hands.take_screenshot(), 2, 0)
             found = np.argwhere((red > 180) & (green < 160) & (blue < 160))
             return (0.0, 0.0) if len(found) < 1000 else (np.median(found[:, 1]), np.median(found[:, 0]))

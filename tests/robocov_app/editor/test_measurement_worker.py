@@ -27,7 +27,7 @@ SKETCH, _ = Sketch("Hall", boundary=HALL).with_obstacles(
 
 
 def are_equal(a, b) -> bool:
-    """Whether two measurements say the same."""
+    """Return whether two measurements are equal."""
     numbers = ("free_area", "components", "reached", "gap", "vertices", "radius")
     words = [[problem.message for problem in each.problems] for each in (a, b)]
     return (

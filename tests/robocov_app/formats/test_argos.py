@@ -1,4 +1,4 @@
-"""Arenas of ARGoS: boxes and cylinders where they stand, and what is distributed."""
+"""Arenas of ARGoS: boxes, cylinders, and distributions of bodies."""
 
 from pathlib import Path
 

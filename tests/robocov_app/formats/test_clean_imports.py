@@ -110,7 +110,7 @@ def test_repeated_and_straight_vertices_are_removed() -> None:
     assert tidy_ring(ring, 4).tolist() == [[0, 0], [2, 0], [2, 2], [0, 2]]
     spike = np.array([(0, 0), (2, 0), (2, 2), (2, 5), (2, 2), (0, 2)], dtype=float)
     assert tidy_ring(spike, 4).tolist() == [[0, 0], [2, 0], [2, 2], [0, 2]]
-    # what is not straight by a digit stays
+    # A vertex that is off the line by one digit is kept.
     bent = np.array([(0, 0), (1, 0.0001), (2, 0), (2, 2), (0, 2)])
     assert len(tidy_ring(bent, 4)) == 5
     twice = round_polygons(box(0, 0, 1, 1) | box(1, 0, 2.00001, 1), 4)

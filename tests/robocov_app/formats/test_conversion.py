@@ -1,4 +1,4 @@
-"""From foreign free space to a map: what stays, what goes, what is said, and that it can be saved."""
+"""Conversion of foreign free space to a map: cleaning, notes, starts, and saving the result."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""DXF drawings, made by ezdxf: entities, blocks, layers, units, and what is refused."""
+"""DXF drawings written by ezdxf: entities, blocks, layers, units, and refused files."""
 
 import io
 import logging
@@ -29,7 +29,7 @@ Draw = Callable[[Any, Any], Any]
 def read_drawing(
     folder: Path, draw: Draw, *, unit: int = METERS, version: str = "R2010", hall: bool = True, **options: Any
 ) -> ForeignMap:
-    """Return what is read of a drawing; a hall of 20 x 10 units is its boundary."""
+    """Read a drawing whose boundary is a hall of 20 x 10 units."""
     document = ezdxf.new(version)
     document.header["$INSUNITS"] = unit
     space = document.modelspace()

@@ -1,4 +1,4 @@
-"""Which shape is the boundary, and what is free: the same rules for every drawing."""
+"""Boundary and free space of a drawing: the same rules for every format."""
 
 from itertools import pairwise
 from typing import Any

@@ -1,4 +1,4 @@
-"""GeoJSON, against shapely's own reader; degrees and meters; names; what is refused."""
+"""GeoJSON, compared with shapely's reader; degrees and meters; names; refused files."""
 
 import json
 from pathlib import Path

@@ -16,7 +16,7 @@ from raster_files import PLAN, chunk, draw_pixels, pgm, raw_png
 
 MEMORY = 200 * 2**20
 SECONDS = 3.0
-"""Of CPU time: three times what is promised, as machines are busy."""
+"""CPU time: three times the documented limit, because machines are busy."""
 
 WATCHED = """
 import json, re, sys, time
@@ -42,7 +42,7 @@ print(json.dumps([told(path, cell) for path, cell in json.loads(sys.argv[1])]))
 
 
 def measure_import(files: list[tuple[Path, float | None]]) -> list[tuple[str, float, int]]:
-    """Import files in a process of its own; return what is said of each, seconds, and peak in bytes."""
+    """Import files in another process; return the message and seconds of each, and the peak in bytes."""
     done = subprocess.run(
         [sys.executable, "-c", WATCHED, json.dumps([(str(path), cell) for path, cell in files])],
         capture_output=True, text=True, timeout=120, check=False,
@@ -66,7 +66,7 @@ def text_bomb() -> bytes:
 
 
 def large(kind: str, side: int, keep: int | None = None, **options: object) -> bytes:
-    """Return the first bytes of a white picture, with as many pixels as it says or a part of them."""
+    """Return a white picture, complete or only its first bytes."""
     stream = io.BytesIO()
     Image.new("1" if options.get("compression") == "group4" else "L", (side, side), 255).save(
         stream, kind, **options

@@ -13,7 +13,7 @@ import pytest
 
 MB = 1_000_000
 SECONDS = 4.0
-"""Of CPU time: four times what is promised (twice for files of 50 MB), as machines are busy."""
+"""CPU time: four times the documented limit (twice for files of 50 MB), because machines are busy."""
 
 
 def _knot(count: int) -> list[list[float]]:

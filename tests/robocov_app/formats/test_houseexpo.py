@@ -1,4 +1,4 @@
-"""HouseExpo plans, on small ones of our own: what is kept, what is repaired, what is refused."""
+"""HouseExpo plans, on small examples: kept, repaired and refused plans."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Pictures of every kind give the same brightness; what is broken or too large is refused."""
+"""Pictures of every kind give the same brightness; broken or too large ones are refused."""
 
 import io
 import math

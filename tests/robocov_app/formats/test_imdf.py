@@ -14,7 +14,7 @@ from shapely import Point, box
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
-# with the corners of the rooms beside it
+# with the corners of the adjacent rooms
 WALKWAY = [(0, 8), (30, 8), (30, 12), (20, 12), (10, 12), (0, 12)]
 PLANE = pyproj.Proj(proj="aeqd", lon_0=8.4, lat_0=49.0, ellps="WGS84")
 GROUND = "11111111-0000"
@@ -231,7 +231,7 @@ def test_other_folders_and_archives_are_not_imdf(tmp_path: Path) -> None:
 def test_hairlines_between_units_are_closed(tmp_path: Path) -> None:
     files = venue()
     del files["opening"]
-    # without the corners of the rooms beside it, and askew: edges miss each other by some micrometers
+    # Rotated, and without the corners of adjacent rooms: edges miss each other by some micrometers.
     files["unit"][0]["geometry"] = polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
     files["unit"][1]["geometry"] = polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
     foreign = read(write_folder(tmp_path / "mill", files))

@@ -1,4 +1,4 @@
-"""Grids of Moving AI: letters, line ends, and what is refused with its line and column."""
+"""Grids of Moving AI: characters, line ends, and mistakes with their line and column."""
 
 from pathlib import Path
 

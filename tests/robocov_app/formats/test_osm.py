@@ -1,4 +1,4 @@
-"""OpenStreetMap: buildings, relations of several ways, barriers, bounds, and what is refused."""
+"""OpenStreetMap: buildings, relations of several ways, barriers, bounds, and refused files."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A mapping of plain values; whatever else YAML can do is refused."""
+"""Mappings of plain values; other features of YAML are refused."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Circles and walls of drawings: they stay where nothing speaks against it, and what is free stays free."""
+"""Circles and walls of drawings are kept where possible, and the free space does not change."""
 
 import json
 import math
@@ -59,7 +59,7 @@ def test_primitives_preserve_the_free_space(
         return
     environment, report = build_environment(foreign, Shaping(simplify=tolerance), "plan")
     apart = shapely.symmetric_difference(environment.free, parts[0])
-    # twice: what was drawn may have moved, and so may the primitives from where it was drawn
+    # Twice the tolerance: both the drawing and the primitives may have moved.
     assert apart.area <= 2 * (tolerance + 2e-4) * parts[0].length
     assert report.obstacles == len(environment.obstacles)
     # A circle at the boundary may cut off a part of the free space. It is a polygon then.

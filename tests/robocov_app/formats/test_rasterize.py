@@ -1,4 +1,4 @@
-"""Which cells a map covers, against a point-by-point test, and what a grid cannot be."""
+"""Cells that a map covers, compared with a point-by-point test, and refused grids."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""ROS maps: what a pixel means in each mode, where the map lies, and what is refused."""
+"""ROS maps: meaning of pixels in each mode, position of the map, and refused files."""
 
 import math
 import os
@@ -113,7 +113,7 @@ def test_unknown_cells_follow_the_option(tmp_path: Path) -> None:
     foreign = IMPORTER.read(path, ReadOptions(unknown="cut"))
     assert shapely.equals(foreign.free, ROOMS)
     assert foreign.boundary is not None
-    # two cells around what is known, which has a side of 14 x 8
+    # Two cells around the known region of 14 x 8 cells.
     assert shapely.equals(foreign.boundary, shapely.box(-1, -1, 17, 11))
 
 
@@ -188,7 +188,7 @@ def test_scale_and_raw_use_the_threshold(tmp_path: Path) -> None:
     assert shapely.equals(
         read(path, unknown="free", threshold=0.5), shapely.box(0, 0, 3, 1) | shapely.box(5, 0, 7, 1)
     )
-    # what is free for sure is free, whatever the threshold
+    # Cells that are certainly free are free with any threshold.
     assert shapely.equals(read(path, threshold=0.0), shapely.box(0, 0, 1, 1))
 
 

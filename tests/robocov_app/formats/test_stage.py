@@ -65,7 +65,7 @@ def test_macros_are_inherited_and_overridden(tmp_path: Path) -> None:
     )
     solid = box(-10, -5, 10, 5) - foreign.free
     triangle = shapely.Polygon([(-10, -5), (-10, 5), (10, 5)])
-    # what is in a model lies in its frame
+    # Children of a model are positioned in its frame.
     inside = [triangle, box(-3, 2.5, -1, 3.5), box(3.5, -5, 4.5, -1), box(0.75, -3.25, 1.25, -2.75)]
     assert shapely.equals(shapely.normalize(solid), shapely.normalize(shapely.union_all(inside)))
     assert foreign.boundary is not None and foreign.boundary.equals(box(-10, -5, 10, 5))

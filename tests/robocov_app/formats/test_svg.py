@@ -1,4 +1,4 @@
-"""SVG drawings: what is drawn where, what is an area and what a wall, sizes, and what is refused."""
+"""SVG drawings: positions, areas and walls, sizes, and refused files."""
 
 import math
 from pathlib import Path
@@ -28,7 +28,7 @@ def read_shapes(
 
 
 def compute_obstacles(folder: Path, body: str, **options: Any) -> Any:
-    """Return what is drawn on a page of 10 x 6 m, y up."""
+    """Read the shapes on a page of 10 x 6 m, y up."""
     return box(0, 0, 10, 6) - read_shapes(folder, PAGE + body, **options).free
 
 

@@ -1,4 +1,4 @@
-"""Which style an element has: attributes, style sheets, what is inherited."""
+"""Styles of elements: attributes, style sheets, inheritance."""
 
 import pytest
 

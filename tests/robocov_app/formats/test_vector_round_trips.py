@@ -1,4 +1,4 @@
-"""Maps out and in again in vector formats: what is free comes back to the rounding, property-tested."""
+"""Maps exported to vector formats and read again have the same free space up to rounding."""
 
 import json
 import sys
@@ -32,7 +32,7 @@ AS_IT_IS = Shaping(simplify=0.0, keep="all")
 
 
 def export_and_read(environment: Environment, path: Path, **options: Any) -> ForeignMap:
-    """Write and read a map, and compare what is free."""
+    """Export and read a map, and compare the free space."""
     report = export_map(environment, path, options=WriteOptions(**options))
     foreign = detect_format(path).read(path, ReadOptions())
     edge = environment.free.length

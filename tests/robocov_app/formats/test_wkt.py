@@ -1,4 +1,4 @@
-"""Well-known text, against shapely's own reader; what other programs add to it; what is refused."""
+"""Well-known text, compared with shapely's reader; additions of other programs; refused texts."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Small things that readers and writers of maps share: words, numbers, single outlines."""
+"""Small functions that readers and writers of maps share: texts, numbers, single outlines."""
 
 from itertools import islice
 from pathlib import Path

@@ -43,7 +43,7 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
         #........#
         ##########
     """.split()
-    # the block of half a meter is one cell; beside it everything is as drawn
+    # The block of half a meter is one cell; the rest is unchanged.
     values = {"#": 0, ".": 254, "?": 205}
     assert pixels(tmp_path / "corner.pgm").tolist() != []
     found = pixels(tmp_path / "corner.pgm")

@@ -111,7 +111,7 @@ class ReferenceImage:
 
 
 def _convert_to_rgb(picture: Image.Image) -> Image.Image:
-    """Return a picture in RGB: transparent ones on white, gray values of any range stretched."""
+    """Return a picture in RGB, with transparent parts on white and gray values stretched to full range."""
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         transparent = picture.convert("RGBA")
         white = Image.new("RGBA", transparent.size, "white")

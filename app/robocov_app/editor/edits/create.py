@@ -144,7 +144,7 @@ def clean_label(name: str) -> str:
 
 
 def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str:
-    """Return a text without blanks around it; raise MapError if it is too long.
+    """Return a text without surrounding blanks; raise MapError if it is too long.
 
     Parameters
     ----------

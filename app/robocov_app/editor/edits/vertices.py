@@ -150,7 +150,7 @@ def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[i
     minimum = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(shape), 3)
     if len(rings[0]) >= minimum:
         return sketch.with_rings(owner, rings)
-    require(owner != BOUNDARY, "the boundary needs three corners at least")
+    require(owner != BOUNDARY, "the boundary needs at least three corners")
     return sketch.without({owner})
 
 

@@ -245,7 +245,7 @@ class EditorWindow(CommandWindow):
         return self.editor.tool.choose_cursor(self.editor)
 
     def _arrange(self) -> None:
-        """Lay the window out again after another size, scale or theme."""
+        """Lay the window out again after a change of size, scale or theme."""
         editor = self.editor
         key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.theme)
         if key == self._arranged:

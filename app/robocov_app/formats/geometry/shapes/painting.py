@@ -77,7 +77,7 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
 
 
 def _find_fills_with_marks(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
-    """Return which fills are pale and have something on them that is not."""
+    """Return for each fill whether it is pale and has darker paint on it."""
     is_marked = np.zeros(len(fills), dtype=bool)
     darker = [mark for mark in marks if mark.color is not None and not is_pale(mark.color)]
     if not darker:
