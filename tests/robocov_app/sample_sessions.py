@@ -68,7 +68,7 @@ def describe_state(session: Session) -> list[object]:
     timeline = session.timeline
     state: list[object] = [
         timeline.scenario,
-        timeline.drag,
+        timeline.run.drag,
         timeline.is_settled,
         timeline.past_version,
         timeline.end_time,

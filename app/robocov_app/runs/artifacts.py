@@ -290,6 +290,8 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
 
 def _build_curves(runs: Sequence[Run], quantity: str) -> list[TimeCurve]:
     """Return the curves of ``mean_distance``, or of ``mean_time``, which not every run has."""
+    from robocov_app.figures.curves import TimeCurve
+
     curves = []
     for run in runs:
         values = getattr(run.history, quantity)

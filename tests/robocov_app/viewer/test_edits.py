@@ -130,15 +130,15 @@ def test_a_failed_robot_can_be_placed():
 def test_a_robot_that_is_dragged_while_paused_is_placed():
     session = advance_session(start_session(), 5)
     session.drag_robot(2, (3.0, 3.0))
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert get_position(session, 2) == [3.0, 3.0]
     session.playback.is_playing = True
     session.drag_robot(2, (3.2, 3.0))
     assert get_position(session, 2) == [3.0, 3.0]
-    assert session.timeline.drag == (2, (3.2, 3.0))
+    assert session.timeline.run.drag == (2, (3.2, 3.0))
     session.playback.is_playing = False
     session.drag_robot(2, (3.4, 3.0))
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert get_position(session, 2) == [3.4, 3.0]
 
 
@@ -147,7 +147,7 @@ def test_a_failed_robot_that_is_dragged_is_placed():
     session.fail_robot(2)
     session.playback.is_playing = True
     session.drag_robot(2, (3.0, 3.0))
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert get_failed_position(session, 2) == (3.0, 3.0)
 
 
@@ -254,9 +254,9 @@ def test_a_robot_that_fails_or_is_removed_is_released():
     for edit, other_robot in ((session.fail_robot, 1), (session.remove_robot, 3)):
         session.drag_robot(2, (3.0, 3.0))
         edit(other_robot)
-        assert session.timeline.drag is not None
+        assert session.timeline.run.drag is not None
         edit(2)
-        assert session.timeline.drag is None
+        assert session.timeline.run.drag is None
         session.undo()
         session.undo()
         assert get_robot_numbers(session) == ((1, 2, 3), ())

@@ -234,7 +234,7 @@ def test_a_dragged_robot_keeps_its_velocity_when_it_is_released():
     panes = session.timeline.panes
     session.playback.is_playing = True
     session.drag_robot(1, (5.3, 3.3))
-    assert session.timeline.drag == (1, (5.3, 3.3))
+    assert session.timeline.run.drag == (1, (5.3, 3.3))
     for _ in range(12):
         session.playback.advance(0.1)
         assert compute_penetration(session) < 2e-3
@@ -245,7 +245,7 @@ def test_a_dragged_robot_keeps_its_velocity_when_it_is_released():
     speeds = [float(np.hypot(*pane.simulation.velocities[0])) for pane in panes]
     assert min(speeds) > 1.5
     session.release()
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert session.timeline.events[-1].text == "robot 1 was dragged"
     session.playback.advance(0.1)
     # The robot brakes from a speed that it could not reach by itself.
@@ -270,5 +270,5 @@ def test_a_dragged_robot_is_released_when_the_past_is_displayed():
     session.playback.is_playing = True
     session.drag_robot(1, (3.0, 3.0))
     session.show_time(0.1)
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert session.timeline.events[-1].kind == "hand"

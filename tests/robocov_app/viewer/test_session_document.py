@@ -148,16 +148,16 @@ def test_an_edit_within_a_drag_releases_the_robot(is_undone: bool) -> None:
     if is_undone:
         session.undo()
     advance_session(session, 80)
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert_same_positions(recompute(session), session)
 
 
 def test_a_branch_within_a_drag_continues_the_drag() -> None:
     session = build_session_displayed_within_a_drag()
     session.branch()
-    assert session.timeline.drag is not None
+    assert session.timeline.run.drag is not None
     advance_session(session, 80)
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert_same_positions(recompute(session), session)
 
 

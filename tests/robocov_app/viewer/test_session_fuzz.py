@@ -170,7 +170,7 @@ def test_a_random_session_is_recomputed_bit_for_bit(seed: int) -> None:
 
 def assert_same_state(session: Session, other: Session) -> None:
     """Assert that two sessions are in the same state, bit for bit."""
-    assert session.timeline.drag == other.timeline.drag
+    assert session.timeline.run.drag == other.timeline.run.drag
     assert len(session.timeline.panes) == len(other.timeline.panes)
     for positions, other_positions in zip(get_positions(session), get_positions(other), strict=True):
         np.testing.assert_array_equal(positions, other_positions)

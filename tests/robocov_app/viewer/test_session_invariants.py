@@ -123,7 +123,7 @@ class RandomEdits(RuleBasedStateMachine):
     @rule()
     def release(self):
         self.session.release()
-        assert self.session.timeline.drag is None
+        assert self.session.timeline.run.drag is None
 
     @rule(index=indices, point=points)
     def place_robot(self, index, point):
@@ -259,10 +259,10 @@ class RandomEdits(RuleBasedStateMachine):
         assert times == sorted(times)
         assert not times or times[-1] <= timeline.end_time
 
-    @precondition(lambda self: self.session and self.session.timeline.drag)
+    @precondition(lambda self: self.session and self.session.timeline.run.drag)
     @invariant()
     def a_dragged_robot_works_at_present(self):
-        number, _ = self.session.timeline.drag
+        number, _ = self.session.timeline.run.drag
         assert self.session.timeline.is_live
         assert number in self.session.displayed.numbers
 

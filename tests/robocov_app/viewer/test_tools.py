@@ -118,12 +118,12 @@ def test_the_hand_throws_robots():
     session.playback.is_playing = True
     hand.press(session, build_event(tuple(get_position(session, 2)), robot=2))
     hand.move(session, build_event((3.0, 3.2)))
-    assert session.timeline.drag == (2, (3.0, 3.2))
+    assert session.timeline.run.drag == (2, (3.0, 3.2))
     session.playback.advance(0.1)
     hand.move(session, build_event((3.1, 3.2)))
-    assert session.timeline.drag == (2, (3.1, 3.2))
+    assert session.timeline.run.drag == (2, (3.1, 3.2))
     hand.release(session, build_event((3.1, 3.2)), clicked=False)
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert session.timeline.events[-1].text == "robot 2 was dragged"
 
 
@@ -134,10 +134,10 @@ def test_canceling_releases_a_dragged_robot():
     hand.press(session, build_event(tuple(get_position(session, 2)), robot=2))
     hand.move(session, build_event((3.0, 3.2)))
     assert hand.cancel(session)
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
     assert not hand.is_holding
     hand.move(session, build_event((1.0, 1.0)))
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
 
 
 def test_the_hand_drags_failed_robots():
@@ -159,7 +159,7 @@ def test_a_robot_can_be_removed_while_it_is_dragged():
     session.remove_robot(2)
     hand.move(session, build_event((3.0, 3.5)))
     assert hand.release(session, build_event((3.0, 3.5)), clicked=False) is None
-    assert session.timeline.drag is None
+    assert session.timeline.run.drag is None
 
 
 def test_the_hand_moves_obstacles():

@@ -21,10 +21,10 @@ def test_a_dragged_robot_follows_the_mouse(driver: Driver) -> None:
         driver.move(*target, held=1, settled=False)
         driver.run_frames()
     assert np.hypot(*(get_position(driver, 2) - MIDDLE)) < 0.3
-    assert driver.session.timeline.drag is not None
-    assert driver.session.timeline.drag[0] == 2
+    assert driver.session.timeline.run.drag is not None
+    assert driver.session.timeline.run.drag[0] == 2
     driver.release()
-    assert driver.session.timeline.drag is None
+    assert driver.session.timeline.run.drag is None
     assert driver.viewer.selected_robot == 2
     assert driver.window.panel.tab == "robot"
 

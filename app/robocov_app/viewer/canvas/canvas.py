@@ -289,7 +289,7 @@ class ViewerCanvas:
         canvas = self._build_canvas(surface, pane, scene)
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
         session = self.viewer.session
-        draw_drag(canvas, scene, session.timeline.drag)
+        draw_drag(canvas, scene, session.timeline.run.drag)
         draw_failed_selection(canvas, scene, self.viewer.selected_robot)
         if pane == self.hovered[0]:
             draw_hovered_robot(canvas, scene, self.hovered[1])

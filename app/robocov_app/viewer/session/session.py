@@ -393,8 +393,8 @@ class Session:
 
     def release(self) -> None:
         """Release the robot that is dragged, if there is one."""
-        if self.timeline.drag is not None and self.timeline.is_live:
-            number, _ = self.timeline.drag
+        if self.timeline.run.drag is not None and self.timeline.is_live:
+            number, _ = self.timeline.run.drag
             self.apply(ReleaseRobot(), "hand", f"robot {number} was dragged", ("hand", number))
         self._gesture = None
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.lockstep import Lockstep
@@ -89,11 +88,6 @@ class Timeline:
     def panes(self) -> list[Pane]:
         """The panes, at the present step."""
         return self.run.panes
-
-    @property
-    def drag(self) -> tuple[int, Point] | None:
-        """Number of the dragged robot, and the point to which it is pulled, m; None if there is none."""
-        return self.run.drag
 
     @property
     def step(self) -> int:

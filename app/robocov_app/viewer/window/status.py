@@ -115,7 +115,7 @@ def suggest_actions(viewer: ViewerModel) -> str:
     has_settled = timeline.is_settled or viewer.settled_change is timeline.head
     if not viewer.view.has_suggestions or not has_settled:
         return ""
-    if not timeline.is_live or timeline.drag is not None:
+    if not timeline.is_live or timeline.run.drag is not None:
         return ""
     tried = {node.kind for node in timeline.document.nodes}
     if len(timeline.panes) > 1:
