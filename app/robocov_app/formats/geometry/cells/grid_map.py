@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NoReturn, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,10 +102,7 @@ def build_grid_map(
     free = cells[::-1] == FREE
     if unknown == "free":
         free |= is_unknown
-    if not free.any() and is_unknown.any():
-        _refuse_no_free_cell(where, unknown_name)
-    if not free.any():
-        _refuse_no_free_cell(where)
+    _require_free_cell(free, is_unknown, unknown_name, where)
     boundary = None
     dropped: tuple[str, ...] = ()
     if unknown == "cut" and is_unknown.any():
@@ -128,9 +125,13 @@ def build_grid_map(
     )
 
 
-def _refuse_no_free_cell(where: str, unknown_name: str = "") -> NoReturn:
-    """Raise MapError for a grid without free cells; without unknown ones, their name is empty."""
-    hint = f" (--unknown free takes {unknown_name} cells as free)" if unknown_name else ""
+def _require_free_cell(free: BoolArray, is_unknown: BoolArray, unknown_name: str, where: str) -> None:
+    """Raise MapError if no cell is free."""
+    if free.any():
+        return
+    hint = ""
+    if is_unknown.any():
+        hint = f" (--unknown free takes {unknown_name} cells as free)"
     raise MapError(f"{where}: no cell is free{hint}")
 
 
