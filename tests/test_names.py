@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import doctest
 import importlib
 import inspect
 import keyword
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tyro  # noqa: F401 - its import hashes all built-in values, and doctests leave arrays in `_`
 
 import robocov as rc
 from robocov.controllers import get_gains
@@ -154,6 +156,29 @@ def test_docstrings_of_public_names_are_complete(name: str) -> None:
             assert is_described or parameter.startswith("_"), f"{parameter} is not described"
     if not isinstance(value, type) and inspect.signature(value).return_annotation not in (None, "None"):
         assert "Returns" in sections
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_examples_of_public_names_import_what_they_use(name: str) -> None:
+    """Doctests see all names of their module, but readers copy examples into a session of their own."""
+    examples = doctest.DocTestParser().get_examples(DOCUMENTED[name].__doc__ or "")
+    tree = ast.parse("".join(example.source for example in examples))
+    known = set(dir(builtins))
+    used = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            used.add(node.id)
+        elif isinstance(node, ast.Name):
+            known.add(node.id)
+        elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            known.add(node.name)
+        elif isinstance(node, ast.arg):
+            known.add(node.arg)
+        elif isinstance(node, ast.alias):
+            known.add(node.asname or node.name.partition(".")[0])
+        elif isinstance(node, ast.ExceptHandler) and node.name:
+            known.add(node.name)
+    assert used <= known
 
 
 @pytest.mark.parametrize("name", [name for name, value in PUBLIC.items() if isinstance(value, type)])

@@ -287,8 +287,9 @@ def build_other_names_page() -> str:
 
 def build_learning_page() -> str:
     """Build the page that documents the learning environments."""
-    text = build_heading("Python: robocov_app.learning", "=")
-    text += '\nThe simulation for gymnasium and PettingZoo: ``pip install "robocov[rl]"``.\n\n'
+    text = build_heading("Python: learning environments", "=")
+    text += "\nNames of ``robocov_app.learning``, for gymnasium and PettingZoo: "
+    text += '``pip install "robocov[rl]"``.\n\n'
     text += ".. py:currentmodule:: robocov_app.learning\n"
     has_packages = all(find_spec(name) for name in ("gymnasium", "pettingzoo"))
     for name in learning.__all__:

@@ -44,8 +44,10 @@ class RangeSensor:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> import robocov as rc
     >>> wall = np.array([[2.0, -1.0], [3.0, -1.0], [3.0, 1.0], [2.0, 1.0]])
-    >>> sensor = RangeSensor((wall,))
+    >>> sensor = rc.RangeSensor((wall,))
     >>> sensor.find_nearest_points(np.array([[0.0, 0.5]]), ranges=np.array([3.0]))
     array([[2. , 0.5]])
     >>> distances, is_hit = sensor.scan(np.array([[0.0, 0.0]]), rays=4, ranges=np.array([3.0]))

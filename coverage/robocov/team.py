@@ -145,7 +145,8 @@ class Team:
 
     Examples
     --------
-    >>> team = Team.homogeneous(3, max_speed=0.5)
+    >>> import robocov as rc
+    >>> team = rc.Team.homogeneous(3, max_speed=0.5)
     >>> team.max_speed
     array([0.5, 0.5, 0.5])
     >>> len(team[:2])

@@ -84,6 +84,7 @@ def render_png(figure: Figure) -> bytes:
 
     Examples
     --------
+    >>> from robocov_app.figures.files import render_png
     >>> from matplotlib.figure import Figure
     >>> render_png(Figure())[1:4]
     b'PNG'
@@ -116,6 +117,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
     Examples
     --------
     >>> import tempfile
+    >>> from robocov_app.figures.files import save_figure
     >>> import robocov as rc
     >>> record = rc.run("square", robots=2, duration=0.5)
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -45,6 +45,7 @@ class GeneratedMaps:
 
     Examples
     --------
+    >>> from robocov_app.learning import GeneratedMaps
     >>> GeneratedMaps("rooms", seeds=range(100))(742).name
     'rooms 42'
     """

@@ -71,6 +71,7 @@ class ObservationLayout:
 
     Examples
     --------
+    >>> from robocov_app.learning import ObservationLayout
     >>> layout = ObservationLayout(neighbors=2)
     >>> layout.size, layout.blocks["neighbor"]
     (13, slice(7, 13, None))

@@ -76,6 +76,8 @@ class PolicyController:
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> from robocov_app.learning import ObservationLayout, PolicyController
     >>> still = PolicyController(lambda observation: (0.0, 0.0))
     >>> still.name, still.period
     ('policy', 0.1)

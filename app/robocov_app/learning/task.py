@@ -93,6 +93,7 @@ class CoverageTask:
 
     Examples
     --------
+    >>> from robocov_app.learning import CoverageTask
     >>> task = CoverageTask(robots=4, duration=30.0)
     >>> task.cycles, round(task.period, 3)
     (300, 0.1)

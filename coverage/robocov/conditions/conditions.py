@@ -99,7 +99,8 @@ class Conditions:
 
     Examples
     --------
-    >>> conditions = Conditions(failures=((2, 10.0),))
+    >>> import robocov as rc
+    >>> conditions = rc.Conditions(failures=((2, 10.0),))
     >>> conditions.find_working(12.0, 3)
     array([ True, False,  True])
     """

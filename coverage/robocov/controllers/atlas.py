@@ -217,10 +217,9 @@ class Atlas(BaseController):
 
     Examples
     --------
-    >>> from robocov.environment import Environment
-    >>> from robocov.simulation import Simulation
-    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
-    >>> simulation = Simulation(room, Atlas(), [[1.0, 1.0]])
+    >>> import robocov as rc
+    >>> room = rc.Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = rc.Simulation(room, rc.Atlas(), [[1.0, 1.0]])
     >>> simulation.run(12.0).positions[-1].round(0)
     array([[4., 3.]])
     """

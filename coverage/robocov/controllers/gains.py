@@ -161,9 +161,12 @@ def gain(
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> import robocov as rc
+    >>> from robocov.controllers import get_gains
     >>> @dataclass(frozen=True)
     ... class Homing:
-    ...     stiffness: float = gain(1.0, "N/m", "pull to the centroid")
+    ...     stiffness: float = rc.gain(1.0, "N/m", "pull to the centroid")
     >>> get_gains(Homing)["stiffness"].unit
     'N/m'
     """
@@ -214,9 +217,12 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> import robocov as rc
+    >>> from robocov.controllers import get_gains
     >>> @dataclass(frozen=True)
     ... class Passing:
-    ...     side: str = choice("left", ("left", "right"), "where to pass")
+    ...     side: str = rc.choice("left", ("left", "right"), "where to pass")
     >>> get_gains(Passing)["side"].choices
     ('left', 'right')
     """

@@ -177,12 +177,13 @@ class IndividualControllerAdapter:
     Examples
     --------
     >>> from dataclasses import dataclass, field
+    >>> import robocov as rc
     >>> @dataclass(frozen=True)
     ... class Homing:
     ...     stiffness: float = 0.5
     ...     def force(self, own):
     ...         return self.stiffness * (own.centroid - own.position)
-    >>> IndividualControllerAdapter(Homing()).name
+    >>> rc.IndividualControllerAdapter(Homing()).name
     'Homing'
     """
 

@@ -50,10 +50,9 @@ class Lloyd(BaseController):
 
     Examples
     --------
-    >>> from robocov.environment import Environment
-    >>> from robocov.simulation import Simulation
-    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
-    >>> simulation = Simulation(room, Lloyd(), [[1.0, 1.0]])
+    >>> import robocov as rc
+    >>> room = rc.Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = rc.Simulation(room, rc.Lloyd(), [[1.0, 1.0]])
     >>> simulation.run(20.0).positions[-1].round(1)
     array([[4., 3.]])
     """

@@ -212,7 +212,8 @@ def make_controller(
 
     Examples
     --------
-    >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
+    >>> import robocov as rc
+    >>> rc.make_controller("rapf", {"k_rep": 0.3}).k_rep
     0.3
     """
     kind = load_controller_class(name, source=source)

@@ -88,8 +88,9 @@ class CoverageCost:
 
     Examples
     --------
-    >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
-    >>> cost = CoverageCost(square)
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
+    >>> cost = rc.CoverageCost(square)
     >>> round(cost([[0.5, 0.5]]).mean_distance, 3)
     0.383
     """
@@ -208,8 +209,9 @@ class CoverageCost:
 
         Examples
         --------
-        >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
-        >>> results = CoverageCost(square, 16).evaluate_teams([[[0.5, 0.5]], [[0.25, 0.25]]])
+        >>> import robocov as rc
+        >>> square = rc.Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
+        >>> results = rc.CoverageCost(square, 16).evaluate_teams([[[0.5, 0.5]], [[0.25, 0.25]]])
         >>> [round(result.mean_distance, 2) for result in results]
         [0.38, 0.49]
         """

@@ -37,9 +37,10 @@ class TimeVaryingCost:
 
     Examples
     --------
-    >>> from robocov.environment import Environment
-    >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
-    >>> cost = TimeVaryingCost(CoverageCost(square, 16))
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
+    >>> cost = rc.TimeVaryingCost(rc.CoverageCost(square, 16))
     >>> positions = np.array([[0.5, 0.5], [0.25, 0.25]])
     >>> result = cost(2.0, positions, working=np.array([True, False]))
     >>> len(result.positions)

@@ -202,7 +202,9 @@ class Gaussians(Density):
 
     Examples
     --------
-    >>> density = Gaussians((Gaussian((2.0, 0.0), weight=3.0, sigma=1.0),), floor=0.5)
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> density = rc.Gaussians((rc.Gaussian((2.0, 0.0), weight=3.0, sigma=1.0),), floor=0.5)
     >>> density.evaluate(np.array([[2.0, 0.0], [9.0, 0.0]])).round(6)
     array([3.5, 0.5])
     """

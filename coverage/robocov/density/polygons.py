@@ -107,8 +107,10 @@ class WeightedPolygons(Density):
 
     Examples
     --------
-    >>> room = WeightedArea(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)), weight=5.0)
-    >>> density = WeightedPolygons((room,), background=1.0)
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> room = rc.WeightedArea(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)), weight=5.0)
+    >>> density = rc.WeightedPolygons((room,), background=1.0)
     >>> density.evaluate(np.array([[1.0, 1.0], [3.0, 1.0]]))
     array([5., 1.])
     """

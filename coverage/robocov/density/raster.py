@@ -64,7 +64,9 @@ class Raster(Density):
 
     Examples
     --------
-    >>> raster = Raster(np.array([[1.0, 2.0]]), extent=(0.0, 0.0, 2.0, 1.0))
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> raster = rc.Raster(np.array([[1.0, 2.0]]), extent=(0.0, 0.0, 2.0, 1.0))
     >>> raster.evaluate(np.array([[0.5, 0.5], [1.0, 0.5]]))
     array([1. , 1.5])
     """

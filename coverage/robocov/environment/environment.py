@@ -65,9 +65,9 @@ class Environment(Drawable):
 
     Examples
     --------
-    >>> from robocov.environment import CircleObstacle
+    >>> import robocov as rc
     >>> square = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-    >>> environment = Environment("pillar", square, (CircleObstacle((5.0, 5.0), radius=1.0),))
+    >>> environment = rc.Environment("pillar", square, (rc.CircleObstacle((5.0, 5.0), radius=1.0),))
     >>> environment
     <Environment pillar, 10 x 10 m, 1 obstacle>
     >>> round(environment.free_area, 2)

@@ -45,7 +45,8 @@ class ObstaclePath:
 
     Examples
     --------
-    >>> path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), speed=2.0, repeat="back-and-forth")
+    >>> import robocov as rc
+    >>> path = rc.ObstaclePath(((0.0, 0.0), (4.0, 0.0)), speed=2.0, repeat="back-and-forth")
     >>> path.period
     4.0
     >>> path.compute_displacement(3.0)

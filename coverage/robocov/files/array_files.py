@@ -137,9 +137,12 @@ class ArrayCache:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import robocov as rc
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     cache = ArrayCache(Path(folder))
-    ...     key = ArrayCache.compute_key("squares", 3)
+    ...     cache = rc.ArrayCache(Path(folder))
+    ...     key = rc.ArrayCache.compute_key("squares", 3)
     ...     cache.save(key, {"squares": np.arange(3) ** 2})
     ...     cache.load(key)
     {'squares': array([0, 1, 4])}

@@ -184,7 +184,8 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
 
     Examples
     --------
-    >>> generate_map(3, kind="polygons", obstacles=4)
+    >>> import robocov as rc
+    >>> rc.generate_map(3, kind="polygons", obstacles=4)
     <Environment polygons 3, 10 x 10 m, 4 obstacles>
     """
     if not is_number(seed, Integral) or seed < 0:

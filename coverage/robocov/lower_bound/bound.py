@@ -178,8 +178,9 @@ def compute_lower_bound(
 
     Examples
     --------
-    >>> square = Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
-    >>> bound = compute_lower_bound(square, [[1, 1]], lattice=16)
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> bound = rc.compute_lower_bound(square, [[1, 1]], lattice=16)
     >>> bound.gap < 0.001
     True
     """

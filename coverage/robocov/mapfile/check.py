@@ -146,8 +146,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
 
     Examples
     --------
-    >>> from robocov.mapfile import load_map
-    >>> check_map(load_map("square")).free_area
+    >>> import robocov as rc
+    >>> rc.check_map(rc.load_map("square")).free_area
     100.0
     """
     gap = find_narrowest_gap(environment.free)

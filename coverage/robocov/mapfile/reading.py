@@ -56,7 +56,8 @@ def load_map(source: str | Path) -> Environment:
 
     Examples
     --------
-    >>> load_map("rooms").name
+    >>> import robocov as rc
+    >>> rc.load_map("rooms").name
     'Rooms'
     """
     path = find_map_file(source)

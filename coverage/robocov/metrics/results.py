@@ -63,6 +63,11 @@ class Results:
         Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), results
         whose names end in their units, the name of the run's folder (``run``), and its ``error``.
 
+    Raises
+    ------
+    InputError
+        If the table cannot be read, or has no columns `run` and `error`.
+
     See Also
     --------
     read_results : Read the results of a sweep.
@@ -70,7 +75,8 @@ class Results:
 
     Examples
     --------
-    >>> results = read_results("study")  # doctest: +SKIP
+    >>> import robocov as rc
+    >>> results = rc.read_results("study")  # doctest: +SKIP
     >>> results.to_pandas().groupby("controller")["mean_distance_m"].median()  # doctest: +SKIP
     """
 
@@ -90,7 +96,13 @@ class Results:
 
     @property
     def study(self) -> dict[str, Any]:
-        """Content of ``study.json``, which describes the sweep."""
+        """Content of ``study.json``, which describes the sweep.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read.
+        """
         path = self.folder / STUDY_FILE
         try:
             return dict(json.loads(path.read_bytes()))

@@ -72,9 +72,11 @@ def find_settling_time(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> import robocov as rc
     >>> time = np.arange(0.0, 12.0)
     >>> x = np.minimum(time, 3.0)
-    >>> find_settling_time(time, np.stack([x, 0.0 * x], axis=1)[:, None, :])
+    >>> rc.find_settling_time(time, np.stack([x, 0.0 * x], axis=1)[:, None, :])
     3.0
     """
     dt = float(time[1] - time[0]) if len(time) > 1 else 0.0

@@ -68,8 +68,10 @@ class Neighbors:
 
         Examples
         --------
+        >>> import numpy as np
+        >>> import robocov as rc
         >>> positions = np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
-        >>> Neighbors.from_ranges(positions, np.full(3, 2.0)).list_neighbors(0)
+        >>> rc.Neighbors.from_ranges(positions, np.full(3, 2.0)).list_neighbors(0)
         array([1])
         """
         if np.isinf(ranges).all():

@@ -62,7 +62,8 @@ class Region:
 
     Examples
     --------
-    >>> region = Region([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
+    >>> import robocov as rc
+    >>> region = rc.Region([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
     >>> region.area, region.diameter
     (12.0, 5.0)
     """

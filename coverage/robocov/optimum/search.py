@@ -185,8 +185,9 @@ def find_optimum(
 
     Examples
     --------
-    >>> square = Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
-    >>> best = find_optimum(square, robots=1, restarts=2)
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> best = rc.find_optimum(square, robots=1, restarts=2)
     >>> best.positions.round(3)
     array([[1., 1.]])
     """

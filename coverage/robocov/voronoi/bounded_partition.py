@@ -139,8 +139,10 @@ def partition(
 
     Examples
     --------
-    >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
-    >>> halves = partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> square = rc.Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
+    >>> halves = rc.partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
     >>> halves.mass, halves.adjacency
     (array([2., 2.]), array([[0, 1]]))
     """

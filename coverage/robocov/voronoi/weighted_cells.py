@@ -183,8 +183,10 @@ def partition_by_travel_time(
     --------
     The cell of a robot is a disc if the other one is twice as fast. Its radius is 2/3 of their distance.
 
-    >>> square = Region(np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]))
-    >>> cells = partition_by_travel_time(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([1.0, 2.0]), square)
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> square = rc.Region(np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]))
+    >>> cells = rc.partition_by_travel_time(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([1.0, 2.0]), square)
     >>> bool(abs(cells.mass[0] - np.pi * 2.0**2) < 1e-12), cells.centroid[0].round(12).tolist()
     (True, [-1.0, 0.0])
     """
