@@ -26,7 +26,7 @@ from robocov_app.benchmark.isolation import (
 )
 from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
 from robocov_app.benchmark.rated_controller import RatedController, Selection
-from robocov_app.benchmark.results import RESULT_FILE
+from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
 from robocov_app.sweep.tasks import Task, generate_tasks
@@ -266,57 +266,37 @@ def test_only_honest_controllers_are_verified(
         assert any(expected in difference for difference in verification.differences)
 
 
-KNOWS_THE_SUITE = """
-from dataclasses import replace
-import numpy as np
-import robocov as rc
-from robocov_app.benchmark import suite
-from robocov_app.benchmark.oracle import Oracle
-
-STARTS = {name: suite.build_map(name).start().sample(6, seed=0, radius=0.1) for name in PLACEMENTS}
-STATE = {}
-
+ON_UNKNOWN_MAPS = """
 @dataclass(frozen=True)
 class Mine:
-    scanning = Oracle.scanning
-
-    def begin(self, region, team):
-        STATE.update(region=region, team=team, oracle=None)
-
-    def decide(self, seen, memory):
-        for name, starts in STARTS.items():
-            if seen.time == 0.0 and np.allclose(starts, seen.positions):
-                extra = {"oracle": [[0.0, list(range(6)), PLACEMENTS[name]]]}
-                STATE["oracle"] = Oracle(environment=replace(suite.build_map(name), extra=extra))
-                STATE["memory"] = STATE["oracle"].begin(STATE["region"], STATE["team"])
-        if STATE["oracle"] is None:
-            return rc.Decision(np.zeros_like(seen.positions))
-        decision = STATE["oracle"].decide(seen, STATE["memory"])
-        STATE["memory"] = decision.memory
-        return replace(decision, memory=None)
+    def force(self, own):
+        return [0.0, 0.0]
 """
-"""Recognizes maps by their starts, and moves to the best placements of the suite."""
+"""What is left of a controller that recognizes the maps of the suite, on a map that it does not recognize."""
 
 
 @pytest.mark.slow
 def test_a_controller_that_knows_the_suite_is_not_verified(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    folder, name = rate(tmp_path, ON_UNKNOWN_MAPS, "ideal")
     names = [name for kind in ("polygons", "blocks", "homes", "plants") for name in suite.FAMILIES[kind]]
-    track = replace(suite.TRACKS["ideal"], maps=tuple(names), duration=6.0)
+    track = replace(suite.TRACKS["ideal"], maps=tuple(names))
     monkeypatch.setitem(suite.TRACKS, "ideal", track)  # type: ignore[arg-type]
-    frozen_maps = suite.load_frozen_maps()
-    placements = {name: frozen_maps[name]["references"]["6"]["positions_m"] for name in names}
-    (tmp_path / "mine.py").write_text(f"{IMPORTS}PLACEMENTS = {placements}\n{KNOWS_THE_SUITE}")
-    name = f"{tmp_path / 'mine.py'}:Mine"
-    with Interruption() as stop:
-        rated = RatedController(name, {})
-        run_benchmark(rated, Selection(tracks=("ideal",)), tmp_path / "out", stop=stop, workers=2, quiet=True)
-    options = VerificationOptions(sample=0, robots=0, new_maps=4, workers=2)
-    verification = verify(tmp_path / "out", name, options)
-    assert verification.comparison is not None and verification.comparison.is_worse
-    expected = "the controller or its gains are fitted to the maps of the suite"
-    assert any(expected in difference for difference in verification.differences)
+    result = json.loads((folder / RESULT_FILE).read_text())
+    # On the maps of the suite, it ends at the best placements that are known.
+    row = result["rows"][0]
+    result["selection"] = {"quick": False, "tracks": ["ideal"], "maps": []}
+    result["rows"] = []
+    for map_name in names:
+        cost = find_reference(map_name, 6)["mean_distance_m"]
+        placed = {**row, "map": map_name, "mean_distance_m": cost}
+        result["rows"].append({**placed, **compute_gaps("ideal", map_name, placed)})
+    (folder / RESULT_FILE).write_text(json.dumps(result))
+    verification = verify(folder, name, VerificationOptions(sample=0, robots=0, new_maps=4, workers=2))
+    assert verification.comparison is not None and verification.comparison.suite_gap == 0.0
+    (difference,) = verification.differences
+    assert difference.endswith("the controller or its gains are fitted to the maps of the suite")
 
 
 def test_an_entry_with_other_information_is_not_verified(tmp_path: Path) -> None:
