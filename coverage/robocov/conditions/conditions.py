@@ -289,6 +289,9 @@ class Conditions:
         data: dict[str, Any] = {
             parameter.json_key: getattr(self, name) for name, parameter in PARAMETERS.items()
         }
+        if self.bandwidth is None:
+            # Files from before there was a bandwidth stay the same when they are written again.
+            del data[PARAMETERS["bandwidth"].json_key]
         data["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
         data["joins"] = [
             {
