@@ -64,7 +64,11 @@ def compute_moments(pieces: Array, cell_count: int) -> Array:
 
 @kernel
 def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
-    """Return the areas, first moments in x and y, and polar moments of the cells, (n, 4)."""
+    """Return the areas, first moments in x and y, and polar moments of the cells, (n, 4).
+
+    By Green's theorem, each piece of a boundary adds the moments of the triangle between its chord and the
+    generator, and those of the circular segment between its chord and its arc.
+    """
     moments = np.zeros((cell_count, 4))
     for k in range(len(pieces)):
         start_x = pieces[k, START_X]
@@ -145,7 +149,11 @@ def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
 
 
 def _split_piece(piece: list[float], max_deviation: float) -> Array:
-    """Return the vertices of the chords of one piece."""
+    """Return the vertices of the chords that replace one piece: a segment or a circular arc.
+
+    The half angle of the piece is half of the angle that the arc spans about the center of its circle; it is
+    positive if the arc turns left, and 0 for a segment.
+    """
     start_x, start_y, end_x, end_y, half_angle = piece
     dx = end_x - start_x
     dy = end_y - start_y
@@ -153,7 +161,8 @@ def _split_piece(piece: list[float], max_deviation: float) -> Array:
     if chord_count == 1:
         return np.array([[start_x, start_y], [end_x, end_y]])
     angle = half_angle * np.linspace(-1.0, 1.0, chord_count + 1)
-    # Coordinates along the line between the ends, and to the right of it, as fractions of its length.
+    # Coordinates along the line between the ends, and to the right of it, as fractions of its length. On a
+    # circle of radius r, that length is 2 r sin(half_angle).
     along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
     rightward = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
     vertex_x = start_x + along * dx + rightward * dy
@@ -192,6 +201,8 @@ def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
     list of (k, 2) arrays, m
         Polygons, the first vertex not repeated; outlines counter-clockwise, holes clockwise.
     """
+    # Each ring starts with any remaining piece. The piece that starts nearest to the end of the ring
+    # continues it, unless the ring's own start is at least as near.
     lines = split_into_chords(pieces, max_deviation)
     starts = pieces[:, :END_X]
     ends = pieces[:, END_X:HALF_ANGLE]

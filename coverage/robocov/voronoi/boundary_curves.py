@@ -86,6 +86,10 @@ def trace_boundaries(
 ) -> Array:
     """Find the pieces of the boundaries of all cells.
 
+    The edges among equally fast robots already bound a convex polygon. The circles of Apollonius between
+    robots of different speeds cut parts off it. What remains of each edge and of each circle, on the cell's
+    side of all the others, is one or several pieces.
+
     Parameters
     ----------
     points : (n, 2) array, m
@@ -152,7 +156,10 @@ def _make_room(pieces: Array, piece_count: int, room: int) -> Array:
 
 @kernel
 def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
-    """Add straight edges to the pieces; return the new number of pieces."""
+    """Append edges to the pieces, from row `piece_count` on; return the new number of pieces.
+
+    An edge is a piece whose half angle is 0.
+    """
     for e in range(len(edges)):
         pieces[piece_count, START_X] = edges[e, EDGE_START_X]
         pieces[piece_count, START_Y] = edges[e, EDGE_START_Y]
@@ -179,7 +186,10 @@ def _is_empty(pairs: Array) -> bool:
 def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
     """Write the circles that may bound a cell to `curves`, after the rows of its lines.
 
-    Return the number of lines and circles.
+    Two robots of speeds v and w, at a distance d, reach the points of a circle at the same time. The point
+    nearest to the first robot is on the line between them, at the distance d v / (v + w) from it. Circles
+    that are entirely farther away than the points of the cell are left out. Return the number of lines and
+    circles.
     """
     reach = _compute_reach(pairs, edges)
     curve_count = len(edges)
@@ -192,6 +202,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
             curves[curve_count, _NORMAL_X] = pairs[k, PAIR_DX] / distance
             curves[curve_count, _NORMAL_Y] = pairs[k, PAIR_DY] / distance
             curves[curve_count, _DISTANCE] = nearest
+            # The coefficient a of the curve a |q|² + b q = c is (w² - v²) / (2 v w d).
             difference_of_squares = (other_speed - own_speed) * (own_speed + other_speed)
             curves[curve_count, _COEFFICIENT] = (
                 0.5 * (difference_of_squares / (own_speed * other_speed)) / distance
@@ -206,7 +217,11 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
 
 @kernel
 def _compute_reach(pairs: Array, edges: Array) -> float:
-    """Return an upper bound on the distance of a cell's points from its generator, m."""
+    """Return an upper bound on the distance of a cell's points from its generator, m.
+
+    The edges bound a convex polygon that contains the cell. A circle around the robot, which is the border to
+    a faster one, may limit the cell further.
+    """
     reach = 0.0
     for e in range(len(edges)):
         reach = max(reach, np.sqrt(edges[e, EDGE_START_X] ** 2 + edges[e, EDGE_START_Y] ** 2))
@@ -222,7 +237,10 @@ def _compute_reach(pairs: Array, edges: Array) -> float:
 
 @kernel
 def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point: Array) -> None:
-    """Write the edges of a cell as straight curves that begin and end at their vertices."""
+    """Write the edges of a cell as straight curves that begin and end at their vertices.
+
+    The line of an edge is either the bisector to a neighbor, or a side of the region.
+    """
     for e in range(len(edges)):
         if edges[e, EDGE_OTHER_CELL] != REGION:
             _write_bisector(curves[e], pairs, edges[e, EDGE_OTHER_CELL])
@@ -273,11 +291,13 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 @kernel
 def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
-    """For each pair of curves, find the interval of the first one on the cell's side of the second one.
+    """For each pair of curves, find the part of the first one that is on the cell's side of the second one.
 
-    The crossings are (k, k, 2) values of t on the first curve, nan if the two do not intersect. A curve that
-    is nowhere on the cell's side of another one gets an empty interval. The first `line_count` curves are the
-    edges of the cell among equally fast robots. They are not compared with each other.
+    A point of a curve can bound the cell only where it is on the cell's side of all other curves. Entry
+    [one, other] of `crossings`, (k, k, 2), receives the values of the parameter t of `one` at which it enters
+    and leaves the cell's side of `other`, or nan if the two do not intersect. A curve that is nowhere on the
+    cell's side of another one gets an empty interval of t. The first `line_count` curves are the edges of the
+    cell among equally fast robots, a convex polygon. They do not shorten each other, and are not compared.
     """
     count = len(curves)
     for one in range(count):
@@ -290,13 +310,15 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
             is_other_outside = False
             if other >= line_count:
                 enter, leave, is_one_outside, is_other_outside = _intersect(curves[one], curves[other])
+            # An interval that ends at minus infinity is empty.
             if is_one_outside:
                 curves[one, _END] = -np.inf
             if is_other_outside:
                 curves[other, _END] = -np.inf
             crossings[one, other, _ENTER] = enter
             crossings[one, other, _LEAVE] = leave
-            # At the point where `one` leaves the cell's side of `other`, `other` enters that of `one`.
+            # Both curves have the cell on their left. Therefore, where `one` leaves the cell's side of
+            # `other`, `other` enters that of `one`, and vice versa.
             x, y = _evaluate(curves[one], leave)
             crossings[other, one, _ENTER] = _find_parameter(curves[other], x, y)
             x, y = _evaluate(curves[one], enter)
@@ -307,8 +329,11 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
 def _intersect(one: Array, other: Array) -> tuple[float, float, bool, bool]:
     """Find where a curve enters and leaves the cell's side of another one.
 
-    Return both values of t, nan if the curves do not intersect, and for each curve whether it is nowhere on
-    the cell's side of the other one.
+    The other curve is a |q|² + b q = c, and the cell is where a |q|² + b q <= c. With the point q(t) of the
+    first curve inserted, this condition is quadratic in t, and its roots are the crossings. The curves meet
+    at an angle whose cosine is g = b b' + 2 (a c' + a' c), so that they intersect if 1 - g² > 0. Return both
+    values of t, nan if the curves do not intersect, and for each curve whether it is nowhere on the cell's
+    side of the other one.
     """
     a1 = one[_COEFFICIENT]
     b1x, b1y, c1 = _compute_b_and_c(one)
@@ -326,7 +351,8 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, bool, bool]:
     factor = 2.0 - r1 * k
     quadratic = a2 * factor * factor - k * outward * factor - c2 * k * k
     constant = a2 * r1 * r1 + r1 * outward - c2
-    # 1 - g² as a sum of minors: at small angles, subtracting g² from 1 would leave only rounding errors.
+    # 1 - g² as a sum of 2 x 2 determinants: at small angles, subtracting g² from 1 would leave only rounding
+    # errors.
     b_cross = b1x * b2y - b1y * b2x
     across = a1 * c2 - a2 * c1
     squared_sine = b_cross * b_cross - 4.0 * across * across
@@ -350,7 +376,11 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, bool, bool]:
 
 @kernel
 def _compute_b_and_c(curve: Array) -> tuple[float, float, float]:
-    """Return the components of b, and c, from b² + 4 a c = 1 and a r² + |b| r = c at the nearest point."""
+    """Return the components of b, and c, of a curve a |q|² + b q = c.
+
+    They follow from b² + 4 a c = 1, and from a r² + |b| r = c at the point nearest to the generator, which is
+    at the distance r in the direction of b.
+    """
     a = curve[_COEFFICIENT]
     r = curve[_DISTANCE]
     length = 1.0 - 2.0 * a * r
@@ -361,7 +391,10 @@ def _compute_b_and_c(curve: Array) -> tuple[float, float, float]:
 def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
     """Add the parts of a curve on the cell's side of all other curves; return the new number of pieces.
 
-    `crossings`, (k, 2), are the crossings with the other curves. They are overwritten.
+    `crossings`, (k, 2), are the values of the parameter t at which the curve enters and leaves the cell's
+    side of each other curve. If it enters first, it is on that side between the two. If it leaves first, it
+    is on that side everywhere except between the two: there is a gap. The parts are what remains of the
+    intersection of the intervals without the gaps. `crossings` is overwritten.
     """
     # The crossings with curves that do not intersect this one are nan. Comparisons with nan are false, so
     # these curves neither limit the interval nor add a gap.
@@ -371,8 +404,7 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) 
         if crossings[other, _ENTER] <= crossings[other, _LEAVE]:
             start = max(start, crossings[other, _ENTER])
             end = min(end, crossings[other, _LEAVE])
-    # If `leave` comes before `enter`, the curve does not bound the cell between the two: there is a gap. The
-    # gaps within the interval are sorted by their start. They overwrite crossings that were already read.
+    # The gaps within the interval are sorted by their start. They overwrite crossings that were already read.
     gap_count = 0
     for other in range(len(crossings)):
         enter = crossings[other, _ENTER]
@@ -388,7 +420,7 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) 
 
 @kernel
 def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None:
-    """Insert a gap, from `leave` to `enter`, among the first rows of `gaps`, sorted by where they start."""
+    """Insert a gap, from t = leave to t = enter, into the first rows of `gaps`, sorted by their start."""
     k = gap_count
     while k > 0 and gaps[k - 1, _LEAVE] > leave:
         gaps[k, _ENTER] = gaps[k - 1, _ENTER]
@@ -400,9 +432,12 @@ def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None
 
 @kernel
 def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_count: int) -> int:
-    """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle.
+    """Append the part of a curve from t = start to t = end to the pieces; return their new number.
 
-    Return the new number of pieces.
+    The point q(t) of a circle of curvature k is at the angle 2 atan(k t), seen from the center of the circle
+    and measured from the point nearest to the generator, where t = 0. The half angle of a piece is therefore
+    a difference of arctangents. A piece must not exceed half a circle, so that a part on both sides of t = 0
+    is cut there.
     """
     k = 2.0 * curve[_COEFFICIENT]
     while start < end:
@@ -419,7 +454,12 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_cou
 
 @kernel
 def _evaluate(curve: Array, t: float) -> tuple[float, float]:
-    """Return q(t), m, by one of two formulas, so that nothing overflows for large t."""
+    """Return the point q(t) of a curve, m.
+
+    With n the normal of the curve, m = n turned left, r its distance from the generator and k its curvature,
+    q(t) = r n + (2 t m - 2 k t² n) / (1 + k² t²). For large t, the fraction is divided by t², so that nothing
+    overflows.
+    """
     k = 2.0 * curve[_COEFFICIENT]
     if abs(k * t) <= 1.0:
         divisor = 1.0 + (k * t) ** 2
@@ -437,7 +477,10 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
 
 @kernel
 def _find_parameter(curve: Array, x: float, y: float) -> float:
-    """Return t of the point q(t) for a point on the curve, which may be off by rounding."""
+    """Return the parameter t of a point on a curve: the inverse of `_evaluate`.
+
+    The point may be beside the curve by rounding.
+    """
     # With the formula of q(t), both quotients below are equal to t. The larger divisor is more accurate.
     k = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]

@@ -282,8 +282,9 @@ def _compute_cells(
 ) -> int:
     """Compute all cells; return the number of edges, or `_NOT_FINITE`.
 
-    A mesh with columns requires a complete graph. If the triangulation fails, its first corner becomes
-    `NOT_TRIANGULATED`.
+    If the mesh has columns, all robots must be neighbors of each other, and the cells follow from their
+    Delaunay triangulation. Otherwise, or if the triangulation fails, each cell is clipped by the bisectors to
+    the robot's neighbors. After a failure, the first corner of the mesh is `NOT_TRIANGULATED`.
     """
     for i in range(len(points)):
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):

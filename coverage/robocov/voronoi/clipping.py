@@ -157,7 +157,8 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     """
     rings = workspace.rings
     neighbor_rows = workspace.neighbors
-    # At first the polygon is the region.
+    # At first the polygon is the region. The nearest neighbors cut it first, so that few of the others can
+    # still cut it.
     ring = 0
     count = len(sides)
     for k in range(count):
@@ -185,7 +186,8 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
 def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
     """Return the square of the largest distance at which a neighbor can cut the polygon, m².
 
-    That distance is twice the distance of the farthest vertex.
+    The bisector is half as far away as the neighbor. It therefore misses the polygon if the neighbor is more
+    than twice as far away as the farthest vertex.
     """
     squared_range = 0.0
     for k in range(count):
@@ -211,9 +213,11 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 @inlined_kernel
 def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
-    """Cut the polygon in a ring by the bisector to a neighbor; write the generator's side to the other ring.
+    """Cut the polygon in a ring by the bisector to a neighbor; write what remains to the other ring.
 
-    Return its number of vertices, or `_NOT_CUT` without writing anything.
+    What remains is the part nearer to the generator than to the neighbor. The vertices beyond the bisector
+    are replaced by the two points where the outline of the polygon crosses it. Return the new number of
+    vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the bisector.
     """
     farthest = _compute_excess(rings, ring, count, neighbor_rows, row)
     if farthest == _NO_VERTEX:
@@ -270,9 +274,11 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 @inlined_kernel
 def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
-    """Compute the excess of each vertex over a bisector.
+    """Compute how far each vertex of a polygon is beyond a bisector, and write it to the column `_EXCESS`.
 
-    Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX`.
+    The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
+    is positive if q is nearer to the neighbor, zero on the bisector, and proportional to the distance from
+    it. Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX` if none is beyond it.
     """
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
@@ -292,10 +298,13 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
 def _add_crossing(
     rings: Array, ring: int, new_vertex: int, inner: int, outer: int, other_cell: float
 ) -> None:
-    """Write the point where an edge crosses the bisector to the other ring, as its vertex `new_vertex`.
+    """Add a vertex at the point where an edge of the polygon crosses the current bisector.
 
-    The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
-    the other side. `other_cell` is the cell on the other side of the edge that begins at the new vertex.
+    The edge belongs to the polygon in `ring`, and connects the vertex `inner`, on the generator's side of the
+    bisector, with the vertex `outer` on the other side. The crossing follows by linear interpolation from
+    their excesses, which are proportional to their distances from the bisector. It becomes vertex
+    `new_vertex` of the polygon in the other ring. `other_cell` is the cell on the other side of the edge that
+    begins there.
     """
     other_ring = 1 - ring
     inner_excess = rings[ring, inner, _EXCESS]
@@ -310,7 +319,7 @@ def _add_crossing(
 def write_cell(
     workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, edge_count: int
 ) -> int:
-    """Write mass, centroid and edges of the cell of robot i.
+    """Write mass, centroid and edges of the cell of robot i, for density 1.
 
     Parameters
     ----------
@@ -332,7 +341,7 @@ def write_cell(
     """
     rings = workspace.rings
     edges = cells.edges
-    # Twice the area, and six times the first moments.
+    # Twice the area, and six times the first moments: sums over the triangles between edges and generator.
     doubled_area = 0.0
     moment_sum_x = 0.0
     moment_sum_y = 0.0

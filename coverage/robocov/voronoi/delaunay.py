@@ -139,7 +139,10 @@ def get_previous_half_edge(h: int) -> int:
 
 @kernel
 def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Flip all edges that are no longer Delaunay; return whether the result is a triangulation."""
+    """Flip all edges that are no longer Delaunay after the points have moved.
+
+    Return whether the result is a triangulation, in which all triangles are counter-clockwise.
+    """
     flip_count = 0
     is_ccw = _compute_all_cotangents(mesh, points, cotangents)
     for h in range(mesh.shape[1]):
@@ -155,7 +158,11 @@ def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bo
 
 @kernel
 def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Triangulate from scratch by inserting one point after another; return whether it succeeded."""
+    """Triangulate from scratch by inserting one point after another; return whether it succeeded.
+
+    Each point splits the triangle that contains it into three. Edges that are then no longer Delaunay are
+    flipped. Triangles are given by their first half-edges.
+    """
     n = len(points) - 3
     # At first there is one triangle, whose corners are the sentinels.
     for k in range(3):
@@ -164,7 +171,8 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
     flip_count = 0
     triangle = 0
     for i in range(n):
-        # Each of the previous points has added two triangles.
+        # Each of the previous points has added two triangles. The search starts at the triangle of the
+        # previous point.
         triangle_count = 2 * i + 1
         triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, triangle_count)
         if triangle == _FAILED:
@@ -259,7 +267,10 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 
 @kernel
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
-    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or `_FAILED`."""
+    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or `_FAILED`.
+
+    Each step crosses an edge that has the point on its other side.
+    """
     triangle = start
     # Because of rounding, the walk could go in circles.
     max_steps = 3 * triangle_count + 3
@@ -291,9 +302,12 @@ def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: f
 def _flip_from(
     mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flip_count: int
 ) -> tuple[int, bool]:
-    """Flip the edge of h if it is not Delaunay, then the edges around it, until all of them are.
+    """Flip the edge of half-edge h if it is not Delaunay, then the edges around it, until all of them are.
 
-    Return the number of flips so far, or `_FAILED`, and whether all new triangles are counter-clockwise.
+    A flip replaces the edge between two triangles by the other diagonal of the quadrilateral that they form.
+    Afterwards, the four sides of the quadrilateral may have to be flipped; the stack contains the edges that
+    are still to be tested. Return the number of flips so far, or `_FAILED`, and whether all new triangles are
+    counter-clockwise.
     """
     stack[0] = h
     stack_size = 1
@@ -304,8 +318,9 @@ def _flip_from(
         b = mesh[TWIN, a]
         if b == NO_TWIN or not _must_flip(mesh, cotangents, a):
             continue
-        # The new edge connects the two corners opposite to the old one. `before_a` and `before_b` become its
-        # half-edges, and b and a take over their former edges.
+        # a and b are the two half-edges of the old edge. The new edge connects the two corners opposite to
+        # it. Its half-edges are `before_a` and `before_b`, which precede a and b in their triangles.
+        # Half-edge a now runs along the edge where `before_b` was, and b along the edge where `before_a` was.
         before_a = get_previous_half_edge(a)
         before_b = get_previous_half_edge(b)
         mesh[CORNER, a] = mesh[CORNER, before_b]

@@ -127,7 +127,11 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
 
 
 def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
-    """Cut edges by discs around their generators, of radius (e,) m for each edge."""
+    """Cut edges by discs around their generators, of radius (e,) m for each edge.
+
+    The boundary of the part of a cell in its disc follows an edge where it is inside the disc. Where the edge
+    is outside, an arc of the disc replaces it, between the directions of the edge's points.
+    """
     step = edges.end - edges.start
     squared_length = np.maximum((step * step).sum(axis=1), _MIN_SQUARED_LENGTH)
     # The edge is start + t step with t from 0 to 1; the disc contains it from middle - half to middle + half.

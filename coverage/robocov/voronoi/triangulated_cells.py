@@ -110,7 +110,11 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
 
 @kernel
 def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> bool:
-    """Triangulate the robots and three sentinels; return whether it succeeded."""
+    """Build the Delaunay triangulation of the robots and three sentinels; return whether it succeeded.
+
+    The sentinels are distant points whose triangle contains all robots and the whole region, which is given
+    by its sides. It fails if a robot is so far from the region that a sentinel could cut a cell.
+    """
     n = len(points)
     x, y, size = _compute_center_and_size(sides)
     vertices = np.empty((n + 3, 2))
@@ -125,6 +129,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     stack = np.empty(mesh.shape[1], np.intp)
     if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
+    # Of the half-edges that begin at a point, any one will do: the last one remains.
     for h in range(mesh.shape[1]):
         if is_half_edge(h):
             half_edges[mesh[CORNER, h]] = h
@@ -178,7 +183,13 @@ def _compute_region_area(sides: Array) -> float:
 def _find_cell(
     workspace: Workspace, triangulation: Triangulation, points: Array, sides: Array, i: int
 ) -> CellPolygon:
-    """Find the cell of robot i from the Voronoi vertices around it; clip it if the region cuts it."""
+    """Find the cell of robot i from the triangles around it.
+
+    The neighbors of the robot are the other corners of these triangles, and the vertices of its cell are
+    their circumcenters. If the cell may reach beyond the region, the region is clipped by the bisectors to
+    these neighbors instead.
+    """
+    # Clearance is the distance of the robot from the nearest side of the region.
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
     clearance = np.inf
     for k in range(len(sides)):
@@ -200,7 +211,12 @@ def _find_cell(
 def _walk_around(
     workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
 ) -> _Fan:
-    """Write the neighbors and Voronoi vertices of robot i, counter-clockwise from its first half-edge."""
+    """Write the neighbors and Voronoi vertices of robot i, counter-clockwise from its first half-edge.
+
+    The walk visits the half-edges that begin at the robot. Each leads to a neighbor j, and belongs to a
+    triangle, whose circumcenter is the Voronoi vertex. All coordinates are relative to the robot. Points from
+    number n on are sentinels, which are no neighbors.
+    """
     mesh = triangulation.mesh
     cotangents = triangulation.cotangents
     neighbor_rows = workspace.neighbors
@@ -223,7 +239,7 @@ def _walk_around(
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
             # The Voronoi vertex lies on the bisector. Its offset to the left of the line from i to j is half
-            # their distance times the cotangent.
+            # their distance times the cotangent of the triangle's angle opposite to that line.
             x = 0.5 * (dx - cotangents[h] * dy)
             y = 0.5 * (dy + cotangents[h] * dx)
             squared_reach = max(squared_reach, x * x + y * y)

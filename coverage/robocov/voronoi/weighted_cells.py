@@ -110,8 +110,8 @@ class WeightedCells(Cells):
         """The outlines of the cells as polygons, (k, 2) m each, and the cell that each outline belongs to.
 
         Chords replace the arcs. Outlines run counter-clockwise around a component of a cell, clockwise around
-        a hole. The cells of fast robots come first, so that painting the outlines in order shows the
-        partition even without holes.
+        a hole. The cells of fast robots come first. A hole in a cell contains only cells of slower robots,
+        which are painted later, so that a program that cannot draw holes may fill them.
         """
         outlines = []
         cells = []
@@ -211,10 +211,13 @@ def partition_by_travel_time(
 def _compute_weighted_cells(
     points: Array, speeds: Array, region: Region, neighbors: Neighbors, reported_positions: Array | None
 ) -> WeightedCells:
-    """Compute cells of robots whose speeds are not all equal, for a density of 1."""
+    """Compute cells of robots whose speeds are not all equal, for a density of 1.
+
+    The cells among equally fast robots have straight edges. The circles of Apollonius between robots of
+    different speeds then cut parts off.
+    """
     robot, other = neighbors.list_pairs()
     other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
-    # If only equally fast neighbors are considered, cells have straight edges. Circles then cut parts off.
     is_equal = speeds[robot] == speeds[other]
     equal_cells = partition(
         points,
