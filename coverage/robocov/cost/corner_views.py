@@ -129,7 +129,11 @@ def _add_views(
     lengths: Array,
     row_count: int,
 ) -> int:
-    """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`."""
+    """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`.
+
+    A search in the box tree of the tiles skips boxes that are entirely hidden by walls, and empty ones, which
+    start at infinity.
+    """
     tree = tiles.tree
     first_leaf = len(tree) // 2
     node = ROOT
@@ -161,7 +165,11 @@ def _add_views(
 def _find_visible_sites(
     walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: Array
 ) -> int:
-    """Return the bit mask of the sites of a tile that a corner sees, and write a row of `lengths`."""
+    """Return the bit mask of the sites of a tile that a corner sees and where a path to them can bend there.
+
+    Bit s of the mask belongs to slot s of the tile. The distances of the nearest and of the farthest of these
+    sites are written to `lengths`.
+    """
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]
     visible_slots = 0

@@ -145,7 +145,11 @@ def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) 
 
 
 def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
-    """Arrange the sites, whose positions are (m, 2) grid steps, in tiles."""
+    """Arrange the sites, whose positions are (m, 2) grid steps, in square tiles.
+
+    Each tile has as many slots as cells, so that kernels need no lists of varying length. Its sites
+    fill the first slots.
+    """
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
     # Sort the sites by tile, so that those of one tile are consecutive entries of `by_tile`.
@@ -155,7 +159,7 @@ def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Ti
     count = np.diff(first, append=len(by_tile))
     slot = np.arange(SLOTS)
     is_empty = slot >= count[:, None]
-    # Empty slots repeat the first site of their tile.
+    # Empty slots repeat the first site of their tile, so that they change no bounding box or minimum.
     site = by_tile[first[:, None] + np.where(is_empty, 0, slot)]
     x = np.ascontiguousarray(grid_positions[site, 0])
     y = np.ascontiguousarray(grid_positions[site, 1])

@@ -154,6 +154,9 @@ def find_site_paths(
 ) -> bool:
     """Find the shortest paths to all sites from the robots of each of several teams.
 
+    The sites are the free cells of a lattice, which is divided into square tiles. Each tile has as
+    many slots as cells; the last ones contain `NO_SITE` if some of its cells are not free.
+
     Parameters
     ----------
     cost_map : CostMap
@@ -171,7 +174,7 @@ def find_site_paths(
     Returns
     -------
     bool
-        Whether the index had enough entries.
+        Whether the wall index of `search` had enough entries. If not, the result is incomplete.
     """
     tiles = cost_map.tiles
     for team in range(len(teams)):
@@ -194,7 +197,12 @@ def find_site_paths(
 
 @kernel
 def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
-    """Find the paths from the robots of a team, (n, 2); return whether the index had enough entries."""
+    """Find the paths from the robots of a team, (n, 2), to all sites.
+
+    At first, each site belongs to the robot that is nearest in a straight line. Sites that this robot does
+    not see are hidden. Paths to them are searched via corners, and from other robots. Return whether the
+    index of the walls around the robots had enough entries.
+    """
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
     entry_count = 0
@@ -219,7 +227,11 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
 
 @kernel
 def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
-    """Find the robot that is nearest to each site in a straight line."""
+    """Find the robot that is nearest to each site in a straight line.
+
+    For a group of neighboring tiles, most robots are too far away to be the nearest one for any site. For
+    each tile of the group, the remaining robots are sieved once more.
+    """
     search.reach[:] = 0.0
     group_robot_count = 0
     for tile in range(len(tiles.boxes)):
@@ -307,7 +319,11 @@ def _find_nearest_robots_of_tile(
 
 @kernel
 def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
-    """Find the hidden sites of a tile. Sites in components of the free space without robots have no path."""
+    """Find the hidden sites of a tile: those that their nearest robot does not see, because of a wall.
+
+    They are marked in a bit mask with one bit for each slot of the tile. Sites in components of the free
+    space without robots have no path.
+    """
     tiles = cost_map.tiles
     hidden_slots = 0
     for slot in range(SLOTS):
@@ -329,7 +345,11 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
 
 @kernel
 def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
-    """Find the shortest paths from the robots to the corners."""
+    """Find the shortest paths from the robots to the corners.
+
+    Straight paths from robots are the start. Then paths via other corners are shortened along the graph of
+    corners that see each other.
+    """
     # Trying only the robot nearest to each corner first finds short paths quickly.
     waiting_count = _try_nearest_robots(cost_map.walls, search, robots)
     relax_paths(cost_map.graph, search.corner_paths, search.queue, waiting_count)
@@ -444,7 +464,11 @@ def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, wa
 
 @kernel
 def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
-    """Find the paths to the hidden sites."""
+    """Find the paths to the hidden sites, which the robot that is nearest in a straight line does not see.
+
+    First, the shortest paths via corners are found. Their lengths limit which other robots can be near enough
+    to reach the sites on a shorter, straight path.
+    """
     tiles = cost_map.tiles
     for group in range(len(tiles.group_boxes)):
         first_tile = group * TILES_PER_GROUP
@@ -498,7 +522,12 @@ def _try_other_robots(
 
 @kernel
 def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
-    """Find the shortest paths via a corner to the hidden sites of a tile."""
+    """Find the shortest paths via a corner to the hidden sites of a tile.
+
+    The last segment of such a path leads from a corner to a site that it sees. Each row of `cost_map.views`
+    belongs to a corner and a tile in which it sees sites. Sets of sites of a tile are bit masks, with one bit
+    for each slot.
+    """
     tiles = cost_map.tiles
     views = cost_map.views
     corners = cost_map.walls.corners
@@ -549,7 +578,11 @@ def _compute_max_hidden_length(search: Search, tile: int) -> float:
 
 @kernel
 def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
-    """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest."""
+    """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest so far.
+
+    Hidden sites are those that their nearest robot does not see. This robot may see them. The set of hidden
+    sites is a bit mask, with one bit for each slot of the tile.
+    """
     tiles = cost_map.tiles
     wall_index = search.wall_index
     if is_box_hidden(tiles.boxes, tile, wall_index, robot):
@@ -564,6 +597,7 @@ def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int
             length = np.sqrt(dx * dx + dy * dy)
             if (
                 _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot])
+                # The nearest robot does not see the site, or it would not be hidden.
                 and robot != search.nearest_robot[tile, slot]
                 and is_visible(cost_map.walls, wall_index, robot, x, y)
             ):

@@ -53,7 +53,7 @@ class TimeVaryingCost:
         self._cost_by_map: dict[bytes, CoverageCost] = {}
 
     def get_cost(self, time: float) -> CoverageCost:
-        """Return the coverage cost of the map at a time.
+        """Return the coverage cost of the map at a given time.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works. By default, all do.
+            False for robots that have failed. By default, no robot has.
 
         Returns
         -------
@@ -101,14 +101,14 @@ class TimeVaryingCost:
     def __call__(
         self, time: float, positions: Array, working: BoolArray | None = None, speeds: Array | None = None
     ) -> CoverageResult | None:
-        """Compute the coverage cost at a time.
+        """Compute the coverage cost at a given time.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works. By default, all do.
+            False for robots that have failed. By default, no robot has.
         speeds : (n,) array, m/s, optional
             See `CoverageCost`.
 
@@ -126,14 +126,14 @@ class TimeVaryingCost:
     def evaluate_all_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> CoverageResult | None:
-        """Compute the coverage cost at a time, with all robots in the result.
+        """Compute the coverage cost at a given time, with all robots in the result.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works. By default, all do.
+            False for robots that have failed. By default, no robot has.
 
         Returns
         -------
@@ -150,21 +150,21 @@ class TimeVaryingCost:
     def compute_summary(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> tuple[float, float, float]:
-        """Compute mean distance, value and uncovered area at a time.
+        """Compute mean distance, coverage cost (22) and uncovered area at a given time.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works. By default, all do.
+            False for robots that have failed. By default, no robot has.
 
         Returns
         -------
         mean_distance : float, m
             nan if no robot is available.
         value : float, m³
-            nan if no robot is available.
+            The coverage cost, see `CoverageResult`; nan if no robot is available.
         uncovered_area : float, m²
             The entire free area if no robot is available.
         """

@@ -106,7 +106,11 @@ class CellEdges:
 
 @kernel
 def _sum_moments(start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
-    """Return the sums of the moments of the triangles between the edges and the generators."""
+    """Return the moments of cells, (n, 4): area, first moments in x and y, and polar moment.
+
+    They are sums over the triangles between the edges of a cell and its generator, which is the origin. The
+    `cross` of the ends of an edge is twice the area of its triangle.
+    """
     sums = np.zeros((cell_count, 4))
     for k in range(len(cell)):
         start_x = start[k, 0]

@@ -138,6 +138,7 @@ class Gaussian:
         -------
         (n, 4) array, m², m³, m³ and m⁴
         """
+        # In standard coordinates, in which the covariance S = L Lᵀ is the identity, edges stay straight.
         factor = self._factorize()
         offset = origins - np.array(self.center)
         edge_offset = offset[edges.cell]
@@ -265,7 +266,17 @@ class Gaussians(Density):
 
 
 def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
-    """Return the contributions of edges between (s, 2) points, in the symbols of the module docstring."""
+    """Return the contributions of edges to the moments of a standard Gaussian g = exp(-|q|²/2) over cells.
+
+    The edges lead from `start` to `end`, (s, 2) each, relative to the center. By Green's theorem, integrals
+    over a cell become integrals along its edges. An edge lies at the signed distance d from the center along
+    its outward normal n, and from s1 to s2 along its direction t. With e0 = ∫ g ds and e1 = ∫ s g ds along
+    the edge, and T Owen's function, it adds
+
+    - [atan(s/d) - 2π T(d, s/d)] from s1 to s2 to the mass,
+    - -n e0 to the first moment, and
+    - (d e0 n + e1 t) nᵀ to the mass minus the second moments (the deficits).
+    """
     # SciPy is imported only here, because loading a map does not need it.
     from scipy.special import erf, owens_t
 

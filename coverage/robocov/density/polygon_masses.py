@@ -32,6 +32,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     >>> compute_polygon_masses(Uniform(2.0), [shapely.box(0.0, 0.0, 3.0, 1.0)])
     array([6.])
     """
+    # Integrate as over cells, whose edges are relative to an origin: here, the centroid of each polygon.
     polygons = shapely.orient_polygons(polygons)
     rings, polygon_of_ring = shapely.get_rings(polygons, return_index=True)
     origins = shapely.get_coordinates(shapely.centroid(polygons))

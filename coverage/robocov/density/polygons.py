@@ -193,7 +193,10 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Return the jumps along a closed, counter-clockwise ring inside which φ is larger by `step`."""
+    """Return the edges of a closed, counter-clockwise ring as jumps: inside it, φ is larger by `step`.
+
+    A jump runs from its lower to its upper end, with the change of φ from its left to its right side.
+    """
     start = points[:-1]
     end = points[1:]
     # A column, (k, 1), which applies to both coordinates of each end.
@@ -233,7 +236,16 @@ class _Strip(NamedTuple):
 def _add_jumps(
     moments: Array, jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array
 ) -> None:
-    """Add to the moments of cells the integrals between each edge and each jump to its left."""
+    """Add to the moments of cells, (n, 4), what the areas of constant weight add to the background.
+
+    A jump is a line across which the density changes: an edge of an area. An edge is one of a cell. With the
+    change of the density to the right of a jump as its weight, the integral over a cell is the sum, over all
+    pairs of an edge and a jump, of integrals over the strip between them: the area to the right of the jump
+    and to the left of the edge, at the heights y that both of them span. Strips of rising edges are added,
+    and those of falling edges subtracted, so that only what lies inside the cell remains.
+
+    Edges run from `start` to `end`, relative to the origin of their cell; horizontal ones span no area.
+    """
     for e in range(len(cell)):
         c = cell[e]
         # A falling edge is reversed, and its integrals are subtracted.
@@ -252,6 +264,7 @@ def _add_jumps(
                 jumps[f, _HIGH_X] - origins[c, 0],
                 jumps[f, _HIGH_Y] - origins[c, 1],
             )
+            # Skip pairs without a common height, and edges that are entirely to the left of the jump.
             bottom = max(edge.low_y, jump.low_y)
             top = min(edge.high_y, jump.high_y)
             if bottom >= top or max(edge.low_x, edge.high_x) <= min(jump.low_x, jump.high_x):
@@ -269,9 +282,12 @@ def _add_jumps(
 
 @inlined_kernel
 def _add_strip(moments: Array, c: int, strip: _Strip, weight: float) -> None:
-    """Add a strip, times a weight, to the moments of cell c.
+    """Add the integrals of a weight over a strip to the moments of cell c.
 
-    The part where the jump is to the right of the edge is left out.
+    A strip is the area between a jump of the density, on its left, and an edge of the cell, on its right. The
+    part where the jump is to the right of the edge is left out. At a height y, the strip extends from `left`
+    to `right`, and the integrals over x are polynomials in y of degree 3 at most. The Gauss rule with two
+    nodes is therefore exact.
     """
     width_bottom = strip.right_bottom - strip.left_bottom
     width_top = strip.right_top - strip.left_top

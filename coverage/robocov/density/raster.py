@@ -145,6 +145,9 @@ class Raster(Density):
         rows, columns = grid.coefficients.shape[1:]
         column = np.clip(np.floor(u), 0, columns - 1).astype(np.intp)
         row = np.clip(np.floor(v), 0, rows - 1).astype(np.intp)
+        # In a square of the grid, the density is a + b ξ + c η + d ξ η, with ξ and η the offsets from its
+        # lower left corner. Outside the grid, the coefficients of the nearest square hold: they make the
+        # density constant outwards, so that ξ and η need no limits.
         a, b, c, d = grid.coefficients[:, row, column]
         xi = u - column
         eta = v - row
@@ -172,7 +175,7 @@ class Raster(Density):
             edges.cell,
             len(origins),
         )
-        # Convert grid steps to meters.
+        # Convert the integrals of φ times 1, u, v, u² and v² from grid steps to meters.
         step_x, step_y = grid.step
         integrals = integrals * (step_x * step_y)
         mass = integrals[:, _ONE]
@@ -266,7 +269,11 @@ def _build_grid(raster: Raster) -> _Grid:
 
 
 def _integrate_rows(coefficients: Array) -> Array:
-    """Return the integrals along rows to the left of each square; see `_Grid.left`."""
+    """Return the integrals of φ, u φ and u² φ along a row from the left side of the grid to each square.
+
+    In a square, φ = a + b ξ + c η + d ξ η, with u = i + ξ in column i. The result, (3, 2, rows, columns),
+    contains the integrals at η = 0, and their increase to η = 1; see `_Grid.left`.
+    """
     a, b, c, d = coefficients
     i = np.arange(a.shape[1])
     # φ along a row is constant + slope ξ. The first entry of each is that at η = 0, the second its increase.
@@ -304,6 +311,7 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
         while t < 1.0:
             next_u = _find_crossing(line_u, edge.u, edge.du, columns)
             next_v = _find_crossing(line_v, edge.v, edge.dv, rows)
+            # The part ends where the edge crosses the next grid line, or at its end.
             stop = max(min(next_u, next_v, 1.0), t)
             if next_u <= stop:
                 line_u += 1 if edge.du > 0.0 else -1
@@ -316,7 +324,14 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
 
 @inlined_kernel
 def _add_part(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, stop: float) -> None:
-    """Add a part of an edge, from t = start to t = stop, to the sums of cell k; it lies in one square."""
+    """Add the contribution of a part of an edge, which lies in one square of the grid, to the sums of cell k.
+
+    The part runs from t = start to t = stop, where t goes from 0 to 1 along the edge. By Green's theorem, the
+    integral of φ over a cell is that of P dv along its edges, with P the integral of φ along the row at
+    height v, from the left side of the image to the edge. P is a sum over the squares to the left, in
+    `grid.left`, plus an integral within the square, where φ = a + b ξ + c η + d ξ η. The same holds for φ
+    times u and u²; v is constant along a row. The Gauss rule with three nodes is exact for these polynomials.
+    """
     coefficients = grid.coefficients
     left = grid.left
     _, rows, columns = coefficients.shape
@@ -334,7 +349,8 @@ def _add_part(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, stop:
         v = edge.v + t * edge.dv
         xi = edge.u + t * edge.du - i
         eta = v - j
-        # Along the row, φ is p + q ξ. Its integrals times 1, ξ and ξ² start at the left side of the square.
+        # Along the row, at the given η, φ is p + q ξ. Its integrals times 1, ξ and ξ² start at the left side
+        # of the square.
         p = a + c * eta
         q = b + d * eta
         zeroth = xi * (p + xi * q / 2.0)
@@ -361,7 +377,11 @@ def _find_first_line(start: float, step: float, line_count: int) -> int:
 
 @kernel
 def _find_crossing(line: int, start: float, step: float, line_count: int) -> float:
-    """Return the fraction of an edge at which it crosses a grid line; inf unless that is an inner line."""
+    """Return the fraction of an edge at which it crosses a grid line; inf unless that is an inner line.
+
+    `start` is the coordinate of the start of the edge across the lines, and `step` the change to its end. The
+    outermost squares extend to infinity, so that the first and the last line are not crossed.
+    """
     if 0 < line < line_count and step != 0.0:
         return (line - start) / step
     return np.inf

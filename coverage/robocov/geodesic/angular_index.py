@@ -143,6 +143,9 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
 def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int) -> bool:
     """Return whether a box lies entirely beyond the horizon of a source, in every bin that it meets.
 
+    The directions from the source are divided into angular bins. In each bin, the horizon is the distance
+    beyond which walls hide everything. A few more bins may be tested than the box meets.
+
     Parameters
     ----------
     boxes : (nodes, 4) array, grid steps
@@ -193,6 +196,9 @@ def add_walls(
     entry_count: int,
 ) -> int:
     """Add a source to an index, with the walls around it.
+
+    A search in the box tree of the walls visits nearby boxes first, and skips those that are out of reach or
+    hidden by the walls found so far.
 
     Parameters
     ----------
@@ -288,7 +294,14 @@ def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squa
 
 @kernel
 def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, entry_count: int) -> int:
-    """Add a wall to the bins that it spans if it faces the source; return the new number of entries."""
+    """Add a wall to the bins that it spans if it faces the source; return the new number of entries.
+
+    The directions from the source are divided into angular bins, each with a list of the walls in it. The
+    wall limits the clear distance of a bin, up to which nothing is hidden, to its own smallest distance. If
+    it covers the whole bin, it also limits the horizon, beyond which everything is hidden, to its largest
+    one. A wall beyond the horizon of a bin is not added to it. Distances and angles are padded against
+    rounding.
+    """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
@@ -349,13 +362,16 @@ def _compute_squared_segment_distance(ax: float, ay: float, bx: float, by: float
 def _compute_max_squared_chain_distance(
     walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, squared_far: float
 ) -> float:
-    """Return the largest squared distance from (x, y) to a chain of walls, up to a pseudo-angle.
+    """Return the largest squared distance from (x, y) to a chain of consecutive walls.
 
-    The chain consists of the walls that follow `wall`, as long as they face (x, y). `squared_far` is the
-    largest squared distance to `wall` itself, which ends at `angle`. The result is inf if the chain does not
-    reach the last angle.
+    Where one wall ends within an angular bin, the next one usually continues, and the two together hide
+    everything behind them. The chain starts with `wall`, which ends in the direction `angle`, and whose
+    largest squared distance is `squared_far`. The walls that follow are added, as long as they face (x, y),
+    until one ends at or beyond `last_angle`, where the bin ends. The result is inf if none does. Directions
+    are given as pseudo-angles, which grow with the angle; see `compute_pseudo_angle`.
     """
     for _ in range(_MAX_CHAIN):
+        # The next wall leads from (ax, ay), where this one ends, to (bx, by), relative to the point.
         ax = walls.ends[wall, END_X] - x
         ay = walls.ends[wall, END_Y] - y
         wall = walls.following[wall]
@@ -365,10 +381,12 @@ def _compute_max_squared_chain_distance(
         by = walls.ends[wall, END_Y] - y
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
+        # The direction in which the wall ends, at or after the end of the wall before.
         stop = compute_pseudo_angle(bx, by)
         while stop < angle - _PADDING:
             stop += _FULL_TURN
         angle = stop
+        # The point of a wall that is farthest away is one of its ends.
         squared_far = max(squared_far, (bx * bx + by * by) * (1.0 + _PADDING))
         if angle - _PADDING >= last_angle:
             return squared_far
@@ -453,14 +471,16 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
 def _is_visible_past_walls(
     walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
 ) -> bool:
-    """Return whether a source sees the point at offset (dx, dy), by testing every wall in bin k."""
+    """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     if index.squared_clear_distance[source, k] == _MUST_CHECK_SECTORS:
+        # The source is at a vertex, where some directions lead into the obstacle.
         vertex = find_vertex(walls.vertices, x, y)
         if not contains_direction(walls, vertex, dx, dy):
             return False
     if dx * dx + dy * dy > index.squared_reach[source]:
+        # The bins may lack walls that are this far away.
         return _is_segment_free(walls, x, y, dx, dy)
     entry = index.head[source, k]
     while entry != NO_ENTRY:
@@ -492,7 +512,10 @@ def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
 
 @kernel
 def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether no wall hides the point at offset (dx, dy) from (x, y), searching along the segment."""
+    """Return whether no wall hides the point at offset (dx, dy) from (x, y).
+
+    Only walls whose boxes in the tree meet the segment between the two points are tested.
+    """
     boxes = walls.boxes
     first_leaf = len(boxes) // 2
     node = ROOT
@@ -516,7 +539,10 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
 @kernel
 def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a box certainly does not meet the segment from (x, y) to (x + dx, y + dy)."""
+    """Return whether a box certainly does not meet the segment from (x, y) to (x + dx, y + dy).
+
+    That is so if the two are apart in x, in y, or across the segment (separating axes).
+    """
     if boxes[node, LOW_X] > x + max(dx, 0.0) or boxes[node, HIGH_X] < x + min(dx, 0.0):
         return True
     if boxes[node, LOW_Y] > y + max(dy, 0.0) or boxes[node, HIGH_Y] < y + min(dy, 0.0):

@@ -32,7 +32,7 @@ Z_ORDER_BITS = 16
 
 
 def build_box_tree(low: Array, high: Array) -> Array:
-    """Build the box tree of items.
+    """Build the box tree of items: a binary tree, in which each box contains those of its two children.
 
     Parameters
     ----------

@@ -174,6 +174,8 @@ def find_links(
 ) -> int:
     """Find the links from a range of corners to the corners after them.
 
+    Two corners are linked if they see each other and a shortest path can bend at both of them.
+
     Parameters
     ----------
     walls : Walls
@@ -221,7 +223,8 @@ def find_links(
 def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting_count: int) -> None:
     """Shorten the paths to corners via other corners until none can be shortened further.
 
-    If paths are equally short, the one from the first source is taken.
+    A corner whose path has become shorter waits in a queue until the paths to its neighbors are tested. If
+    paths are equally short, the one from the first source is taken.
 
     Parameters
     ----------

@@ -397,10 +397,12 @@ def _find_corner_distances(
     distances: Array,
     paths: CornerPaths,
 ) -> bool:
-    """Write the distances from (n, 2) points to the corners, (n, k).
+    """Write the distances from (n, 2) points to the corners, (n, k), along shortest paths around the walls.
 
-    `paths` is overwritten for each point, and finally contains the paths from the last one. Return whether
-    the index has enough space.
+    A path is straight, or leads from one of the corners that the point sees along links of the corner graph.
+    With `must_be_straight`, only straight paths count, and other corners are infinitely far away. `paths` is
+    overwritten for each point, and finally contains the paths from the last one. Return whether the index has
+    enough space.
     """
     corner_count = len(walls.corners)
     queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))

@@ -115,6 +115,11 @@ class _Sectors(NamedTuple):
 def build_walls(free: MultiPolygon) -> Walls:
     """Build the walls of a free space.
 
+    A wall is an edge of the free space, which lies on its left. A sector is a wedge of free space at a
+    vertex, between an incoming wall, which ends there, and an outgoing wall, which starts there. It is a
+    corner, where a shortest path can bend, if it is wider than half a turn. Walls and corners are each sorted
+    so that nearby ones are close together in memory, and get a tree of bounding boxes.
+
     Parameters
     ----------
     free : shapely.MultiPolygon, grid steps
@@ -124,6 +129,8 @@ def build_walls(free: MultiPolygon) -> Walls:
     -------
     Walls
     """
+    # Sectors are built from the vertex `before`, where the incoming wall starts, and the vertex `after`,
+    # where the outgoing wall ends.
     segments = _list_segments(free)
     vertices = segments.vertices
     sectors = _find_sectors(segments)
@@ -142,6 +149,7 @@ def build_walls(free: MultiPolygon) -> Walls:
         ends=np.hstack([starts, ends]),
         following=_find_following(segments),
         component=segments.component,
+        # There is no free space behind a wall on the convex hull of the map, so that it hides nothing.
         can_hide=~_find_hull_walls(segments),
         boxes=build_box_tree(np.minimum(starts, ends), np.maximum(starts, ends)),
         vertices=vertices,
@@ -191,7 +199,9 @@ def _compute_spatial_order(points: Array) -> IntArray:
 def _find_sectors(segments: _Segments) -> _Sectors:
     """Find the pairs of incoming and outgoing walls that bound the same wedge of free space.
 
-    At a pinch, each outgoing wall is paired with the next incoming wall counter-clockwise; see `Walls`.
+    An incoming wall ends at a vertex, and an outgoing wall starts there; both have free space on their left.
+    At most vertices there is one of each. At a pinch, where walls touch, there are several, and each outgoing
+    wall is paired with the next incoming wall counter-clockwise.
     """
     vertices = segments.vertices
     # As many walls start at a vertex as end there. Row i of both orders therefore has the same vertex.
@@ -217,7 +227,11 @@ def _compute_angles(vectors: Array) -> Array:
 
 
 def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArray:
-    """Find the sectors that are corners, given their vertices and the directions of their walls."""
+    """Find the sectors that are corners, given their vertices and the directions of their walls.
+
+    A sector, the wedge of free space between an incoming and an outgoing wall, is a corner if it is wider
+    than half a turn: then the path along the walls turns right, and its cross product is negative.
+    """
     crosses = compute_crosses(incoming, outgoing)
     is_pinch = np.bincount(vertex)[vertex] > 1
     # At a pinch, even a straight wall has a corner: otherwise the walls of the other sector would hide the
@@ -326,6 +340,10 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
 def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
     """Return whether a direction from a vertex leads into its free space.
 
+    The free space at a vertex consists of sectors, each to the left of an incoming and an outgoing wall. In a
+    sector of up to half a turn, the direction must be to the left of both walls. In a corner, which is wider,
+    it is enough to be to the left of one of them.
+
     Parameters
     ----------
     walls : Walls
@@ -355,6 +373,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
     """Count how often the boundary of each component winds around points.
 
     The winding number is the number of walls to the right of a point that run up, minus those that run down.
+    A search in the box tree visits only walls at the height of the point that are not entirely to its left.
 
     Parameters
     ----------
@@ -385,7 +404,11 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
 
 @kernel
 def _count_winding(ends: Array, wall: int, x: float, y: float) -> int:
-    """Return the contribution of a wall to the winding number of a point."""
+    """Return the contribution of a wall to the winding number of a point.
+
+    It is 1 if the wall runs up past the point on its right, -1 if it runs down there, and otherwise 0. The
+    lower end of a wall counts, but not its upper end, so that no vertex counts twice.
+    """
     ax = ends[wall, START_X]
     ay = ends[wall, START_Y]
     bx = ends[wall, END_X]

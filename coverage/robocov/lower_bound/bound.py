@@ -242,6 +242,12 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
 class _Dual:
     """The dual problem of one map and team. Costs are weighted sums over the sites, not means.
 
+    Each site c of weight w_c offers a price u_c for a robot, of which the distance d(c, p) to the robot's
+    position p is subtracted. The profit of a position is sum_c w_c max(0, u_c - d(c, p)). For any prices, the
+    dual sum_c w_c u_c - n max_p profit(p) is a lower bound on the cost of every placement of n robots. The
+    largest profit is searched on a table of candidate positions, and then bounded on triangles that cover all
+    positions.
+
     Attributes
     ----------
     is_covered : (c,) bool array
@@ -257,6 +263,16 @@ class _Dual:
     """
 
     def __init__(self, cost: CoverageCost, positions: Array, radius: float) -> None:
+        """Set up the sites, the triangles, the first prices and the table.
+
+        Parameters
+        ----------
+        cost : CoverageCost
+        positions : (n, 2) array, m
+            The given placement.
+        radius : float, m
+            Radius of the robots.
+        """
         geodesics = cost.geodesics
         self._geodesics = geodesics
         self._unit = geodesics.grid.unit
@@ -281,6 +297,8 @@ class _Dual:
         self._site_data = self._build_site_data(site_positions)
         configuration_space = self._build_configuration_space(cost.environment, radius)
         self._triangles = self._triangulate(configuration_space)
+        # The searches are limited to prices up to the maximum, which limits the number of entries in the
+        # table.
         self._max_prices, self.first_prices = self._compute_first_prices(robots)
 
         # The table starts with the robots and some of the sites where a robot can be.
@@ -358,9 +376,10 @@ class _Dual:
             self._table = self._table.append(distances, self._max_prices)
 
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
-        """Search for prices, (m,) m, that raise the dual over the positions in the table.
+        """Search for prices, (m,) m, that increase the dual over the positions in the table.
 
-        In place of the maximum profit, the search uses the smooth function ``s log sum exp(profit / s)``.
+        The dual is the sum of the weighted prices minus n times the maximum profit of a position. The maximum
+        has no gradient, so that the search replaces it by the smooth function ``s log sum exp(profit / s)``.
         `smoothing` is s as a fraction of the cost per robot. The gradient of that function is the mean of the
         gradients of the profits, weighted by the shares exp(profit / s).
         """
@@ -369,15 +388,20 @@ class _Dual:
         s = smoothing * scale / self._robot_count
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
-            """Return minus the dual and its gradient, both divided by `scale`."""
+            """Return minus the smoothed dual at given prices, and its gradient, both divided by `scale`.
+
+            The smoothing s is that of `improve_prices`.
+            """
             heartbeat()
             profits = self._table.compute_profits(prices, weights)
+            # Subtracting the maximum prevents an overflow of the exponential function.
             max_profit = profits.max()
             shares = np.exp((profits - max_profit) / s)
             smooth_max = max_profit + s * math.log(shares.sum())
             dual = float(weights @ prices) - self._robot_count * smooth_max
-            # The robots are divided among the positions. A higher price of a site increases the dual if the
-            # site pays for less than one robot in total.
+            # In the gradient, the n robots are divided among the positions in proportion to the shares.
+            # Raising the price of a site by 1 adds its weight to the dual once, and subtracts it once for
+            # each robot that the site pays for, that is, each robot that is nearer than its price.
             robot_shares = shares * (self._robot_count / shares.sum())
             paid_shares = np.zeros(len(prices))
             add_paid_shares(self._table, prices, robot_shares, paid_shares)
@@ -394,7 +418,7 @@ class _Dual:
         return np.asarray(solution.x)
 
     def bound_profits(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
-        """Compute upper bounds on the profits of all points of triangles.
+        """Compute upper bounds on the profits of all points of triangles, by the kernel of the same name.
 
         Parameters
         ----------
@@ -410,19 +434,21 @@ class _Dual:
         bounds : (t,) array, m
             Upper bound on the profit of every point of each triangle.
         """
+        # The middle of a triangle may be outside the free space by rounding. Its center is not.
         middles = self._geodesics.grid.to_meters(triangles.mean(axis=1))
         centers, _ = self._geodesics.snap_to_free_space(middles)
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
         grid_prices = prices / self._unit
 
         def compute_profits(wall_index: AngularWallIndex) -> Array | None:
-            """Return the rows of the kernel's result; None if the index is too small."""
+            """Return the profits and their bounds, (2, t); None if the wall index is too small."""
             profits = np.empty((2, len(triangles)))
             has_space = bound_profits(
                 self._site_data, wall_index, grid_prices, triangles, centers, scratch, profits
             )
             return profits if has_space else None
 
+        # The index of the walls around a center is enlarged until it is large enough.
         grid_profits = self._geodesics.run_with_index(
             source_count=1, bin_count=SOURCE_BINS, compute=compute_profits
         )
@@ -432,7 +458,8 @@ class _Dual:
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost by branch and bound over triangles.
 
-        The bound falls short of the best one for these prices by at most `tolerance` times the cost of the
+        The lower bound is the sum of the weighted prices minus n times an upper bound on the profit of any
+        position. It falls short of the best one for these prices by at most `tolerance` times the cost of the
         placement, unless the limit `_MAX_TRIANGLES` is reached. A triangle is a leaf if no robot in it can
         earn much more than one at the best position found so far. All other triangles are halved.
         """

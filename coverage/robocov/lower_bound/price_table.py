@@ -77,7 +77,10 @@ class PriceTable(NamedTuple):
 
 @kernel
 def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: Array) -> None:
-    """Write the profits of the positions of the table."""
+    """Write the profit of each position: the sum over the sites of weight * max(price - distance, 0).
+
+    Sites that are too far away to pay for a robot at a position have no entry in the table.
+    """
     for position in range(len(profits)):
         profit = 0.0
         for entry in range(table.first_entry[position], table.first_entry[position + 1]):

@@ -91,7 +91,10 @@ def bound_profits(
 ) -> bool:
     """Compute the profit of the center of each triangle, and an upper bound on the profit of all its points.
 
-    The profit of a point is the sum over the sites of weight * max(price - distance, 0).
+    The profit of a point is the sum over the sites of weight * max(price - distance, 0). In a triangle, a
+    distance is never below the smallest of the tangents, at the center, of the lengths of the paths to the
+    site. With these tangents in place of the distances, the profit is convex, and therefore largest at one of
+    the three vertices.
 
     Parameters
     ----------
@@ -131,7 +134,10 @@ def _set_triangle(
     triangle: Array,
     center: Array,
 ) -> _Center:
-    """Write a triangle, and the corners that are visible from its center, to the scratch space."""
+    """Write a triangle, and the corners that are visible from its center, to the scratch space.
+
+    The profits of the vertices start at 0; `_add_site` adds to them.
+    """
     x = center[0]
     y = center[1]
     radius = 0.0
@@ -160,7 +166,12 @@ def _add_site(
     site: int,
     price: float,
 ) -> float:
-    """Add what a site pays to the profit bounds of the vertices; return what it pays at the center."""
+    """Add what a site pays to the profit bounds of the vertices; return what it pays at the center.
+
+    A site pays weight * max(price - distance, 0) to a robot. For each vertex, the distance is bounded from
+    below by tangents of path lengths at the center: of the straight path, if the site is visible from the
+    center, and of the paths via the corners that are visible from there.
+    """
     site_x = site_data.sites[site, 0]
     site_y = site_data.sites[site, 1]
     dx = center.x - site_x
@@ -209,8 +220,10 @@ def _lower_to_tangent(
 ) -> None:
     """Lower the distance bounds of the vertices where the tangent of a path length is below them.
 
-    The path starts at the center. `length` is the length of the whole path, and `first_length` that of its
-    first segment, whose end is at -(dx, dy) from the center.
+    The length of a path from a point to a site is a convex function of the point, and is therefore never
+    below its tangent at the center. The slope of the tangent is that of the first segment of the path. The
+    path starts at the center. `length` is the length of the whole path, and `first_length` that of its first
+    segment, whose end is at -(dx, dy) from the center.
     """
     # If the segment is empty, its direction (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)
