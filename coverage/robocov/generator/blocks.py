@@ -203,14 +203,19 @@ class _Street(NamedTuple):
 def _compute_widening_share(count: int, total_count: int) -> float:
     """Return the widening share of the edges along a street that divides a cell of `count` blocks.
 
-    Streets that separate more blocks are wider. Half of a street lies on either side of its middle line.
+    The first street divides all blocks and is widened most. The share of the others grows with the logarithm
+    of the number of blocks that they divide. Half of a street lies on either side of its middle line.
     """
     rank = math.log(count) / math.log(total_count)
     return (_MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * rank) / 2.0
 
 
 def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Cell]:
-    """Divide a cell by a street; `fraction` is the share of its extent that the first part gets."""
+    """Divide a convex cell by a street; `fraction` is the share of its extent that the first part gets.
+
+    The extent is that in the direction of the street's normal. Both parts get a new edge along the middle
+    line of the street, whose setback, half of the street's width, keeps the blocks off the street.
+    """
     normal_x, normal_y = street.normal
     distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
     # The extent that is divided excludes the new street, and half of the streets at both ends.
@@ -302,7 +307,11 @@ def _find_feasible_widening(cells: list[Cell], request: Request, corner_disc: Di
 
 
 def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
-    """Return the block of a cell, outside the square around the start; empty if nothing remains."""
+    """Return the block of a cell, outside the square around the start; empty if nothing remains.
+
+    The block is the cell without the streets along its edges, which are wider by `widening` than their
+    smallest widths. A trim cuts off one of its corners.
+    """
     block = remove_streets(cell, widening)
     if not block:
         return Polygon()
@@ -368,7 +377,10 @@ def _draw_trim(rng: np.random.Generator) -> Trim | None:
 
 
 def _is_thick(block: shapely.Geometry) -> bool:
-    """Return whether a block is one polygon without holes and without thin parts."""
+    """Return whether a block is one polygon without holes and without thin parts.
+
+    Eroding a block and dilating it again (an opening) removes its thin parts; it must not lose much area.
+    """
     if not isinstance(block, Polygon) or block.is_empty or block.interiors:
         return False
     radius = _MIN_THICKNESS / 2.0 * math.sqrt(block.area)

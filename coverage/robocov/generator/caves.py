@@ -75,6 +75,9 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     list of Obstacle or None
         None if the map is too small, too much or too little is blocked, or narrow windows remain.
     """
+    # Choose the core, where the center of a robot may be, then dilate it by a radius that blocks the
+    # requested area. While some passages are narrower than the gap, cut tunnels through the narrowest ones,
+    # and dilate again.
     builder = _create_builder(request, corner_disc)
     if _build_inner_rectangle(request, 2.0 * builder.min_radius).is_empty:
         return None
@@ -134,15 +137,19 @@ class _CaveBuilder:
     start: BaseGeometry
 
     def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
-        """Return the area where a field on a mesh is below 0, joined with the start into one piece."""
+        """Build the core of a cave: the area where the center of a robot may be, in one piece.
+
+        It consists of the areas where a random field on a mesh is below 0 (the chambers), of the area around
+        the start (the hall), and of tunnels that join them.
+        """
         unit = self.request.unit
         low_area = shapely.simplify(extract_area_below_zero(points, values), self.tolerance)
         low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
         chambers = [
             part for part in shapely.get_parts(low_area) if part.area >= _MIN_CHAMBER_AREA_UNITS2 * unit**2
         ]
-        # The hall is the chamber around the start. The core is dilated later, by at least the radius by which
-        # the start is eroded here.
+        # The free space results later from dilating the core by at least `min_radius`. The start is eroded by
+        # that radius now, so that it becomes free as a whole, but not much more.
         hall = self.start.buffer(-self.min_radius)
         if hall.is_empty:
             hall = self.start.centroid
@@ -196,7 +203,11 @@ def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
 
 
 def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int) -> BaseGeometry:
-    """Return the core at the level that leaves about the requested area blocked after dilation."""
+    """Return the core at the level that leaves about the requested area blocked after dilation.
+
+    The core is where the field is below the level. The higher the level, the larger is the core, and the less
+    is blocked, so that bisection finds it.
+    """
     low = float(values.min())
     high = float(values.max())
     for _ in range(_LEVEL_STEPS):
@@ -211,7 +222,7 @@ def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int)
 
 
 def _choose_radius(builder: _CaveBuilder, core: BaseGeometry) -> float:
-    """Return the dilation of a core that leaves about the requested area blocked, m."""
+    """Return the dilation of a core that leaves about the requested area blocked, m, found by bisection."""
     low = builder.min_radius
     high = _MAX_RADIUS * builder.min_radius
     for _ in range(_RADIUS_STEPS):
@@ -294,6 +305,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     Each square of the mesh is divided into two triangles, in which the contour is a line ("marching
     triangles"). In a triangle, unlike in a square, the contour is never ambiguous.
     """
+    # On the edge of the mesh, all values are positive, so that contours are closed.
     raised_values = np.maximum(values, 1.0)
     raised_values[1:-1, 1:-1] = values[1:-1, 1:-1]
     values = raised_values
@@ -364,6 +376,9 @@ def _bend_line(line: LineString, rng: np.random.Generator) -> LineString:
 def build_window_tunnel(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
     """Build a tunnel through a window between two dilated parts of a core.
 
+    A window is a passage that is narrower than the requested gap, where two dilated parts of the core barely
+    meet. A line between these parts, added to the core, makes it wider when the core is dilated again.
+
     Parameters
     ----------
     gap : Gap
@@ -377,6 +392,7 @@ def build_window_tunnel(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeom
     geometry
         A line from part to part; the middle of the window if no part is near on one of its sides.
     """
+    # `across` leads along the window from wall to wall, and `through` from one of the parts to the other.
     first_wall = np.array(gap.between[0])
     second_wall = np.array(gap.between[1])
     middle = (first_wall + second_wall) / 2.0

@@ -283,7 +283,10 @@ def _choose_starts(
 def _shrink_corner_disc(
     environment: Environment, request: Request, corner_disc: DiscStart
 ) -> DiscStart | None:
-    """Return the disc, smaller and nearer to its corner if walls are near; None if it would be too small."""
+    """Return the disc, smaller and nearer to its corner if walls are near; None if it would be too small.
+
+    The smaller disc keeps its distance from the sides of the map.
+    """
     center = np.array(corner_disc.center)
     outwards = np.sign(center - request.size / 2.0)
     radius = corner_disc.radius
@@ -298,7 +301,11 @@ def _shrink_corner_disc(
 def _choose_center_disc(
     environment: Environment, request: Request, corner_disc: DiscStart
 ) -> DiscStart | None:
-    """Return a disc near the middle with as much clearance as possible; None if nothing is free there."""
+    """Return a disc near the middle with as much clearance as possible; None if nothing is free there.
+
+    The free one of a grid of points around the middle is chosen that has the best score: its distance from
+    the nearest wall, as far as the disc can make use of it, minus a part of its distance from the middle.
+    """
     max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
     steps = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -312,6 +319,7 @@ def _choose_center_disc(
     max_radius = _CENTER_DISC_FRACTION * corner_disc.radius
     distances = np.hypot(offsets[:, 0], offsets[:, 1])
     scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
+    # Scores are rounded, so that rounding errors do not decide between equally good points.
     best = int(np.round(scores, _SCORE_DIGITS).argmax())
     # Where there is little clearance, the disc extends into obstacles. Robots start in the free part of it.
     radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)

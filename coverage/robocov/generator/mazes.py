@@ -92,9 +92,13 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 
 def _choose_grid_shape(request: Request) -> GridShape:
-    """Return numbers of columns and rows for about the requested number of nearly square cells."""
+    """Return numbers of columns and rows for about as many nearly square cells as requested.
+
+    The number of cells of a maze is requested as `Request.obstacles`.
+    """
 
     def compute_mismatch(shape: GridShape) -> float:
+        """Return how far a grid is from the requested number of cells, and its cells from squares."""
         columns, rows = shape
         elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
         return abs(math.log(columns * rows / request.obstacles)) + _ELONGATION_WEIGHT * elongation
@@ -109,9 +113,14 @@ def _choose_grid_shape(request: Request) -> GridShape:
 
 
 def _choose_thickness(request: Request, shape: GridShape, trails: list[list[Post]]) -> float:
-    """Return the rounded thickness, m, with which walls block an area nearest to the requested one."""
+    """Return the rounded thickness, m, with which walls block an area nearest to the requested one.
+
+    Walls along the polylines `trails` of posts are tried with thicknesses of whole rounding steps, by
+    bisection.
+    """
 
     def compute_area(steps: int) -> float:
+        """Return the area that walls block if they are a number of rounding steps thick, m²."""
         thickness = round(steps * request.step, request.digits)
         return _compute_union_area(_build_walls(request, shape, trails, thickness))
 
@@ -168,7 +177,11 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
 def _clear_disc(
     request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner_disc: DiscStart
 ) -> bool:
-    """Remove the walls that a disc touches; return whether there were any."""
+    """Remove the walls that a disc touches; return whether there were any.
+
+    Each row of `indices` is a wall: the column and row of the post where it starts, and 1 if it is
+    horizontal, which leads to the right, or 0 if it is vertical, which leads upwards.
+    """
     x = _compute_lines(request, request.width, shape[0], thickness)
     y = _compute_lines(request, request.height, shape[1], thickness)
     indices = np.argwhere(walls)
@@ -244,9 +257,11 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 
 
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Remove a wall, preferably one that is attached at both ends, because that makes a loop.
+    """Remove a random wall, preferably one that is attached to other walls at both ends: that makes a loop.
 
-    With the probability `_DEAD_END_PROBABILITY`, a wall at a dead end is removed if possible.
+    With the probability `_DEAD_END_PROBABILITY`, it is one at a dead end, if there is any. A wall starts at a
+    post, the crossing of two lines of the grid, and leads to the post on the right if it is horizontal (1),
+    or above if it is vertical (0).
     """
     columns, rows, is_horizontal = np.argwhere(walls).T
     starts = (columns, rows)
@@ -287,7 +302,8 @@ def _count_openings(walls: BoolArray) -> IntArray:
 def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     """Trace polylines that contain every wall once.
 
-    A polyline goes straight on if it can; otherwise it turns a corner if no other wall ends there.
+    At each post, the crossing of two lines of the grid, a polyline goes straight on if a wall does.
+    Otherwise, it turns if a single other wall ends there, and ends if there is none, or more than one.
 
     Parameters
     ----------
@@ -308,7 +324,8 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     steps = sorted((post, neighbor) for post in neighbors for neighbor in neighbors[post])
     traced: set[tuple[Post, Post]] = set()
     for start, second in steps:
-        # Begin only at posts where a polyline from the second post would end.
+        # Begin a polyline only where one that comes the other way, from the second post to the first, would
+        # end. Otherwise, it would begin in the middle.
         is_end = _find_next_post(neighbors, previous=second, post=start) is None
         if not is_end or (start, second) in traced:
             continue
@@ -319,6 +336,7 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
             traced.add((previous, post))
             traced.add((post, previous))
             following = _find_next_post(neighbors, previous, post)
+            # Only bends and the last post become vertices.
             if following != _step_straight(previous, post):
                 trail.append(post)
             if following is None:

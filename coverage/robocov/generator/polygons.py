@@ -110,7 +110,11 @@ def _place_shape(
     start_disc: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
-    """Return a random outline of a shape at a free position; None if none is found."""
+    """Return a random outline of a shape at a free position; None if none is found.
+
+    For each of several outlines, many random positions are tested at once: the outline must keep the gap from
+    the boundary and from other obstacles, and must not touch the start disc.
+    """
     gap = request.gap
     size = request.size
     tree = shapely.STRtree(others)

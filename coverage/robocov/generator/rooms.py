@@ -310,7 +310,8 @@ def _divide_by_wall(
 ) -> list[tuple[Box, int]] | None:
     """Divide a rectangle by a wall across its longer side, and add the wall to the plan.
 
-    Return the two parts, each with its number of rooms; None if they would be too small.
+    Each part is to contain half of the `count` rooms. Its share of the rectangle is about the same. Return
+    the two parts, each with its number of rooms; None if they would be too small.
     """
     width, height = box.sides
     axis = 1 if height > width else 0
@@ -395,6 +396,8 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
 
     for k in sorted(range(len(places)), key=compute_sort_key):
         place = places[k]
+        # A door is left out where it would be too narrow, or if the rooms are already connected, unless it is
+        # one of the random doors that close a loop.
         max_width = place.high - place.low - 2.0 * min_piece
         width = request.round_down(min(float(widths[k]), max_width))
         is_unneeded = room_groups.connected(*place.rooms) and loop_draws[k] > _LOOP_PROBABILITY
@@ -409,7 +412,11 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
 
 
 def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
-    """Return a place for each wall and each pair of rooms on its two sides."""
+    """Return a place for each wall and each pair of rooms on its two sides.
+
+    `axis` is the axis that a wall crosses. A room on its lower side ends at the position of the wall on this
+    axis, and a room on its upper side begins there.
+    """
     # The rooms that begin, and those that end, at each coordinate on each axis.
     rooms_by_low: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     rooms_by_high: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
@@ -434,7 +441,11 @@ def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
 def _place_furniture(
     request: Request, corner_disc: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
-    """Return furniture that blocks the given area, m²; None if it does not fit."""
+    """Return furniture that blocks the given area, m²; None if it does not fit.
+
+    Pieces of random size are placed at random, one after another, until their areas add up to the given one.
+    After a piece that does not fit, smaller ones are tried.
+    """
     min_area = _AREA_TOLERANCE * request.width * request.height
     if area < -min_area:
         return None
@@ -443,7 +454,7 @@ def _place_furniture(
     if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
-    # The doors and the furniture of each room. More furniture must keep a gap from them.
+    # The polygons of the doors and of the furniture in each room. More furniture must keep the gap from them.
     occupied: list[list[Polygon]] = [[] for _ in inner_rooms]
     for door in plan.doors:
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
@@ -547,13 +558,18 @@ def _place_piece(
     start_disc: Polygon,
     rng: np.random.Generator,
 ) -> CircleObstacle | PolygonObstacle | None:
-    """Return a piece of furniture at a free position in a room; None if none is found."""
+    """Return a piece of furniture at the first free one of several random positions in a room.
+
+    `low`, `middle` and `high` are the lower left corners, centers and upper right corners of the piece at all
+    these positions, (k, 2) m each. A position is free if the piece does not touch the start disc, and keeps
+    the gap from the other pieces and from doors. None if no position is free.
+    """
     low = _sample_piece_corners(request, piece, room, rng)
     if low is None:
         return None
     high = request.round_points(low + piece.size)
     middle = request.round_points(low + piece.size / 2.0)
-    # Distances to a circle are measured from its center, and are larger by its radius.
+    # Distances to a circle are measured from its center, and must be larger by its radius.
     if piece.is_round:
         shapes = shapely.points(middle)
         # Rounding moves the center by up to half a step.

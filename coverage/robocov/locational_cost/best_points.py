@@ -219,30 +219,38 @@ def _start_search(points: Array, is_active: BoolArray) -> _Search:
 
 @kernel
 def _advance(search: _Search, derivatives: CellDerivatives, sign: float, tolerance: float) -> None:
-    """Accept the trial points, or shorten the steps to them, and choose the next ones.
+    """Advance Newton's method in all cells: accept the trial points, or shorten the steps to them.
 
-    `derivatives` are those at the trial points. The search in a cell has converged if the step is shorter
-    than `tolerance`, relative to half the perimeter of the cell.
+    A full step leads from the best point of a cell so far to where Newton's method expects the optimum. Along
+    it, the cost falls at first, and may then rise. A trial point is accepted if it is in its cell and the
+    cost rises there, if at all, at most half as steeply as it falls at the start of the step (`_MAX_RISE`):
+    then the step was not much too long. Otherwise, only a fraction of the step is tried next.
+
+    `derivatives` are those at the trial points, and `sign` makes the cost one to be minimized. The search in
+    a cell has converged if the step is shorter than `tolerance`, relative to half the perimeter of the cell.
     """
     for i in range(len(search.points)):
         if not search.is_active[i]:
             continue
         clearance = derivatives.clearance[i]
         is_first = np.isnan(search.fraction[i])
-        # A cell that is not convex does not confine the search.
+        # The clearance is the distance from the boundary, and negative outside the cell. A cell that is not
+        # convex does not confine the search.
         is_unconfined = search.clearance[i] == np.inf or (is_first and clearance <= 0.0)
         if is_unconfined:
             clearance = np.inf
         slope = sign * (derivatives.x[i] * search.step_x[i] + derivatives.y[i] * search.step_y[i])
-        # The slope at the start of the step is negative.
+        # The slope at the start of the step is negative, so that this limit is positive.
         max_slope = -_MAX_RISE * search.slope[i]
         if is_first or (clearance >= 0.0 and slope <= max_slope):
             _accept_trial(search, derivatives, i, sign, clearance)
         elif clearance >= 0.0:
-            # Shorten the step to where the slope would be zero if it changed linearly, within limits.
+            # The trial is in the cell, but the cost rises too steeply there. Shorten the step to where the
+            # slope would be zero if it changed linearly, within limits.
             zero_slope = search.slope[i] / min(search.slope[i] - slope, -_MIN_SLOPE_CHANGE)
             search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
         else:
+            # The trial is outside the cell.
             search.fraction[i] *= _MAX_SHORTENING
         _choose_next_trial(search, i, derivatives.half_perimeter[i], tolerance)
 
@@ -269,7 +277,11 @@ def _accept_trial(
 
 @kernel
 def _choose_next_trial(search: _Search, i: int, half_perimeter: float, tolerance: float) -> None:
-    """Choose the next trial point of cell i, or end its search if the step to it is short enough."""
+    """Choose the next trial point of cell i, or end its search if the step to it is short enough.
+
+    A short last step is taken without a trial, unless it might lead out of the cell: it must not be longer
+    than the distance of the best point so far from the boundary (the clearance).
+    """
     x = search.fraction[i] * search.step_x[i]
     y = search.fraction[i] * search.step_y[i]
     length = np.sqrt(x * x + y * y)
@@ -288,7 +300,11 @@ def _choose_next_trial(search: _Search, i: int, half_perimeter: float, tolerance
 def _compute_newton_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float, max_length: float
 ) -> tuple[float, float]:
-    """Return the Newton step, or a descent step if the Hessian is not positive definite; limit its length."""
+    """Return the Newton step -H⁻¹ g for the gradient g and the Hessian H, of limited length.
+
+    If H is not positive definite, or almost singular, the step would not lead to a minimum. A step that is
+    certain to descend replaces it.
+    """
     trace = xx + yy
     determinant = xx * yy - xy * xy
     if trace > 0.0 and determinant > _MIN_CURVATURE * trace * trace:
@@ -306,7 +322,8 @@ def _compute_descent_step(
 ) -> tuple[float, float]:
     """Return the Newton step for the Hessian with the absolute values of its eigenvalues.
 
-    This step always descends.
+    This matrix is positive definite, so that the step always descends. The step is the sum of those along the
+    two eigenvectors: minus the component of the gradient, divided by the absolute value of the eigenvalue.
     """
     # The eigenvalues are mean + radius and mean - radius.
     mean = 0.5 * (xx + yy)

@@ -135,8 +135,9 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
 
     Notes
     -----
-    At the generators this is equation (11). As the cells move with their generators, it is also the gradient
-    of the whole cost: what a moving boundary adds to one cell, it takes from the other, (8)-(10).
+    At the generators this is equation (11) of the paper (the numbers are those of its equations). The cells
+    move with their generators. Nevertheless, this is also the gradient of the sum of all costs: what a moving
+    boundary adds to one cell, it takes from the other, (8)-(10).
     """
     derivatives = compute_derivatives(edges, points, f)
     return np.column_stack([derivatives.x, derivatives.y])
@@ -164,7 +165,13 @@ def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> Cell
 def _sum_derivatives(
     start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float
 ) -> CellDerivatives:
-    """Return the derivatives as sums over the edges of each cell."""
+    """Return the gradients and Hessians of the costs, and the shapes of the cells.
+
+    By the divergence theorem, the gradient of ∫ f(|q-p|) dq over a cell, with respect to p, is the sum of
+    -n ∫ f ds over its edges, with n the outward unit normal of an edge. The Hessian is the derivative of that
+    sum. It follows from the derivatives of ∫ f ds as p moves along the edge, and across it. The edges are
+    sorted by cell.
+    """
     n = len(points)
     sums = CellDerivatives(
         x=np.zeros(n),
@@ -211,7 +218,11 @@ def _sum_derivatives(
 
 @kernel
 def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float) -> _RelativeEdge:
-    """Return edge k relative to a point (x, y)."""
+    """Return edge k in the frame of a point (x, y): its outward normal, length, distance and start.
+
+    The distance is that of the point from the edge's line, negative beyond it. s1 is the coordinate of the
+    start along the edge, from the foot of the perpendicular through the point.
+    """
     along_x = end[k, 0] - start[k, 0]
     along_y = end[k, 1] - start[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
@@ -235,7 +246,7 @@ def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimete
 
 @kernel
 def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
-    """Return the integrals over an edge for f = r²."""
+    """Return the integrals over an edge for f = r², with r² = s² + d², s from s1 to s2 along the edge."""
     d = edge.distance
     s1 = edge.start
     s2 = edge.start + edge.length
@@ -247,7 +258,7 @@ def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
 
 @kernel
 def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
-    """Return the integrals over an edge for f = r."""
+    """Return the integrals over an edge for f = r, with r² = s² + d², s from s1 to s2 along the edge."""
     d = edge.distance
     s1 = edge.start
     s2 = edge.start + edge.length
@@ -262,7 +273,9 @@ def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
 def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float) -> _EdgeIntegral:
     """Return the integrals over an edge for f = 1/(r²+h²), or for f - 1/h².
 
-    A constant that is the same for all edges of a cell may be omitted from f: around the cell it adds 0.
+    With r² = s² + d², s from s1 to s2 along the edge, and w² = d² + h², the integral of f over the edge is
+    (atan(s2/w) - atan(s1/w)) / w. A constant that is the same for all edges of a cell may be subtracted from
+    f: the sum over all edges around the cell remains the same.
     """
     d = edge.distance
     s1 = edge.start
@@ -342,8 +355,11 @@ def _sum_edge_costs(
 def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, rule: Array) -> None:
     """Add to sum i the integral of 1/(r²+h²) over the triangle of a point and an edge.
 
-    The quadrature is exact up to rounding. The closed form has dilogarithms, which cancel if the triangle is
-    flat or the height is large.
+    With F(r) = ½ log(1 + r²/h²) the integral of r/(r²+h²) from 0 to r, this is the integral of d F(r)/r²
+    along the edge, with d the distance of its line from the point, r² = s² + d², and s the position along it.
+    It is computed by Gauss rules on panels of equal length in τ, where s = w sinh τ and w² = d² + h², which
+    is exact up to rounding. The closed form has dilogarithms, which cancel if the triangle is flat or the
+    height is large.
     """
     d = edge.distance
     w = np.sqrt(d * d + height * height)

@@ -40,6 +40,10 @@ def compute_weighted_derivatives(
 ) -> WeightedDerivatives:
     """Compute gradients and Hessians of weighted locational costs with respect to the points.
 
+    A cell is divided into the triangles between its point p and its edges. In a triangle, a node of the
+    quadrature is p + u (e(t) - p): t is its position along the edge e, and u, from 0 at p to 1 at the edge,
+    its position outward.
+
     Parameters
     ----------
     cells : Cells
