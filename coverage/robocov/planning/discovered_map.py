@@ -161,6 +161,7 @@ class DiscoveredMap:
         """
         if earlier is self:
             return 0
+        # A wall that has appeared is one that would disappear if time ran backwards.
         disappeared = _count_opened_walls(earlier.state, self.state)
         appeared = _count_opened_walls(self.state, earlier.state)
         return disappeared + appeared
@@ -227,7 +228,12 @@ def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> 
 def _mark_passed_cells(
     state: NDArray[np.uint8], grid: CellGrid, position: Array, directions: Array, lengths: Array
 ) -> None:
-    """Mark the cells that rays pass through as free; walls only become less certain."""
+    """Mark the cells that rays pass through as free; walls only become less certain.
+
+    The states of walls are numbers from `WALL`, the least certain, to `CERTAIN_WALL`. A ray that passes
+    through lowers the number by 1, so that several rays are needed to remove a certain wall. Rays are sampled
+    at regular steps, and the last step before their ends is left out.
+    """
     rows, columns = state.shape
     step = _RAY_STEP_CELLS * grid.cell_size
     for ray in range(len(lengths)):
@@ -243,6 +249,8 @@ def _mark_passed_cells(
             elif cell_state > WALL:
                 state[row, column] = cell_state - 1
             elif cell_state == PRESUMED_WALL:
+                # The offset of the ray from the center of the cell, in cells: a ray that only cuts a corner
+                # of the cell proves nothing.
                 offset_x = (x - grid.low_x) / grid.cell_size - column - 0.5
                 offset_y = (y - grid.low_y) / grid.cell_size - row - 0.5
                 if max(abs(offset_x), abs(offset_y)) < _CORE_HALF_WIDTH_CELLS:
@@ -263,7 +271,10 @@ def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, length
 
 @kernel
 def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
-    """Mark unknown cells between the ends of neighboring rays as presumed walls; confirm walls there."""
+    """Mark unknown cells between the ends of neighboring rays as presumed walls; confirm walls there.
+
+    If the ends of two neighboring rays are close together, both have probably hit the same surface.
+    """
     rows, columns = state.shape
     half_cell = 0.5 * grid.cell_size
     step_count = math.ceil(MAX_BRIDGED_GAP_M / half_cell)

@@ -254,7 +254,7 @@ class GridPlanner(MapWindow):
         return int(np.where(self.has_clearance, squared_distances, np.inf).argmin())
 
     def find_own_node(self, position: Array) -> int:
-        """Find the node of a robot: the nearest node with clearance that it sees, or else the nearest one.
+        """Find the node of a robot: the nearest node with clearance that it sees.
 
         Parameters
         ----------
@@ -263,13 +263,16 @@ class GridPlanner(MapWindow):
         Returns
         -------
         int
-            `NO_NODE` if no node has clearance.
+            The nearest node with clearance if the robot sees none. `NO_NODE` if no node has clearance.
         """
         visible = self._find_visible_nodes(position)
         return int(visible[0]) if len(visible) else NO_NODE
 
     def _find_visible_nodes(self, position: Array) -> IntArray:
-        """Return the close nodes with clearance in sight of a position, or the nearest if none is."""
+        """Return the nodes with clearance that are close to a position and in sight of it, nearest first.
+
+        If none is in sight, return only the nearest one with clearance.
+        """
         key = position.tobytes()
         if key not in self._visible_nodes:
             if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
@@ -345,7 +348,11 @@ class GridPlanner(MapWindow):
         return distances[0], predecessors[0]
 
     def _find_first_node(self, position: Array) -> int:
-        """Return the first node of a route, close, with clearance and in sight, or `NO_NODE`."""
+        """Return the first node of a route, near the position, with clearance and in sight, or `NO_NODE`.
+
+        If possible, no tight cell, which is too close to a wall, lies on the line to the node. Those around
+        the position do not count, because the robot may be too close to a wall.
+        """
         close = self._find_close_nodes(position, self.has_clearance)
         is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
         if not is_visible.any():
@@ -353,7 +360,11 @@ class GridPlanner(MapWindow):
         return int(close[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
-        """Return the waypoints without those that can be skipped, because later ones are in sight."""
+        """Return the waypoints without those that can be skipped, because later ones are in sight.
+
+        A waypoint is in sight if no cell on the line to it is tight, that is, too close to a wall. On the
+        first line, cells around the robot do not count, because it may itself be too close to a wall.
+        """
         remaining: list[Array] = []
         current = position
         k = 0
@@ -361,6 +372,7 @@ class GridPlanner(MapWindow):
             ignored_length = 0.0 if remaining else self.clearance
             is_visible = self.find_clear_lines(current, points[k:], self.is_tight, ignored_length)
             if is_visible.any():
+                # Go on with the last visible waypoint.
                 k += int(is_visible.nonzero()[0][-1])
             current = points[k]
             remaining.append(current)

@@ -128,7 +128,10 @@ def _build_moves(stride: int, spacing: float) -> _Moves:
 
 @lru_cache(maxsize=512)
 def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
-    """List the row and column, relative to a node, of each cell that the line to a neighbor crosses."""
+    """List the row and column, relative to a node, of each cell that the line to a neighbor crosses.
+
+    The line is sampled twice per cell. A dictionary removes the duplicates and keeps the order.
+    """
     along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
     row = np.rint(along * up * stride).astype(int)
     column = np.rint(along * right * stride).astype(int)
@@ -137,9 +140,12 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
 @kernel
 def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
-    """Compute the lengths of all moves from all nodes, (m, 5, 5) m, infinite where there is no edge.
+    """Compute the lengths of all moves from all nodes, (node, 5, 5) in meters; infinite without an edge.
 
-    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the move by that many rows and columns.
+    A move leads from a node to a neighbor up to `_MAX_MOVE` rows and columns away. The entry [node, _MAX_MOVE
+    + up, _MAX_MOVE + right] belongs to the move by that many rows and columns. There is an edge if no cell on
+    the line between both nodes is tight, that is, too close to a wall. A move through unknown cells counts as
+    longer. `moves` contains only half of the moves; the others are their opposites.
     """
     lengths = np.full((rows * columns, 2 * _MAX_MOVE + 1, 2 * _MAX_MOVE + 1), np.inf)
     for move in range(len(moves.lengths)):
@@ -163,7 +169,8 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 other = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_count)
-                # A node without clearance can be reached from one with it, but not the other way around.
+                # A node without clearance lies in a tight cell. It can be reached from one with clearance,
+                # but not the other way around.
                 has_clearance = cells.has_clearance[node]
                 other_has_clearance = cells.has_clearance[other]
                 if is_passable or (is_without_wall and has_clearance and not other_has_clearance):
@@ -175,7 +182,11 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
 
 @kernel
 def _compress_edges(lengths: Array, columns: int) -> Edges:
-    """Collect the edges from the lengths of all moves, (m, 5, 5) m, skipping infinite ones."""
+    """Collect the edges of all nodes in compressed sparse rows.
+
+    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths`, (node, 5, 5), is the length in meters of
+    the move by that many rows and columns; moves of infinite length are no edges.
+    """
     count = 0
     edge_lengths = np.empty(lengths.size)
     ends = np.empty(lengths.size, dtype=np.intp)
@@ -232,6 +243,7 @@ def compute_distances(
             front[front_size] = node
             is_in_front[node] = True
             front_size += 1
+    # The front contains the nodes that a path has reached and from which others may be reached.
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
         nearest = np.inf
@@ -281,6 +293,8 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
     (k,) int array
         At most `max_count` nodes.
     """
+    # The nearest nodes so far are kept in order of distance. A new one is inserted at its place, and the last
+    # one drops out.
     nearest = np.empty(max_count, dtype=np.intp)
     squared_distances = np.empty(max_count)
     count = 0
@@ -320,6 +334,7 @@ def find_clear_lines(
     -------
     (k,) bool array
     """
+    # All lines are sampled at the same number of points, at most half a cell apart.
     lengths = np.empty(len(ends))
     for k in range(len(ends)):
         lengths[k] = math.sqrt((ends[k, 0] - position[0]) ** 2 + (ends[k, 1] - position[1]) ** 2)
@@ -336,6 +351,7 @@ def find_clear_lines(
             y = position[1] + (ends[k, 1] - position[1]) * fraction
             row = math.floor((y - frame.low_y) * cells_per_meter)
             column = math.floor((x - frame.low_x) * cells_per_meter)
+            # Points beyond the window belong to the nearest cell in it.
             row = min(max(row, frame.first_row), frame.last_row) - frame.first_row
             column = min(max(column, frame.first_column), frame.last_column) - frame.first_column
             is_ignored = ignored_length > 0.0 and lengths[k] * fraction <= ignored_length

@@ -128,6 +128,7 @@ class MapWindow:
     @cached_property
     def frontier(self) -> Frontier:
         """The unknown cells next to free cells with room for a robot."""
+        # With a margin of one cell, shifted views contain the neighbor of each cell in one direction.
         height, width = self.is_free.shape
         is_usable = np.pad(self.is_free & ~self.is_tight, 1)
         is_side_free = np.stack(
@@ -148,7 +149,8 @@ class MapWindow:
         rows, columns = self.patches.nonzero()
         stride = self.window.stride
         nodes = rows // stride * self.window.columns + columns // stride
-        # Each pair of a patch and a node is one number, so that the cells can be grouped by pair.
+        # A node represents the cells of a square block, whose side is the stride. Each pair of a patch and a
+        # node is one number, so that the cells can be grouped by pair.
         node_count = len(self.nodes)
         pairs, index = np.unique(self.patches[rows, columns] * node_count + nodes, return_inverse=True)
         expected_free_counts = np.bincount(index, self.openness[rows, columns]).astype(np.float64)

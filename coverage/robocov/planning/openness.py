@@ -93,7 +93,12 @@ def _count_blocks(cell_count: int, block_side: int) -> int:
 
 @kernel
 def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
-    """Build the blocks of a grid, in which `_OUTSIDE` marks the cells to ignore."""
+    """Divide a grid of cells into square blocks, and count the sides between cells.
+
+    Unknown cells of a block exchange flow with free cells, with walls, and with unknown cells of other
+    blocks, in proportion to the number of sides that they share. `_OUTSIDE` marks the cells to ignore. Block
+    (i, j) is in row i and column j.
+    """
     rows, columns = cells.shape
     block_rows = _count_blocks(rows, block_side)
     block_columns = _count_blocks(columns, block_side)
@@ -138,9 +143,12 @@ def _count_side(state: int, neighbor_state: int, i: int, j: int, blocks: _BlockG
 
 @kernel
 def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
-    """Compute the openness of blocks, (rows + 1, columns + 1), by successive overrelaxation.
+    """Compute the openness u of blocks, (rows + 1, columns + 1), by successive overrelaxation.
 
-    The last row and the last column are padding without links; the index -1 also refers to them.
+    u is the probability that a random walk through unknown cells reaches a free cell before a wall. It solves
+    Laplace's equation: the u of a block is the mean over its surroundings, weighted by conductances, where
+    free cells have u = 1, walls have u = 0, and a small leak leads to `PRIOR_OPENNESS`, for walks that are
+    cut off. The last row and the last column are padding without links; the index -1 also refers to them.
     """
     block_rows, block_columns = blocks.unknown_counts.shape
     up = blocks.link_counts_up

@@ -94,6 +94,7 @@ class _NodeSearch:
     """Coverage costs with the robot at different nodes, computed when the search gets close to them."""
 
     def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
+        """Start a search at a node, with weights (m,) of all nodes, and (k, 2) positions of the others, m."""
         self._planner = planner
         distances = planner.get_distances(first_node)
         self.targets: IntArray = np.flatnonzero(np.isfinite(distances) & (weights > 0.0))
@@ -147,8 +148,11 @@ def _refine_goal(
 ) -> tuple[Array, float]:
     """Return the minimum of the parabolas around a node, and the excess cost of the previous goal over it.
 
-    The excess is infinite beyond one spacing from the node, where the parabolas do not hold.
+    In x and in y, a parabola leads through the costs of the node and of its two neighbors, with the distance
+    between nodes as unit. Along an axis on which a neighbor is missing, the goal stays at the node. The
+    excess is infinite beyond one spacing from the node, where the parabolas do not hold.
     """
+    # The order is that of `SIDES`. Axis 0 is x, and axis 1 is y.
     right, up, left, down = neighbors
     goal = planner.nodes[node].copy()
     excess = 0.0

@@ -127,7 +127,10 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
 
 
 def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> IntArray:
-    """Return the source nearest to each previous goal, all different; fixed robots choose first."""
+    """Return the source nearest to each previous goal, (k,), all different; fixed robots choose first.
+
+    Sources are the nodes of the map that may become goals.
+    """
     chosen = np.empty(len(team.positions), dtype=np.intp)
     is_taken = np.zeros(len(source_positions), dtype=bool)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
@@ -139,7 +142,12 @@ def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> In
 
 
 def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
-    """Return sources, (k,), with a lower cost. The last column of the table represents all other robots."""
+    """Return goals for the robots of the plan, as sources, (k,), with a lower cost than the chosen ones.
+
+    Sources are the possible goals. Row q of `table` contains the weighted distances of a target q to all of
+    them. Its last column does not belong to a source, but to the nearest robot outside the plan. That column
+    is always chosen, like the goals of fixed robots.
+    """
     # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
     order = np.lexsort(team.previous_goals.T)
     others_source = table.shape[1] - 1
@@ -158,9 +166,12 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
 def _move_first_source(
     table: Array, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
 ) -> IntArray:
-    """Return sources, (k,), with the first one moved to the best position in its own cell.
+    """Return sources, (k,), with that of the first robot moved to the best position in its own cell.
 
-    The last column of the table represents all other robots; it is not in the cell.
+    Sources are the possible goals, and `chosen` those of the robots of the plan. `is_in_own_cell` says for
+    each source whether no other robot is nearer to it. Row q of `table` contains the weighted distances of a
+    target q to all sources. Its last column belongs to the nearest robot outside the plan, which serves its
+    targets where it is.
     """
     others_source = table.shape[1] - 1
     moved_sources = move_first_source(
@@ -190,6 +201,8 @@ def _assign_goals(
     (k, 2) array, m
         The goal of each robot.
     """
+    # Rows of `squared_lengths` are the mobile robots, and columns the goals, in the order in which these
+    # robots have them now.
     mobile = np.flatnonzero(~team.is_fixed)
     starts = [_find_nearest(source_positions, team.positions[robot]) for robot in mobile]
     squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, _MAX_SQUARED_LENGTH_M2)

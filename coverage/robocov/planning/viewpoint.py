@@ -21,7 +21,9 @@ def find_viewpoint(
     min_stake: float,
     previous_viewpoints: Sequence[Array],
 ) -> Array | None:
-    """Find the most worthwhile viewpoint on an unknown patch of a robot's own cell.
+    """Find the most worthwhile viewpoint from which a robot can look into an unknown patch of its own cell.
+
+    An unknown patch is a connected area of cells of the map that the robot has not seen.
 
     Parameters
     ----------
@@ -31,7 +33,8 @@ def find_viewpoint(
     path_lengths : (m,) array, m
         Distances from the robot to all nodes.
     min_stake : float
-        Stake below which a patch is not worth a visit, in cells times meters.
+        Stake (see Notes) up to which a patch is not worth a visit: a number of cells times their mean
+        distance in meters.
     previous_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
 
@@ -40,15 +43,16 @@ def find_viewpoint(
     (2,) array or None, m
         Center of a free cell at the border of the patch. None if no patch is worth a visit.
 
-    Notes
-    -----
-    The stake of a patch is its expected contribution to the cost; it is close to zero for the inside of an
-    obstacle. The viewpoint maximizes the stake of the patch, divided by (1 m + path length).
+    Notes ----- The stake of a patch is what it is expected to contribute to the coverage cost: the sum, over
+    its cells, of the probability that the cell is free times the distance from the robot's goal. It is close
+    to zero for the inside of an obstacle. The viewpoint maximizes the stake of the patch, divided by (1 m +
+    path length).
     """
     window = planner.window
     raster = planner.known_map.raster
     frontier = planner.frontier
     unknown = planner.unknown_area
+    # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
     stakes = np.bincount(
         unknown.patches,
         cell_distances[unknown.nodes] * unknown.expected_free_counts,
@@ -58,7 +62,8 @@ def find_viewpoint(
     is_worth_visiting = frontier_stakes > min_stake
     if not is_worth_visiting.any():
         return None
-    # The cells on the four sides of each unknown one. Those marked in `frontier.is_side_free` are free.
+    # The frontier consists of the unknown cells that have a free one on at least one of their four sides. The
+    # cells on these sides, (b, 4), are possible viewpoints if they are marked in `frontier.is_side_free`.
     rows_up, columns_right = np.array(SIDES).T
     row = frontier.rows[is_worth_visiting, None] + rows_up
     column = frontier.columns[is_worth_visiting, None] + columns_right

@@ -67,6 +67,8 @@ class VoronoiRoadmap(NamedTuple):
         -------
         VoronoiRoadmap
         """
+        # Each group of consecutive cells of the graph becomes a vertex, at its first cell. Two vertices are
+        # joined if their groups touch. Finally, the other free cells join the nearest group.
         is_in_graph = find_voronoi_cells(has_clearance)
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_in_graph) / max_vertices)))
         first_cells, vertex_of_cell = _group_cells(is_in_graph, steps, _NEIGHBOR_STEPS)
@@ -109,8 +111,10 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         distances = np.swapaxes(wall_distance, 0, axis)
         walls = np.swapaxes(nearest_wall, 1, 1 + axis)
         is_between = np.swapaxes(is_between_walls, 0, axis)
+        # The distance between the wall cells that are nearest to two adjacent cells.
         gap = np.sqrt((np.diff(walls, axis=1) ** 2).sum(axis=0))
-        # Two points at this distance, in directions that differ by the angle, are this far apart.
+        # Two walls at a distance r from a cell, in directions that differ by an angle α, are 2 r sin(α/2)
+        # apart.
         distance = np.maximum(distances[:-1], distances[1:])
         is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + 1.0
         is_between[:-1] |= is_facing
@@ -123,7 +127,10 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
 
 @kernel
 def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbor_steps: IntArray) -> None:
-    """Remove cells that no connection depends on, in the given order, until no more can be removed."""
+    """Thin the free cells: remove those that no connection depends on, in the given order.
+
+    This is repeated until no more can be removed. `order` contains indices of the flattened array.
+    """
     columns = is_in_graph.shape[1]
     has_changed = True
     while has_changed:
@@ -140,7 +147,11 @@ def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbo
 
 @kernel
 def _count_crossings(is_in_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
-    """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
+    """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it.
+
+    It is the number of separate runs of cells of the graph among the eight neighbors. The neighbors above and
+    to the right, for example, touch diagonally, and belong to the same run.
+    """
     crossings = 0
     for k in range(0, 8, 2):
         has_side = _is_neighbor_in_graph(is_in_graph, row, column, neighbor_steps[k])
@@ -163,7 +174,8 @@ def _group_cells(
 ) -> tuple[IntArray, IntArray]:
     """Return the first cell of each group, and the group of each cell, (rows, columns), or `NO_VERTEX`.
 
-    A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
+    A group consists of the cells of the graph within `max_steps` of its first cell, from neighbor to
+    neighbor, that are not in an earlier group. They are found by a breadth-first search.
     """
     rows, columns = is_in_graph.shape
     group = np.full(is_in_graph.shape, NO_VERTEX)
@@ -215,7 +227,11 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 @kernel
 def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray) -> None:
-    """Give each free cell the group of the nearest cell that has one, measured in steps between cells."""
+    """Give each free cell the group of the nearest cell that has one, measured in steps between cells.
+
+    Cells without a group, which contain `NO_VERTEX`, are reached by a breadth-first search from all the
+    others at once.
+    """
     rows, columns = is_free.shape
     queue = np.empty(is_free.size, dtype=np.intp)
     head = 0

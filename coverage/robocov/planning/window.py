@@ -122,7 +122,11 @@ class Window(NamedTuple):
 
 
 def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple[int, int]:
-    """Return the bounds of an interval of cells, rounded outward to whole steps and clipped to `count`."""
+    """Return the bounds of an interval of cells around `middle`, rounded outward to whole steps.
+
+    Because of the rounding, the interval stays the same while the middle moves only a little. The bounds are
+    clipped to the cells from 0 up to `count`.
+    """
     step = max(1, half_width // _STEPS_PER_HALF_WIDTH)
     low = (middle - half_width) // step * step
     high = math.ceil((middle + half_width + 1) / step) * step
