@@ -13,7 +13,7 @@ from robocov_app.render.surface_cache import cache_surfaces
 from robocov_app.toolkit.window.layout import Box
 
 _FINE = 4
-"""Factor by which rounded boxes are drawn larger, and then smoothly reduced."""
+"""Rounded boxes are drawn larger by this factor and then scaled down, which smooths their edges."""
 _BOX_CACHE_BYTES = 4_000_000
 _VEIL_ALPHA = 150
 _FACT_SEPARATOR = "    "
@@ -27,7 +27,7 @@ _STATUS_MARGIN_PX = 12
 
 
 def create_flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
-    """Create a canvas for lines and texts whose positions are in pixels."""
+    """Create a canvas whose coordinates are pixels of a surface."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
     return Canvas(surface, camera, theme, scale, np.zeros(1, dtype=np.intp))
 
@@ -77,7 +77,7 @@ def get_field_color(theme: Theme) -> Color:
 
 
 def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[str]:
-    """Break a text into lines.
+    """Wrap text into lines of limited width.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
     size : int
         Height of the text, px.
     width : float
-        Maximum width of a line, px. A word that is wider is broken, too.
+        Maximum width of a line, px. Words that are wider are split.
     bold : bool
 
     Returns
@@ -113,24 +113,24 @@ def draw_card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
 
 
 def draw_veil(screen: Surface, theme: Theme) -> None:
-    """Let everything that was drawn fade into the background."""
+    """Dim everything that has been drawn so far, by a translucent layer in the background color."""
     veil = Surface(screen.get_size(), pygame.SRCALPHA, 32)
     veil.fill((*theme.background, _VEIL_ALPHA))
     screen.blit(veil, (0, 0))
 
 
 def draw_tag(screen: Surface, text: str, position: tuple[float, float], theme: Theme, scale: float) -> None:
-    """Draw a text in a small box, which stays inside the window.
+    """Draw text in a small box, which is moved if it would extend beyond the window.
 
     Parameters
     ----------
     screen : pygame.Surface
     text : str
     position : (x, y), px
-        Left end of the text, in the middle of its height.
+        Middle of the left edge of the text.
     theme : Theme
     scale : float
-        Size of text and box.
+        Scale of the text and the box.
     """
     size = round(theme.text * scale)
     box = Rect(0, 0, measure_text(text, size) + round(12 * scale), round(20 * scale))
@@ -155,7 +155,7 @@ def draw_status(
     scale : float
         Size of texts.
     facts : list of str
-        Texts from the left; the last ones are left out if there is no space.
+        Texts shown from the left; the last ones are omitted if there is not enough space.
     hint : str
         Text at the right end.
     """
@@ -177,7 +177,7 @@ def draw_status(
 def draw_message(
     screen: Surface, text: str, arena: Box, theme: Theme, scale: float, *, is_error: bool
 ) -> None:
-    """Draw a message at the foot of the arena; nothing if the text is empty.
+    """Draw a message at the bottom of the arena; nothing if the text is empty.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def draw_message(
     scale : float
         Size of the text.
     is_error : bool
-        Whether it stands out.
+        Whether it is drawn in the color of errors.
     """
     if not text:
         return

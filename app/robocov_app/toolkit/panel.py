@@ -13,7 +13,7 @@ from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Layout
 
 PanelPage: TypeAlias = Callable[[Ui], None]
-"""Shows and edits the content of a page."""
+"""Function that shows the widgets of a page and handles their input."""
 
 
 class SidePanel:
@@ -29,13 +29,13 @@ class SidePanel:
     tab : str
         Name of the open tab.
     is_covered : bool
-        Whether something else is drawn in its place, or gets its events.
+        Whether something else is drawn over it and gets its events.
     hidden : bool
         Whether it is not shown.
     ui : Ui
-        Its page.
+        Page with the widgets of the panel.
     drawn_state : object
-        State of the content when the panel was drawn last, for panels that draw only changes.
+        State of the content when the panel was last drawn, for panels that are redrawn only when it changes.
     """
 
     def __init__(self, tab: str) -> None:
@@ -46,10 +46,11 @@ class SidePanel:
         self.drawn_state: object = None
 
     def show_content(self, ui: Ui) -> None:
-        """Show and edit the content."""
+        """Show the widgets of the panel, and handle their input; called in every run of the page."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Take the place of the panel in a layout, and its colors and scale."""
+        """Adopt the position and the scale of the panel in a layout, and the colors of a theme."""
+        # A panel of width 0 is hidden.
         self.hidden = not layout.panel[2]
         if self.hidden:
             self.ui.stop_typing()
@@ -84,14 +85,14 @@ class PanelButton(NamedTuple):
 
 
 class CommandPanel(SidePanel):
-    """A panel with pages, whose buttons run the commands of the window.
+    """A panel with tabbed pages whose buttons run the commands of the window.
 
     Parameters
     ----------
     commands : CommandTable
         The commands of the window.
     run_command : callable
-        Runs a command by its name.
+        Runs the command with a given name.
 
     Attributes
     ----------
@@ -116,24 +117,24 @@ class CommandPanel(SidePanel):
         return {}
 
     def show_tab(self, name: str) -> None:
-        """Show a page, if there is one of that name."""
+        """Open the tab with this name, if there is one."""
         if name in self.tabs:
             self.tab = name
             self.ui.needs_redraw = True
 
     def show_next_tab(self) -> None:
-        """Show the next page."""
+        """Open the next tab; after the last one, the first."""
         self.show_tab(self.tabs[(self.tabs.index(self.tab) + 1) % len(self.tabs)])
 
     def show_pages(self, ui: Ui, titles: Mapping[str, str]) -> None:
-        """Show the tabs, and the page that is open.
+        """Show the tabs, and the page of the open tab.
 
         Parameters
         ----------
         ui : Ui
             The page of the panel.
         titles : mapping of str to str
-            Texts of tabs by their names; by default the names themselves.
+            Label of each tab by its name; by default the capitalized name.
         """
         tab = ui.tabs("tab", self.tabs, self.tab, *self.tab_widths, titles=titles)
         if tab is not None:
@@ -160,7 +161,7 @@ class CommandPanel(SidePanel):
         label : str
             Its text.
         command : str
-            Name of the command, whose title is the tool tip.
+            Name of the command. Its title and keys are the tool tip.
         chosen : bool
             Whether it is highlighted.
         small : bool
@@ -170,7 +171,7 @@ class CommandPanel(SidePanel):
         """
         key = command
         if ui.find("button", key) is not None:
-            # A command may have two buttons on a page.
+            # A command may have two buttons on a page, and widget keys must be unique.
             key = f"{key}:again"
         tip = self.commands[command].tip
         if ui.button(label, key=key, tip=tip, chosen=chosen, small=small, disabled_reason=disabled_reason):
@@ -183,7 +184,7 @@ class CommandPanel(SidePanel):
             self.show_button(ui, button.label, button.command, small=True)
 
     def show_tools(self, ui: Ui, toolbox: Toolbox[Any], columns: int) -> None:
-        """Show a button for each tool, in a number of columns."""
+        """Show a button for each tool, in a grid with the given number of columns."""
         ui.header("TOOLS")
         ui.row(*[0.0] * columns, below=4)
         for tool in toolbox.by_name.values():

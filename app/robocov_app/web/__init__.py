@@ -1,4 +1,4 @@
-"""The window in a browser: frames are sent to pages, which send input and their size."""
+"""Showing a window in a browser: frames are sent to web pages, which send back input and their size."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def prepare(options: Any, folder: Path) -> None:
     options : WebOptions
         Options of a command; nothing is checked without ``--serve``.
     folder : Path
-        Folder for files of the window; it is created.
+        Folder for files of the window; it is created if necessary.
 
     Raises
     ------
     RobocovError
-        Without the extra, or if files cannot be written to the folder.
+        If the optional "web" dependencies are not installed, or files cannot be written to the folder.
     """
     if not options.serve:
         return
@@ -44,14 +44,16 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     ----------
     window : BaseWindow
     options : WebOptions
-        Options of a command; ``--serve`` selects browsers.
+        Options of a command; with ``--serve``, the window is shown in browsers.
     folder : Path
-        The only folder with files that a window in a browser can use.
+        The only folder in which a window in a browser can read and write files.
 
     Raises
     ------
     RobocovError
-        Without the extra.
+        If the optional "web" dependencies are not installed.
+    KeyboardInterrupt
+        If a served window was ended by SIGINT, SIGTERM or SIGHUP.
     """
     if not options.serve:
         window.run()
@@ -72,14 +74,14 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         was_interrupted = False
 
         def close_window(number: int, frame: object) -> None:
-            """Close the window without a question about unsaved work; stop at once the second time."""
+            """Close the window without asking about unsaved work; on the second signal, stop at once."""
             nonlocal was_interrupted
             if was_interrupted:
                 raise KeyboardInterrupt
             was_interrupted = True
             window.closed = True
 
-        # The window itself handles SIGTERM.
+        # SIGTERM and SIGHUP are handled by `ending_on_signals`.
         signal.signal(signal.SIGINT, close_window)
         unblock_interrupts()
         window.run()
@@ -88,7 +90,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
 
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:
-    """Serve a command's window to each visitor in a process of their own, until the process is stopped."""
+    """Serve a window of a command to each visitor, each in its own process, until the server is stopped."""
     import asyncio
 
     from robocov_app.web.visitor_server import VisitorServer

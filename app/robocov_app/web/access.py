@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl
 from robocov.errors import InputError
 
 _LOOPBACK_ADDRESSES = {"0.0.0.0": "127.0.0.1", "::": "::1"}
-"""Addresses to open in a browser for a server that listens at all addresses."""
+"""Addresses that a browser on this machine can open, for a server that listens at all addresses."""
 
 
 def build_link(host: str, port: int, token: str) -> str:
@@ -20,13 +20,13 @@ def build_link(host: str, port: int, token: str) -> str:
 
 
 def build_listen_error(host: str, port: int, error: OSError) -> InputError:
-    """Return the error for an address at which a server cannot listen."""
+    """Build the error that a server cannot listen at an address."""
     reason = (error.strerror or str(error)).rpartition(": ")[2]
     return InputError(f"--port: cannot listen at {host}:{port}: {reason}. Use --port 0 for any free port.")
 
 
 def parse_query(address: str) -> dict[str, str]:
-    """Return the query of an address, the last value for each name."""
+    """Return the query parameters of an address; if a name occurs several times, the last value counts."""
     return dict(parse_qsl(address.partition("?")[2]))
 
 
@@ -45,5 +45,5 @@ def parse_cookies(headers: Iterable[str]) -> dict[str, str]:
 
 
 def are_equal(token: str, other: str) -> bool:
-    """Compare two tokens in a time that does not depend on where they differ."""
+    """Return whether two tokens are equal, in a time that does not reveal where they differ."""
     return hmac.compare_digest(token.encode(errors="replace"), other.encode())

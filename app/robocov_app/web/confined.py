@@ -22,38 +22,46 @@ _PATH_COUNTS = {
     **dict.fromkeys(("os.truncate", "os.chmod", "os.utime"), 1),
     **dict.fromkeys(("os.rename", "os.link", "os.symlink"), 2),
 }
-"""Python's audit events, and how many of their first arguments are paths."""
+"""Python's audit events for file access, and how many of their first arguments are paths."""
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _SYSTEM_FOLDERS = ("/dev", "/proc", "/usr/share")
 
 
 class OutsideError(InputError, PermissionError):
-    """A file that is not below the folder of a served window."""
+    """A served window may not use a file because it is outside the window's folder."""
 
 
 class FileConfinement:
-    """Restriction of this process to files below some folders, whether paths are typed, stored or linked.
+    """Restricts this process to files in some folders, whether paths are typed, stored or symbolic links.
 
     Parameters
     ----------
     readable, writable : tuple of Path
-        Folders from which files may be read, and in which they may be written, without symbolic links.
+        Folders in which files may be read, and in which they may be written, with symbolic links resolved.
 
     Attributes
     ----------
     is_active : bool
-        Whether the restriction holds.
+        Whether the restriction applies.
     """
 
     def __init__(self, readable: tuple[Path, ...], writable: tuple[Path, ...]) -> None:
         self.is_active = True
         self._readable = readable
         self._writable = writable
-        # Python cannot remove the hook, which does nothing once the confinement is no longer active.
+        # Python cannot remove an audit hook; this one does nothing once the confinement is inactive.
         sys.addaudithook(self.check_event)
 
     def check_event(self, event: str, arguments: tuple[Any, ...]) -> None:
-        """Raise OutsideError if an event of Python's audit hooks is about a file that is not allowed."""
+        """Audit hook of Python: raise OutsideError if an event accesses a file that is not allowed.
+
+        Parameters
+        ----------
+        event : str
+            Name of the audit event, such as "open".
+        arguments : tuple
+            Its arguments; the first ones are paths, and the third one of "open" contains the flags.
+        """
         if not self.is_active or event not in _PATH_COUNTS:
             return
         is_reading = event in _READING_EVENTS
@@ -61,8 +69,9 @@ class FileConfinement:
             is_reading = True
         for argument in arguments[: _PATH_COUNTS[event]]:
             if not isinstance(argument, str | bytes | os.PathLike):
-                continue  # The number of a file that is already open.
+                continue  # A file descriptor: the file is already open.
             path = Path(os.path.realpath(os.fsdecode(argument)))
+            # Python may write compiled modules next to the modules that it may read.
             is_compiled_code = "__pycache__" in path.parts
             roots = self._readable if is_reading or is_compiled_code else self._writable
             if not any(path.is_relative_to(root) for root in roots):
@@ -71,10 +80,10 @@ class FileConfinement:
 
 @contextmanager
 def confine_files(folder: Path) -> Iterator[None]:
-    """Allow the process to use only files below a folder, and to read the files of programs.
+    """Restrict the process to files in a folder; it may also read the files of installed programs.
 
     The restriction holds for every file that Python opens, whether its path is typed, stored in a session or
-    the target of a link. Temporary files are written to a separate folder, which is removed at the end.
+    the target of a symbolic link. Temporary files go to a separate folder, which is removed at the end.
 
     Parameters
     ----------
@@ -83,7 +92,7 @@ def confine_files(folder: Path) -> Iterator[None]:
     Raises
     ------
     OutsideError
-        Where another file is opened.
+        Raised in this context by any attempt to open another file.
     """
     arrays = ArrayCache.open_default()
     caches = [open_cache_folder(), None if arrays is None else arrays.folder]
@@ -100,7 +109,7 @@ def confine_files(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _use_own_temporary_folder() -> Iterator[str]:
-    """Let `tempfile`, also in libraries, create files in a new folder, which is removed at the end."""
+    """Make `tempfile`, also in libraries, create files in a new folder that is removed at the end."""
     previous_folder = tempfile.tempdir
     with tempfile.TemporaryDirectory(prefix="robocov-") as folder:
         tempfile.tempdir = folder
@@ -111,7 +120,7 @@ def _use_own_temporary_folder() -> Iterator[str]:
 
 
 def _list_program_folders() -> list[str | Path]:
-    """Return the folders of Python, its packages, the system's data and the bundled maps."""
+    """Return the folders of Python and its packages, of system data, and of the bundled maps."""
     packages = [Path(str(module.__file__)).parent for module in (robocov, robocov_app)]
     maps = [path.parent for path in list_bundled_maps().values()]
     return [*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, *_SYSTEM_FOLDERS, *packages, *maps]

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
     from websockets.http11 import Request, Response
 
-MAX_MESSAGE_BYTES = 1 << 20  # the longest text that is pasted, escaped; files come in pieces
+MAX_MESSAGE_BYTES = 1 << 20  # the longest pasted text with JSON escapes; files arrive in pieces
 MAX_QUEUED_MESSAGES = 4  # from one page, before reading from it pauses
 WRITE_LIMIT_BYTES = 1 << 16
-MAX_UNANSWERED = 256  # connections without an open socket; the oldest one is ended when there are more
-REQUEST_TIMEOUT_S = 10.0  # for a request to come in
+MAX_UNANSWERED = 256  # connections without an open WebSocket; if there are more, the oldest is closed
+REQUEST_TIMEOUT_S = 10.0  # for a request to arrive
 MAX_FILES_BYTES = 1 << 29  # of files that browsers are downloading at the same time
 RESPONSE_TIMEOUT_S = 600.0  # for a browser to download a file
 SEND_TIMEOUT_S = 30.0  # for a page to receive a message
 CLOSE_TIMEOUT_S = 5.0
-MIN_FILES = 2048  # that the process may have open: each connection is one
+MIN_FILES = 2048  # open files that the process needs; each connection is one
 END_TIMEOUT_S = 1.0  # for all pages to close their sockets at the end of the server
 
-# Close codes of sockets, see page.html.
+# WebSocket close codes, which page.html interprets.
 WINDOW_CLOSED = 1001
 NOT_UNDERSTOOD = 1008
 FAULT = 1011
@@ -44,7 +44,7 @@ Talk = Callable[["ServerConnection"], Awaitable[None]]
 
 
 def report_fault(message: str) -> None:
-    """Print a message about a fault, with the traceback of the current exception, on stderr."""
+    """Print a message and the traceback of the current exception on stderr."""
     report(f"{message}\n{traceback.format_exc()}")
 
 
@@ -54,26 +54,38 @@ def report(message: str) -> None:
 
 
 class Listener:
-    """Listens for browsers, answers their requests and hands over the sockets that they open.
+    """HTTP and WebSocket server: answers requests, and hands over the sockets that browsers open.
 
     Parameters
     ----------
     answer : callable
-        Returns the response to a request; None to let it open a socket.
+        Coroutine that returns the response to a request; None if the request may open a socket.
     talk : callable
-        Exchanges messages with a page as long as its socket is open.
+        Coroutine that exchanges messages with a page as long as its socket is open.
     """
 
     def __init__(self, answer: Answer, talk: Talk) -> None:
         self._answer = answer
         self._talk = talk
         self._connections: set[ServerConnection] = set()
-        self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # in the order in which they came
+        self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # oldest first
         self._files: dict[ServerConnection, int] = {}  # bytes of the files that browsers are downloading
         self._server: Server | None = None
 
     async def listen(self, host: str, port: int) -> int:
-        """Start listening, and return the port; raise `InputError` if that is not possible."""
+        """Start listening, and return the actual port.
+
+        Parameters
+        ----------
+        host : str
+        port : int
+            0 for any free port.
+
+        Raises
+        ------
+        InputError
+            If the server cannot listen at this address.
+        """
         from websockets.asyncio.server import ServerConnection, serve
 
         listener = self
@@ -92,7 +104,7 @@ class Listener:
                 super().connection_lost(error)
 
         _raise_file_limit()
-        # Invalid requests of strangers would fill the terminal.
+        # Otherwise, invalid requests from strangers would fill the terminal.
         logger = logging.getLogger("robocov.web")
         logger.propagate = False
         logger.addHandler(logging.NullHandler())
@@ -191,7 +203,7 @@ class Listener:
 
 
 def _raise_file_limit() -> None:
-    """Raise the limit of open files of the process, as far as the system allows; some start with 256."""
+    """Raise the limit of open files to `MIN_FILES`, as far as the system allows; the default may be 256."""
     try:
         import resource
     except ImportError:  # Windows has no such limit
@@ -204,7 +216,7 @@ def _raise_file_limit() -> None:
 
 
 def respond(connection: ServerConnection, status: HTTPStatus, text: str) -> Response:
-    """Return a response of plain text."""
+    """Build a plain text response."""
     return respond_with(connection, status, text.encode(), "text/plain; charset=utf-8", {})
 
 
@@ -215,7 +227,7 @@ def respond_with(
     content_type: str,
     headers: dict[str, str],
 ) -> Response:
-    """Return a response with a body of any type."""
+    """Build a response with a body of any content type, which browsers must not cache."""
     response = connection.respond(status, "")
     response.body = body
     for name in ("Content-Type", "Content-Length"):
@@ -227,12 +239,12 @@ def respond_with(
 
 
 def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cookie: str = "") -> Response:
-    """Return the page that shows a window.
+    """Build the response with the HTML page that shows a window.
 
     Parameters
     ----------
     connection : ServerConnection
-        The connection that asks for it.
+        The connection that requests it.
     may_be_framed : bool
         Whether other sites may frame it, as notebooks do.
     cookie : str
@@ -254,7 +266,8 @@ def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cook
 
 
 def is_from_own_page(request: Request) -> bool:
-    """Return whether a socket is opened by the server's own page, or by a program other than a browser."""
+    """Return whether a request comes from the server's own page or a program that is not a browser."""
+    # Browsers always send the origin of the page that opens a socket.
     origins = request.headers.get_all("Origin")
     if not origins:
         return True

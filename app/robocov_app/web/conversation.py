@@ -1,4 +1,4 @@
-"""Messages between the server and one page: input, requests and files come in, states and frames go out."""
+"""Messages between the server and one page: input, requests and files in; states and frames out."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from robocov_app.web.pages import Page, Pages
 from robocov_app.web.window_input import WindowInput
 
 MAX_EVENTS_PER_S = 400.0
-"""Maximum rate of events from one page. More of them wait in its connection; none is lost."""
+"""Maximum rate of events from one page. Excess events wait in the connection; none is lost."""
 EVENTS_PER_UPLOAD = 200.0
 """Number of events that an upload counts as."""
 EVENTS_PER_PIECE = 8.0
 """Number of events that a piece of an upload counts as."""
 _PAUSE_S = 0.05
-"""Time between two checks whether more messages may be read."""
+"""Interval at which the server checks whether more messages may be read."""
 
 
 @dataclass
 class SharedWindow:
-    """The parts of a served window that all pages share.
+    """What all pages of a served window share.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class SharedWindow:
     folder : Path
         Folder for uploaded files.
     file_executor : Executor
-        Thread for reading and writing files.
+        Runs the reading and writing of files in a thread.
     state : dict
-        State of the window that pages show besides its frames: cursor, title, saved files and clipboard.
+        State of the window that pages get in addition to its frames: cursor, title, saved files, clipboard.
     uploads : dict
-        Times at which uploaded files were written, s since the epoch, by their names.
+        Modification time of each uploaded file by its name, s since the epoch.
     """
 
     pages: Pages
@@ -60,7 +60,7 @@ class SharedWindow:
 
 
 class _EventBudget:
-    """The number of events that a page may still send now; it is refilled at a constant rate."""
+    """The number of events that a page may still send; it is replenished at a constant rate."""
 
     def __init__(self) -> None:
         self._remaining = MAX_EVENTS_PER_S
@@ -72,7 +72,7 @@ class _EventBudget:
         return self._remaining < 0.0
 
     def refill(self) -> None:
-        """Add the events of the time since the last call."""
+        """Add the events that the time since the last call allows."""
         now = monotonic()
         gained = (now - self._refilled_at) * MAX_EVENTS_PER_S
         self._remaining = min(self._remaining + gained, MAX_EVENTS_PER_S)
@@ -110,7 +110,7 @@ class Conversation:
         finally:
             sender.cancel()
 
-    # Messages from the page.
+    # Messages from the page
 
     async def _receive_messages(self) -> None:
         from websockets.exceptions import ConnectionClosed
@@ -194,7 +194,7 @@ class Conversation:
         await self._finish_upload()
 
     async def _finish_upload(self) -> None:
-        """Save a file once all of it has arrived, and let the window open it."""
+        """Once all of a file has arrived, save it and let the window open it."""
         upload = self._page.upload
         if upload is None or not upload.is_complete:
             return
@@ -225,7 +225,7 @@ class Conversation:
             while True:
                 await page.has_news.wait()
                 page.has_news.clear()
-                # The frames are read before the state, so that the state is never older than they are.
+                # Read the frames before the state: then the state is never older than the frames.
                 frames = list(page.outbox)
                 page.outbox.clear()
                 await self._send_state()
@@ -236,7 +236,7 @@ class Conversation:
                     await self._send(frame)
 
     async def _send_state(self) -> None:
-        """Send the state of the window and the people, if it differs from the last one that was sent."""
+        """Send the state of the window and the list of people if they have changed."""
         page = self._page
         state = {
             **self._shared.state,
@@ -246,14 +246,14 @@ class Conversation:
             "teacher": page.is_teacher,
         }
         if not self._is_controlling:
-            # Only the page that controls sees the clipboard.
+            # Only the controlling page may see the clipboard.
             state.pop("copied", None)
         if state != page.sent_state:
             page.sent_state = state
             await self._send(json.dumps(state))
 
     async def _send(self, message: str | bytes) -> None:
-        """Send a message; end the connection if the page does not read it."""
+        """Send a message; abort the connection if the page does not read it in time."""
         try:
             async with asyncio.timeout(SEND_TIMEOUT_S):
                 await self._page.connection.send(message)

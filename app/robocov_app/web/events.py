@@ -1,4 +1,4 @@
-"""Messages of a page, validated, and their translation to events of pygame."""
+"""Validation of messages from a page, and their translation to pygame events."""
 
 import unicodedata
 from collections.abc import Iterator
@@ -15,19 +15,19 @@ MAX_PAGE_SIDE_PX = 7680
 MAX_PAGE_PIXELS = 4096 * 2304
 MAX_UPLOAD_BYTES = 1 << 24
 MAX_FILE_NAME_CHARACTERS = 300
-"""Longer than any file system allows, so that such names are rejected with a message."""
+"""More than any file system allows, so that names that are too long are rejected with a message."""
 _STRIPPED_CATEGORIES = ("Cc", "Cs")
 
 
 def strip_controls(text: str, keep: str = "") -> str:
-    """Remove control characters such as NUL, escape and delete from a text.
+    """Remove control characters such as NUL, escape and delete.
 
     Parameters
     ----------
     text : str
         Text from a page.
     keep : str
-        Control characters that stay, such as line breaks in pasted text.
+        Control characters to keep, such as line breaks in pasted text.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def strip_controls(text: str, keep: str = "") -> str:
 
 
 def _strip_lines(text: str) -> str:
-    """Remove control characters except line breaks, which become line feeds, and tabs."""
+    """Remove control characters except tabs and line breaks; all line breaks become line feeds."""
     return strip_controls(text.replace("\r\n", "\n").replace("\r", "\n"), keep="\n\t")
 
 
@@ -89,7 +89,7 @@ class WheelTurned(_PointerMessage):
 
 
 class KeyChanged(_HeldMessage):
-    """A key is pressed or released; `key` is its name in browsers, empty for control characters."""
+    """A key is pressed or released; `key` is its name in browsers, empty if it was a control character."""
 
     kind: Literal["key"]
     key: Annotated[str, Field(min_length=1, max_length=20), _Line]
@@ -97,7 +97,7 @@ class KeyChanged(_HeldMessage):
 
 
 class TextTyped(_Message):
-    """Text is typed without keys: on a phone, or composed of several keys."""
+    """Text is entered other than by single keys: on a phone, or with an input method."""
 
     kind: Literal["text"]
     text: Annotated[str, Field(max_length=1000), _Lines]
@@ -118,7 +118,7 @@ class Left(_Message):
 
 
 class PageChanged(_Message):
-    """The page has another size, in device pixels, pixel ratio (to those of CSS), or color scheme."""
+    """The page reports its size in device pixels, device pixels per CSS pixel, and its color scheme."""
 
     kind: Literal["page"]
     width: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
@@ -128,7 +128,7 @@ class PageChanged(_Message):
 
 
 class FrameShown(_Message):
-    """A frame has arrived."""
+    """The page has shown a frame."""
 
     kind: Literal["shown"]
     number: int = Field(ge=0, lt=2**32)
@@ -157,7 +157,7 @@ class UploadStarted(_Message):
 
 
 class Uploaded(_Message):
-    """A file was saved in the folder and is to be opened."""
+    """An uploaded file was saved on the server and should be opened in the window."""
 
     kind: Literal["uploaded"] = "uploaded"
     path: str
@@ -180,25 +180,25 @@ _KEYS = {
     "Alt": pygame.K_LALT,
     "Meta": pygame.K_LMETA,
 }
-"""Keys of pygame by their names in browsers."""
-# pygame names keys by their characters without Shift, browsers by the characters that they write.
+"""pygame's key codes by the names of keys in browsers."""
+# pygame identifies a key by its character without Shift, browsers by the character it produces (US layout).
 _UNSHIFTED = str.maketrans('!@#$%^&*()_+{}|:"<>?~', "1234567890-=[]\\;',./`")
 _CHARACTER_KEYS = {"\n": "Enter", "\t": "Tab"}
-"""The on-screen keyboard of a phone writes these characters instead of pressing keys."""
+"""Keys for characters that the on-screen keyboard of a phone sends as text instead of key presses."""
 _SHIFT = 0b0001
 _CTRL = 0b0010
 _CTRL_OR_META = 0b1010
 _MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KMOD_LMETA)
-"""Modifiers of pygame by the bits of `held`."""
+"""pygame's modifiers, in the order of the bits of `held`."""
 
 
 class EventTranslator:
-    """Translates messages of a page to events of pygame; remembers the pointer and its button.
+    """Translates messages from a page to pygame events; keeps track of the pointer and the pressed button.
 
     Parameters
     ----------
     clipboard : Clipboard
-        Clipboard on which a text is put that the page pastes.
+        Clipboard that receives text pasted in the page.
     """
 
     def __init__(self, clipboard: Clipboard) -> None:
@@ -207,7 +207,7 @@ class EventTranslator:
         self._pressed_button = 0
 
     def translate(self, message: InputMessage | Uploaded) -> Iterator[Event]:
-        """Yield the events of pygame that correspond to a message."""
+        """Yield the pygame events that correspond to a message."""
         match message:
             case PointerMoved():
                 yield self._move(message.x, message.y, message.button)
@@ -253,7 +253,7 @@ class EventTranslator:
             yield Event(pygame.WINDOWLEAVE)
             return
         if self._pressed_button:
-            # The page will not notice when the button is released.
+            # Without the focus, the page will not notice when the button is released.
             yield Event(pygame.MOUSEBUTTONUP, pos=self._position, button=self._pressed_button, touch=False)
             self._pressed_button = 0
         yield Event(pygame.WINDOWFOCUSLOST)
@@ -271,23 +271,24 @@ class EventTranslator:
 
 
 def get_modifiers(held: int) -> int:
-    """Return the modifiers of pygame for those that a page reports as held."""
+    """Return pygame's modifier mask for the bits in `held` of a message."""
     return sum(modifier for bit, modifier in enumerate(_MODIFIERS) if held >> bit & 1)
 
 
 def _press_key(name: str, held: int = 0) -> Iterator[Event]:
-    """Yield the events of a key that is pressed and released."""
+    """Yield the events of a key press and its release."""
     yield from _translate_key(KeyChanged(kind="key", key=name, down=True, held=held))
     yield from _translate_key(KeyChanged(kind="key", key=name, down=False, held=held))
 
 
 def _translate_key(message: KeyChanged) -> Iterator[Event]:
+    """Yield the key event of a message, and for a character without Ctrl or Meta the text event."""
     name = message.key
     if not name:
         return
     is_character = len(name) == 1
     if name not in _KEYS and not is_character:
-        return  # A key without a meaning in the window.
+        return  # A key that the window does not use.
     text = name if is_character and not message.held & _CTRL_OR_META else ""
     yield Event(
         pygame.KEYDOWN if message.down else pygame.KEYUP,
@@ -301,7 +302,7 @@ def _translate_key(message: KeyChanged) -> Iterator[Event]:
 
 
 def _get_key_code(name: str, held: int) -> int:
-    """Return the key of pygame with a name in browsers; 0 for a character without a key."""
+    """Return pygame's code of a key with a given name in browsers; 0 for a character without a key."""
     if name in _KEYS:
         return int(_KEYS[name])
     character = name.lower()

@@ -1,4 +1,4 @@
-"""Files that are uploaded to a served window and downloaded from it, all in its folder."""
+"""Uploads to and downloads from a served window; all files are in its folder."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_OFFERED = 20
 
 
 class TransferError(RobocovError):
-    """A file cannot be uploaded or downloaded; the message is for the page."""
+    """A file cannot be uploaded or downloaded; the message is shown in the page."""
 
 
 def prepare_folder(folder: Path) -> None:
@@ -35,7 +35,7 @@ def prepare_folder(folder: Path) -> None:
     Raises
     ------
     InputError
-        If it is not a folder, or cannot be created or written to.
+        If the path is not a folder, or the folder cannot be created or written to.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -59,7 +59,7 @@ class Upload:
     size : int
         Its size in bytes.
     is_refused : bool
-        Whether its pieces are discarded on arrival; the page may have sent them already.
+        Whether the file is rejected. Its pieces are discarded, since the page may already have sent them.
     """
 
     def __init__(self, name: str, size: int, *, is_refused: bool) -> None:
@@ -74,7 +74,7 @@ class Upload:
         return self._remaining == 0
 
     def add(self, piece: bytes) -> None:
-        """Add the next piece; raise `ValueError` if the file becomes larger than announced."""
+        """Add the next piece; raise `ValueError` if the file exceeds the announced size."""
         if len(piece) > self._remaining:
             raise ValueError(f"{self.name}: larger than announced")
         self._remaining -= len(piece)
@@ -82,7 +82,7 @@ class Upload:
             self._pieces.append(piece)
 
     def save(self, folder: Path) -> Path:
-        """Write the file under a name that is not in use, and return its path; raise `TransferError`."""
+        """Write the file under an unused name, and return its path; raise `TransferError` on failure."""
         path = folder / self.name
         try:
             if path.exists():
@@ -116,7 +116,7 @@ def check_name(name: str) -> None:
 def list_saved(
     folder: Path, since: float, uploads: Mapping[str, float] = MappingProxyType({})
 ) -> tuple[str, ...]:
-    """Return the names of the files and folders that windows saved since a time, the newest first.
+    """Return the names of files and folders saved in a folder since a given time, newest first.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def list_saved(
     since : float
         The time, s since the epoch.
     uploads : mapping of str to float
-        Times at which uploaded files were written, by their names. They are left out until they are saved.
+        Modification time of each uploaded file by its name. Uploads are omitted unless they were saved again.
     """
     try:
         offered = [path for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES) if _is_offered(path)]
@@ -145,12 +145,12 @@ def _is_offered(path: Path) -> bool:
 
 
 def read_saved(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of a file, or of a folder as a zip, for a download.
+    """Return the name and the content of a download: a file, or a folder as a zip archive.
 
     Raises
     ------
     TransferError
-        If it cannot be read, or is too large.
+        If it cannot be read, or is larger than `MAX_DOWNLOAD_BYTES`.
     """
     try:
         if path.is_dir():

@@ -13,14 +13,14 @@ from robocov_app.web.pages import Page, Pages
 SERVED_FPS = 60
 """Frames per second of a served window while something moves."""
 MAX_INDIVIDUAL_PAGES = 3
-"""Number of pages besides the controlling one up to which each gets every frame that it can show."""
+"""With at most this many other pages, each gets every frame that it can show."""
 SHARED_FRAME_INTERVAL_S = 1 / 15
-"""Time between two frames for more pages than that. They get the same frames, which are encoded once."""
+"""Time between frames if there are more pages. They share frames, each of which is encoded once."""
 _MIN_TIMEOUT_S = 0.001
 
 
 class FrameDelivery:
-    """Encodes frames for pages, in turn for the controlling page and the others.
+    """Encodes and queues frames; the controlling page and the other pages take turns.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class FrameDelivery:
     Attributes
     ----------
     newest : Frame or None
-        The newest frame of the window, which the window's thread sets.
+        The newest frame of the window; set by the window's thread.
     has_work : asyncio.Event
-        Set when there is a newer frame, or when a page has come, gone, or shown a frame.
+        Set when there is a newer frame, or when a page has connected, disconnected, or shown a frame.
     bases : BaseFrames
-        Frames that pages show, with which newer ones are compared.
+        Frames that pages show now; only the differences of newer frames from them are sent.
     """
 
     def __init__(self, pages: Pages) -> None:
@@ -62,10 +62,10 @@ class FrameDelivery:
         self._encoder.shutdown(wait=False, cancel_futures=True)
 
     def _choose(self) -> tuple[Page | None, Frame | None]:
-        """Return the page that gets the next frame, and that frame; None if no page is ready.
+        """Return the page that gets the next frame, and that frame; (None, None) if no page is ready.
 
-        The controlling page and the others take turns. Among the others, the page with the oldest frame is
-        the first.
+        The controlling page and the others take turns. Among the others, the page that shows the oldest frame
+        comes first.
         """
         controlling = self._pages.controlling
         controlling_is_ready = controlling is not None and controlling.is_ready_for(self.newest)
@@ -81,7 +81,7 @@ class FrameDelivery:
         return None, None
 
     def _update_shared_frame(self, page_count: int) -> None:
-        """Choose the frame for the pages that do not control."""
+        """Update the frame for the other pages; with many of them, only every `SHARED_FRAME_INTERVAL_S`."""
         if page_count > MAX_INDIVIDUAL_PAGES and monotonic() < self._next_shared_time:
             return
         if self.newest is not self._shared_frame:
@@ -89,7 +89,7 @@ class FrameDelivery:
         self._shared_frame = self.newest
 
     async def _deliver(self, page: Page, frame: Frame) -> None:
-        """Encode a frame for a page, and queue it for all pages that show the same frame as that one."""
+        """Encode a frame for a page, and queue it for all pages that now show the same frame as that page."""
         base_number = page.base_number
         base = self.bases.get(base_number)
         loop = asyncio.get_running_loop()

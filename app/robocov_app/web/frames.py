@@ -1,4 +1,4 @@
-"""Frames of a window, and their differences, which are sent to pages."""
+"""Frames of a window, and their encoding as differences from earlier frames."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     import pygame
 
 HEADER = struct.Struct("<I7H")
-"""Number, width, height; left, top, width and height of the changed box; 1 if the frame starts from black."""
+"""Frame number, width, height; left, top, width, height of the changed box; 1 if based on a black frame."""
 MAX_BASES_BYTES = 1 << 27
-"""Memory of the frames that are kept because a page shows them."""
+"""Maximum memory of the frames that are kept because a page shows them."""
 _COMPRESSION_LEVEL = 1
-"""The fastest one, as most of a difference is zeros."""
+"""The fastest level, which suffices because most of a difference is zeros."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Frame:
     Attributes
     ----------
     number : int
-        Increases from frame to frame, starting at 1.
+        Number of the frame, counted from 1.
     pixels : (height, width) array of uint32
         Colors as 0xRRGGBB.
     """
@@ -43,28 +43,28 @@ class Frame:
         height = surface.get_height()
         columns = surface.get_pitch() // 4
         buffer: Any = surface.get_buffer()
+        # Rows of a surface may be padded, and the highest byte of a pixel is unused.
         view = np.frombuffer(buffer, np.uint32).reshape(height, columns)
         return cls(number, view[:, : surface.get_width()] & np.uint32(0xFFFFFF))
 
 
 def encode_frame(frame: Frame, base: Frame | None) -> bytes:
-    """Encode a frame for a browser that shows another one.
+    """Encode a frame as the difference from the one that a browser shows now.
 
-    The pixels of the smallest box around all changes are combined with the previous ones by xor: unchanged
-    pixels become 0, which deflate compresses to almost nothing. Text stays as sharp as in the window, and
-    this is several times faster than PNG.
+    The pixels in the smallest box around all changes are XORed with the previous ones: unchanged pixels
+    become 0, which deflate compresses to almost nothing. This is lossless and several times faster than PNG.
 
     Parameters
     ----------
     frame : Frame
         The frame to show.
     base : Frame or None
-        The frame that the browser shows now; None, or one of another size, to start from black.
+        The frame that the browser shows now. If it is None or of another size, the difference is from black.
 
     Returns
     -------
     bytes
-        `HEADER`, and the deflated pixels.
+        The header (see `HEADER`) and the compressed pixels of the changed box.
     """
     pixels = frame.pixels
     height, width = pixels.shape
@@ -87,7 +87,7 @@ def encode_frame(frame: Frame, base: Frame | None) -> bytes:
 class BaseFrames:
     """The frames that pages show, within a limit on their memory.
 
-    A page whose frame was dropped gets the next one from black.
+    For a page whose frame was dropped, the next frame is encoded from black.
     """
 
     def __init__(self, max_bytes: int = MAX_BASES_BYTES) -> None:
@@ -103,7 +103,7 @@ class BaseFrames:
         return sum(frame.pixels.nbytes for frame in self._frames.values())
 
     def add(self, frame: Frame) -> None:
-        """Keep a frame that is sent to a page; drop the oldest ones if they need too much memory."""
+        """Store a frame that is sent to a page; drop the oldest ones if they exceed the memory limit."""
         self._frames[frame.number] = frame
         while self.n_bytes > self._max_bytes and len(self._frames) > 1:
             self._frames.popitem(last=False)

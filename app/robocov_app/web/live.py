@@ -1,4 +1,4 @@
-"""A served window in a cell of a notebook: a separate process, and a frame that shows it."""
+"""A served window in a notebook cell: a separate process, and an iframe that shows it."""
 
 import os
 import re
@@ -19,16 +19,16 @@ _END_TIMEOUT_S = 5.0
 
 
 class LiveWindow:
-    """The interactive window in the notebook cell that shows it, until `close` or the end of the kernel.
+    """An interactive window in a notebook cell; it runs until `close` is called or the kernel ends.
 
-    JupyterHub needs jupyter-server-proxy.
+    On JupyterHub, jupyter-server-proxy must be installed.
 
     Parameters
     ----------
     arguments : sequence of str
-        Arguments of ``robocov``, the command first.
+        Arguments of ``robocov``, starting with the command.
     height : int
-        Height of the frame in the cell, CSS pixels.
+        Height of the iframe in the cell, CSS pixels.
 
     Attributes
     ----------
@@ -48,10 +48,11 @@ class LiveWindow:
     link: str
 
     def __init__(self, arguments: Sequence[str], height: int = 620) -> None:
+        """Start the window's process, and wait until it prints the link."""
         import_optional("websockets", "web")
         self.height = height
         command = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
-        # Running the cell again rebuilds the window, so that drafts are not needed.
+        # Running the cell again creates the window anew, so drafts are not needed.
         environment = {**os.environ, DRAFTS: ""}
         # Errors go to a file: a full pipe that nobody reads would stop the process.
         with tempfile.TemporaryFile() as errors:
@@ -85,7 +86,7 @@ class LiveWindow:
 
 
 def _end_process(process: subprocess.Popen[str]) -> None:
-    """End a process, and close its streams."""
+    """Terminate a process, kill it if that takes too long, and close its streams."""
     with process:
         process.terminate()
         try:

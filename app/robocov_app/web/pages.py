@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from robocov_app.web.frames import Frame
 
 MAX_VIEWERS = 100
-"""Maximum number of pages with the link for watching."""
+"""Maximum number of pages opened with the watch link."""
 MAX_TEACHERS = 16
-"""Maximum number of pages with the link for controlling. If one more is opened, the oldest is closed."""
+"""Maximum number of pages opened with the control link. If one more is opened, the oldest is closed."""
 MAX_NOTICES = 8
-"""Maximum number of messages that wait for a page."""
+"""Maximum number of notices waiting to be sent to a page."""
 MAX_FRAMES_IN_FLIGHT = 2
-"""Maximum number of frames that were sent to a page but not shown yet."""
+"""Maximum number of frames that were sent to a page but that it has not shown yet."""
 
 
 class NoPlaceError(RobocovError):
-    """All places for pages are taken; the message is for the page."""
+    """There is no place for another page; the message is shown in the page."""
 
 
 @dataclass(eq=False)
@@ -39,28 +39,29 @@ class Page:
     ----------
     connection : ServerConnection
     number : int
-        Number of the page, by which other pages name it.
+        Number of the page, by which messages refer to it.
     is_teacher : bool
-        Whether it was opened with the link for controlling, and may take control at any time.
+        Whether it was opened with the control link, so that it may take control at any time.
     name : str
         Name that other pages show.
     page_id : str
-        Identity that the page keeps when its connection breaks.
+        Identity of the page, which it keeps when it reconnects.
     requests_control : bool
+        Whether its user has asked for control.
     settings : PageChanged or None
         Its size and color scheme, once it has reported them.
     upload : Upload or None
         The file that it is sending.
     base_number : int
-        Number of the frame that it shows, or will show when all frames on their way have arrived; 0 for none.
+        Number of the newest frame that was queued for it, on which the next one is based; 0 for none.
     in_flight : deque of int
-        Numbers of the frames on their way to it.
+        Numbers of the frames that were queued or sent but not shown yet, modulo 2**32.
     outbox : deque of bytes
-        Encoded frames to be sent.
+        Encoded frames waiting to be sent.
     notices : deque of str
-        Messages to be sent.
+        Messages to the user waiting to be sent.
     sent_state : dict
-        State of the window that it was sent last.
+        State of the window that was last sent to it.
     has_news : asyncio.Event
         Set when there is something to send.
     """
@@ -81,7 +82,7 @@ class Page:
     has_news: asyncio.Event = field(default_factory=asyncio.Event)
 
     def is_ready_for(self, frame: Frame | None) -> bool:
-        """Return whether a frame is newer than the one that the page has, and can be sent."""
+        """Return whether a frame is newer than the page's frame, and not too many frames are on their way."""
         if frame is None or len(self.in_flight) >= MAX_FRAMES_IN_FLIGHT:
             return False
         return self.base_number < frame.number
@@ -94,7 +95,7 @@ class Page:
         self.has_news.set()
 
     def confirm_frame(self, number: int) -> None:
-        """Remove a frame that the page has shown, and all earlier ones, from those on their way."""
+        """Remove a frame that the page has shown, and all earlier ones, from `in_flight`."""
         while self.in_flight and self.in_flight.popleft() != number:
             pass
 
@@ -105,19 +106,19 @@ class Page:
 
 
 class Pages:
-    """The pages that show a window. One of them controls it: the first teacher, until control is passed on.
+    """The pages that show a window. One page at a time controls it; at first, the first teacher's.
 
     Parameters
     ----------
     on_control_change : callable
-        Called with the page that had control and the one that has it now; either may be None.
+        Called with the previously controlling page and the new one; either may be None.
 
     Attributes
     ----------
     controlling : Page or None
         The page that controls the window.
     people : list of dict
-        Number, name and role of each page, as pages show them.
+        Number, name, and control state of each page, for the list in the pages.
     """
 
     def __init__(self, on_control_change: Callable[[Page | None, Page | None], None]) -> None:
@@ -135,14 +136,14 @@ class Pages:
     def open(self, connection: ServerConnection, *, is_teacher: bool, page_id: str) -> Page:
         """Add the page of a new connection.
 
-        If the page has connected before, and that connection broke unnoticed, it keeps its number, name and
-        role.
+        If the same page is still listed because its earlier connection broke unnoticed, it keeps its number,
+        name and role.
 
         Parameters
         ----------
         connection : ServerConnection
         is_teacher : bool
-            Whether it was opened with the link for controlling.
+            Whether it was opened with the control link.
         page_id : str
             Identity of the page; empty if it has none.
 
@@ -168,13 +169,13 @@ class Pages:
         return page
 
     def close(self, page: Page) -> None:
-        """Remove a page whose connection has ended; another teacher gets control if it had it."""
+        """Remove a page whose connection has ended; if it had control, a teacher gets it."""
         if page in self._pages:
             self._pages.remove(page)
         self.give_control(self.controlling)
 
     def remove_surplus_teacher(self) -> Page | None:
-        """Remove the oldest page of a teacher if there are too many. The controlling page stays.
+        """If there are too many teacher pages, remove the oldest one that is not in control.
 
         Returns
         -------
@@ -196,19 +197,19 @@ class Pages:
         self._update_people()
 
     def toggle_request(self, page: Page) -> None:
-        """Let a page request control, or withdraw its request."""
+        """Record that a page requests control, or withdraws its request."""
         page.requests_control = not page.requests_control and page is not self.controlling
         self._update_people()
 
     def pass_control(self, page: Page, number: int) -> None:
-        """Give control to the page with a number, if the page that requests it is allowed to."""
+        """Give control to the page with a number, if `page`, which asks for this, is allowed to."""
         if page is not self.controlling and not page.is_teacher:
             return
         receivers = (other for other in self._pages if other.number == number)
         self.give_control(next(receivers, self.controlling))
 
     def give_control(self, page: Page | None) -> None:
-        """Let a page control the window; the first teacher if that page is gone."""
+        """Let a page control the window; if it is None or gone, the first teacher's page."""
         if page not in self._pages:
             page = next((other for other in self._pages if other.is_teacher), None)
         if page is not self.controlling:
@@ -220,7 +221,7 @@ class Pages:
         self._update_people()
 
     def wake(self) -> None:
-        """Let all pages receive the changes."""
+        """Wake the senders of all pages, so that they send what has changed."""
         for page in self._pages:
             page.has_news.set()
 
@@ -231,7 +232,7 @@ class Pages:
         return None
 
     def _find_free_number(self) -> int:
-        """Return the lowest number that no page has, so that a page keeps its number when it is reloaded."""
+        """Return the lowest unused number, so that a page usually keeps its number when it is reloaded."""
         used = {page.number for page in self._pages}
         number = 1
         while number in used:
@@ -242,7 +243,7 @@ class Pages:
         return sum(not page.is_teacher for page in self._pages)
 
     def _replace(self, earlier: Page, page: Page) -> None:
-        """Let a page take the place of its earlier connection."""
+        """Let a page inherit number, name and control from its earlier connection, and abort that."""
         page.number = earlier.number
         page.name = earlier.name
         page.requests_control = earlier.requests_control
@@ -253,6 +254,7 @@ class Pages:
         earlier.connection.transport.abort()
 
     def _update_people(self) -> None:
+        """Rebuild `people`, and wake the senders of all pages."""
         self.people = [
             {
                 "number": page.number,

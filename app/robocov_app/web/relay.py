@@ -1,4 +1,4 @@
-"""Messages between a visitor's page and the server of the visitor's window, copied both ways."""
+"""Relay of messages between a visitor's page and the server of the visitor's window."""
 
 from __future__ import annotations
 
@@ -47,12 +47,13 @@ async def relay_messages(connection: ServerConnection, window: WindowProcess, pa
             max_queue=MAX_QUEUED_FRAMES,
             write_limit=WRITE_LIMIT_BYTES,
             compression=None,
-            ping_interval=None,  # The process ends with its socket.
+            ping_interval=None,  # If the process ends, its socket closes, too.
             proxy=None,
         ) as socket:
             await _copy_both_ways(connection, socket)
             code = socket.close_code
             reason = socket.close_reason or reason
+    # Only a window that its user has closed, or a code that the page interprets, is passed on as it is.
     if code is None or (code < NOT_UNDERSTOOD and code != WINDOW_CLOSED):
         code = WINDOW_ENDED
     await connection.close(code, reason)
@@ -72,7 +73,7 @@ async def _copy_both_ways(first: Connection, second: Connection) -> None:
 
 
 async def _copy_messages(source: Connection, target: Connection) -> None:
-    """Copy messages one way until either end is closed; a slow target holds up the source."""
+    """Copy messages one way until either end is closed. A slow target slows down the source."""
     from websockets.exceptions import ConnectionClosed
 
     with suppress(ConnectionClosed):

@@ -1,7 +1,8 @@
-"""The server of a window: one page, its frames and the input of its users, behind a token.
+"""The server of a window: it serves the page, sends frames and receives input; a token grants access.
 
-The window's loop stays in the main thread; it knows a `Remote` and nothing about browsers. The server has a
-thread of its own. (The ``http`` backend of rendercanvas lacks tokens, origins, control, text and clipboard.)
+The main loop of the window stays in the main thread and only uses the `Remote` interface; the server runs in
+a thread of its own. (The ``http`` backend of rendercanvas lacks tokens, origin checks, passing of control,
+text input and the clipboard.)
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from robocov_app.toolkit.window.window import BaseWindow
 
 MAX_COPIED_CHARACTERS = 100_000
-"""Maximum length of the text in the clipboard that the controlling page gets."""
+"""Maximum length of copied text that is sent to the controlling page."""
 SAVED_FILES_INTERVAL_S = 1.0
 """Time between two searches for new files."""
 _STOP_TIMEOUT_S = 5.0
@@ -71,8 +72,8 @@ _CSS_CURSORS = {
 class WebDisplay:
     """A `Remote` that shows a window in browsers.
 
-    Whoever has `link` may take control of the window. Whoever has `watch_link` sees it, and controls it once
-    control is passed to them. One page at a time controls the window.
+    Users with `link` may take control of the window. Users with `watch_link` see the window, and control it
+    only if control is passed to them. One page at a time controls the window.
 
     Parameters
     ----------
@@ -86,13 +87,13 @@ class WebDisplay:
     Attributes
     ----------
     link, watch_link : str
-        Addresses of the page, while the server runs.
+        Addresses of the page for controlling and for watching, set while the server runs.
     fps : int
         Frames per second of the window while something moves.
     shared : SharedWindow
-        What all pages have in common.
+        What all pages share.
     clipboard : Clipboard
-        Text that the controlling page pastes, and that was copied in the window.
+        Text copied in the window, or pasted in the controlling page.
     saved_files : tuple of str
         Names of the files that pages may download.
     """
@@ -102,11 +103,12 @@ class WebDisplay:
     fps = SERVED_FPS
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path()) -> None:
+        """Prepare the server; it starts when the context is entered."""
         self.host = host
         self.port = port
         self.token = secrets.token_urlsafe(_TOKEN_BYTES)
         self.watch_token = secrets.token_urlsafe(_TOKEN_BYTES)
-        # Browsers share cookies among all ports of a machine.
+        # Browsers share cookies among all ports of a host, so each server needs a cookie name of its own.
         token_hash = sha256(self.token.encode()).hexdigest()
         self._cookie_name = f"robocov-{token_hash[:_COOKIE_HASH_CHARACTERS]}"
         self._file_executor = ThreadPoolExecutor(1, thread_name_prefix="web-files")
@@ -145,15 +147,15 @@ class WebDisplay:
         self._thread.join(_STOP_TIMEOUT_S)
 
     def wait(self, seconds: float) -> None:
-        """Wait until a page sends something, or for some seconds."""
+        """Wait until a page sends input, at most for the given time."""
         self.shared.window_input.wait(seconds)
 
     def receive(self, window: BaseWindow) -> None:
-        """Fit the window to the controlling page, and post the input of that page."""
+        """Fit the window to the controlling page, and post that page's input as events."""
         self.shared.window_input.post(window)
 
     def send(self, surface: pygame.Surface, cursor: int = pygame.SYSTEM_CURSOR_ARROW) -> None:
-        """Send the content of the window to the pages, if it has changed."""
+        """Send the frame and the state of the window to the pages, if they have changed."""
         delivery = self.shared.delivery
         previous = delivery.newest
         number = 1 if previous is None else previous.number + 1
@@ -216,7 +218,7 @@ class WebDisplay:
             return respond(connection, HTTPStatus.NOT_FOUND, "This page does not exist.\n")
         link_token = get_token(request.path)
         has_link = self._is_known(link_token)
-        # A teacher who opens the link for watching keeps the right to control.
+        # A teacher who opens the watch link keeps the right to control.
         keeps_cookie = are_equal(self._read_cookie(request), self.token)
         cookie = ""
         if has_link and not keeps_cookie:
@@ -258,17 +260,17 @@ class WebDisplay:
         if surplus is not None:
             text = "This window was opened in too many other pages."
             self._start_in_background(surplus.connection.close(REPLACED, text))
-        # The page has no frame yet.
+        # The page has no frame yet, so the delivery must send it one.
         self.shared.delivery.has_work.set()
         try:
             await Conversation(page, self.shared).run()
         finally:
             pages.close(page)
-            # Its last frame is no longer needed.
+            # The delivery can drop the page's base frame.
             self.shared.delivery.has_work.set()
 
     def _handle_control_change(self, previous: Page | None, page: Page | None) -> None:
-        """Fit the window to the page that has control now, and release the keys held by the previous one."""
+        """Fit the window to the new controlling page, and release the keys held in the previous one."""
         if page is not None:
             self.shared.window_input.set_page(page.settings)
         if previous is not None:

@@ -1,4 +1,4 @@
-"""A server that opens a window for each visitor, all behind one port."""
+"""A server that opens a separate window for each visitor, all at one port."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ if TYPE_CHECKING:
 MAX_OPENING = 4
 """Maximum number of windows that open at the same time."""
 MIN_IDLE_S = 60.0
-"""Time without a page after which a window may be ended because another visitor waits."""
+"""Time without a page after which a window may be ended to make room for another visitor."""
 CHECK_INTERVAL_S = 1.0
-"""Time between two searches for windows that have ended, or have been idle for too long."""
+"""Interval at which windows that have ended or have been idle for too long are removed."""
 MAX_REASON_BYTES = 120
-"""Maximum length of the reason with which a socket is closed; its frame has room for 123 bytes."""
+"""Maximum length of the reason for closing a socket; WebSocket allows 123 bytes."""
 _TOKEN_BYTES = 18
 _NOT_FOUND = "This page does not exist.\n"
 
 
 @dataclass(eq=False)
 class VisitorWindow:
-    """The window of a visitor, or one that is being opened.
+    """The window of a visitor, which may still be opening.
 
     Attributes
     ----------
@@ -69,7 +69,8 @@ class VisitorWindow:
     ending : asyncio.Task or None
         The task that ends it.
     has_closed : bool
-        Whether its user has closed it. Its process then takes some seconds to end, but no place any more.
+        Whether its user has closed it. It no longer counts as open, although its process takes some seconds
+        to end.
     """
 
     opening: asyncio.Task[WindowProcess]
@@ -80,7 +81,7 @@ class VisitorWindow:
 
     @property
     def process(self) -> WindowProcess | None:
-        """Its process, once it is open."""
+        """The process of the window; None until it is open, or if opening failed."""
         if self.opening.done() and not self.opening.cancelled() and self.opening.exception() is None:
             return self.opening.result()
         return None
@@ -102,9 +103,9 @@ class VisitorWindow:
 class VisitorServer:
     """Opens a window for each visitor who follows the link, and relays the messages of its pages.
 
-    A visitor gets a cookie with the page, and a window when that page opens a socket; link previews and
-    programs that fetch a page do not open one. Returning visitors find their window. If it has ended, they
-    get a new one with their folder, which offers their draft.
+    A visitor gets a cookie with the page, and a window only when that page opens a socket, which link
+    previews and programs that merely fetch the page do not do. Returning visitors get their window back. If
+    it has ended, they get a new one with their old folder, which offers to recover their draft.
 
     Parameters
     ----------
@@ -119,6 +120,7 @@ class VisitorServer:
     """
 
     def __init__(self, command: WindowCommand, options: Any, max_windows: int, max_idle_s: float) -> None:
+        """Prepare the server; `serve` starts it."""
         self.token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._command = command
         self._options = options
@@ -126,7 +128,7 @@ class VisitorServer:
         self._max_idle_s = max_idle_s
         self._folders = VisitorFolders(options.folder)
         self._windows: dict[str, VisitorWindow] = {}  # by the visitor's identity
-        self._spare: WindowProcess | None = None  # open already, for the first new visitor
+        self._spare: WindowProcess | None = None  # already open, for the next new visitor
         self._processes: list[SpawnProcess] = []
         self._is_ending = False
         self._admission = asyncio.Lock()
@@ -150,7 +152,7 @@ class VisitorServer:
         port = await listener.listen(host, self._options.port)
         _cancel_on_signals()
         try:
-            # An error in the options is reported at once, not to the first visitor.
+            # Open the first window now, so that errors in the options are reported at once.
             self._spare = await self._open(self._folders.create())
             print_line(f"open {build_link(host, port, self.token)}")
             while True:
@@ -200,7 +202,7 @@ class VisitorServer:
         return respond_with_page(connection, may_be_framed=has_link, cookie=cookie)
 
     def _admit(self, connection: ServerConnection, cookie_token: str) -> Response:
-        """Redirect a browser with the common link to a visitor's own link. This starts no window yet."""
+        """Redirect a browser that opens the common link to the visitor's own link; open no window yet."""
         visitor = read_id(cookie_token)
         if not (is_signed(cookie_token, self.token) or self._folders.find(visitor)):
             visitor = create_id()
@@ -236,7 +238,7 @@ class VisitorServer:
     # Sockets.
 
     async def _talk(self, connection: ServerConnection) -> None:
-        """Relay messages between a page and its visitor's window, which is opened if there is none."""
+        """Relay messages between a page and its visitor's window; open the window if there is none."""
         request = connection.request
         assert request is not None
         visitor = read_id(self._read_token(request))
@@ -265,7 +267,7 @@ class VisitorServer:
         return f"All {self._max_windows} windows are in use. Trying again …"
 
     async def _find_or_open(self, visitor: str) -> VisitorWindow | None:
-        """Return a visitor's window, which may still be opening; None if all places are taken."""
+        """Return a visitor's window, which may still be opening; None if `max_windows` are in use."""
         async with self._admission:
             window = self._windows.get(visitor)
             if window is not None and window.has_ended:
@@ -276,7 +278,7 @@ class VisitorServer:
             return window
 
     async def _start_opening(self, visitor: str) -> VisitorWindow | None:
-        """Start opening a window for a visitor; return None if all places are taken."""
+        """Start opening a window for a visitor; return None if `max_windows` are in use."""
         folder = self._folders.find(visitor)
         spare = self._spare
         if folder is None and spare is not None and spare.is_alive:
@@ -290,8 +292,8 @@ class VisitorServer:
         return window
 
     async def _assign(self, process: WindowProcess, visitor: str) -> WindowProcess:
-        """Assign the window that is already open to a visitor."""
-        # If the folder cannot be recorded, the next server will not recognize the visitor.
+        """Assign the spare window, which is already open, to a visitor."""
+        # If the folder cannot be recorded, a later server just will not recognize the visitor.
         with suppress(OSError, OutputError):
             self._folders.assign(visitor, process.folder)
         process.opened_at = time()
@@ -309,7 +311,7 @@ class VisitorServer:
         return await self._open(folder)
 
     async def _open(self, folder: Path) -> WindowProcess:
-        """Open a window in a process of its own; raise InputError with its message if it does not open."""
+        """Open a window in a process of its own; raise InputError with its error message if that fails."""
         async with self._openings:
             if self._is_ending:
                 raise InputError("the server is ending")
@@ -320,10 +322,10 @@ class VisitorServer:
     # Places.
 
     async def _make_room(self) -> bool:
-        """Make room for a window; return False if all places are taken.
+        """Make room for another window; return False if `max_windows` are in use.
 
-        If no place is free, the spare window is ended; without one, a window that has already ended is
-        removed, or the one that has been idle for longest is ended.
+        If necessary, the spare window is ended; without one, a window that has already ended is removed, or
+        the one that has been idle longest is ended.
         """
         spare = self._spare
         taken = sum(not window.has_closed for window in self._windows.values())
@@ -343,7 +345,7 @@ class VisitorServer:
         return True
 
     def _choose_window_to_end(self) -> str | None:
-        """Return the visitor whose window can be ended for another one; None if all are in use."""
+        """Return the visitor whose window can be ended to make room; None if all windows are in use."""
         for visitor, window in self._windows.items():
             if window.has_ended and not window.has_closed:
                 return visitor
@@ -363,7 +365,7 @@ class VisitorServer:
                 window.ending = asyncio.create_task(self._end(visitor, window))
 
     async def _end(self, visitor: str, window: VisitorWindow) -> None:
-        """End a visitor's window, which writes a draft, and free its place."""
+        """End a visitor's window, which writes a draft, and remove it."""
         if window.ending is not None and window.ending is not asyncio.current_task():
             await asyncio.shield(window.ending)
         if window.process is not None:
@@ -373,9 +375,9 @@ class VisitorServer:
 
 
 def _cancel_on_signals() -> None:
-    """Let SIGINT and SIGTERM cancel the current task.
+    """Make SIGINT and SIGTERM cancel the current task.
 
-    As a KeyboardInterrupt, Ctrl-C could end any running task instead of this one.
+    By default, Ctrl-C raises KeyboardInterrupt in whatever task is running, not necessarily this one.
     """
     task = asyncio.current_task()
     assert task is not None

@@ -1,4 +1,4 @@
-"""Visitors of a server that opens a window for each: their identities and folders."""
+"""Identities and folders of the visitors of a server that opens a window for each of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ID_CHARACTERS = 24
 
 
 def create_id() -> str:
-    """Create the identity of a visitor, which cannot be guessed."""
+    """Create a random identity for a visitor, which cannot be guessed."""
     return secrets.token_urlsafe(_ID_BYTES)
 
 
@@ -44,15 +44,15 @@ def _compute_signature(visitor: str, key: str) -> str:
 
 
 class VisitorFolders:
-    """The folders of visitors below one folder, including those of earlier servers.
+    """The folders of all visitors in one parent folder, including visitors of earlier servers.
 
-    A file in that folder lists them by hashes of the visitors' identities, so that readers of the file cannot
-    use these identities.
+    A file in the parent folder maps hashes of visitors' identities to their folders, so that someone who
+    reads the file cannot use the identities.
 
     Parameters
     ----------
     folder : Path
-        The folder that has a folder for each visitor.
+        The parent folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,11 +60,11 @@ class VisitorFolders:
         content = self._read()
         cookie = content.get("cookie")
         self.cookie = cookie if _is_cookie_name(cookie) else f"robocov-{secrets.token_hex(6)}"
-        """Name of the cookie of visitors; browsers share cookies among all servers of a machine."""
+        """Name of the visitors' cookie, unique because browsers share cookies among all ports of a host."""
         self._names = _read_names(content)
 
     def find(self, visitor: str) -> Path | None:
-        """Return the folder of a visitor who was here before; None for a new one."""
+        """Return the folder of a returning visitor; None for a new visitor."""
         name = self._names.get(_hash(visitor))
         if name is None or not (self._folder / name).is_dir():
             return None
@@ -83,7 +83,7 @@ class VisitorFolders:
 
     def assign(self, visitor: str, path: Path) -> None:
         """Assign a folder to a visitor; raise `OSError` or `OutputError` if it cannot be recorded."""
-        # Another server may use the same folder.
+        # Another server may have updated the file in the meantime.
         self._names = {**_read_names(self._read()), **self._names, _hash(visitor): path.name}
         content = {"cookie": self.cookie, "visitors": self._names}
         with replace_file(self._folder / FILE_NAME) as part:
@@ -102,7 +102,7 @@ def _hash(visitor: str) -> str:
 
 
 def _read_names(content: dict[str, Any]) -> dict[str, str]:
-    """Return the names of folders by hashes of identities, without invalid names."""
+    """Return the valid folder names in the content of the file, by the hash of the visitor's identity."""
     names = content.get("visitors")
     if not isinstance(names, dict):
         return {}

@@ -1,4 +1,4 @@
-"""Input of the controlling page, which the server's thread passes to the thread of the window."""
+"""Input of the controlling page, passed from the server's thread to the window's thread."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from robocov_app.toolkit.window.window import BaseWindow
 
 MAX_WAITING_MESSAGES = 5000
-"""Beyond this number of messages, the server reads no more of them until the window has caught up."""
+"""If more messages are waiting, the server stops reading until the window has caught up."""
 NARROW_PAGE_PX = 700
-"""Width of a page below which the panel is hidden, in CSS pixels."""
+"""Page width below which the panel is hidden, in CSS pixels."""
 _MIN_WAIT_S = 0.001
 """Lets other threads run even if the window would not wait."""
 
@@ -30,7 +30,7 @@ class WindowInput:
     Parameters
     ----------
     clipboard : Clipboard
-        Clipboard on which a text is put that the page pastes.
+        Clipboard that receives text pasted in the page.
     """
 
     def __init__(self, clipboard: Clipboard) -> None:
@@ -44,7 +44,7 @@ class WindowInput:
 
     @property
     def is_full(self) -> bool:
-        """Whether too many messages wait to read more of them."""
+        """Whether so many messages are waiting that no more should be read."""
         return len(self._messages) > MAX_WAITING_MESSAGES
 
     def put(self, message: InputMessage | Uploaded) -> None:
@@ -53,17 +53,17 @@ class WindowInput:
         self._has_arrived.set()
 
     def set_page(self, page: PageChanged | None) -> None:
-        """Let the window adopt the size and colors of a page; None leaves them as they are."""
+        """Let the window adopt the size and color scheme of a page; None changes nothing."""
         self._page = page or self._page
         self._has_arrived.set()
 
     def wait(self, seconds: float) -> None:
-        """Wait until something arrives, or for some seconds."""
+        """Wait until something arrives, at most for the given time."""
         if self._has_arrived.wait(max(seconds, _MIN_WAIT_S)):
             self._has_arrived.clear()
 
     def post(self, window: BaseWindow) -> None:
-        """Fit the window to the page, and post the messages that have arrived as events of pygame."""
+        """Fit the window to the page, and post the messages that have arrived as pygame events."""
         page = self._page
         if page is not None and page is not self._fitted_page:
             self._fitted_page = page
@@ -73,7 +73,8 @@ class WindowInput:
             held = getattr(self._messages[0], "held", self._held)
             if held != self._held:
                 if has_posted:
-                    # The window first handles the events for which other keys were held.
+                    # pygame has one global state of held modifier keys: the window must first handle the
+                    # events posted so far, and gets the others in the next frame.
                     self._has_arrived.set()
                     return
                 self._held = held
@@ -89,6 +90,7 @@ class WindowInput:
             pygame.display.set_mode(size, pygame.RESIZABLE)
             pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
         theme = "dark" if page.dark else "light"
+        # Show or hide the panel only when a page becomes wide or narrow, so that the user's choice is kept.
         is_narrow = page.width < NARROW_PAGE_PX * page.ratio
         shows_panel: bool | None = None
         if is_narrow != self._is_narrow:

@@ -1,4 +1,4 @@
-"""The window of a visitor, in a process of its own."""
+"""The window of a visitor, which runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from robocov_app.web.access import get_token
 
 OPENING_TIMEOUT_S = 120.0
 ENDING_TIMEOUT_S = 5.0
-"""Time for a process to write a draft before it is killed."""
+"""Time that a process has to write a draft before it is killed."""
 _CHECK_INTERVAL_S = 0.02
 
 WindowCommand = Callable[[Any], int]
@@ -40,13 +40,13 @@ class WindowProcess:
     ----------
     process : SpawnProcess
     folder : Path
-        Folder for the files of its visitor.
+        Folder for the visitor's files.
     port : int
-        Port of its server, at which it listens for this machine only.
+        Port of the process's own server, which accepts local connections only.
     token : str
-        Token of that server.
+        Access token of that server.
     opened_at : float
-        Time at which its visitor got it, s since the epoch.
+        Time at which it was assigned to its visitor, s since the epoch.
     """
 
     process: SpawnProcess
@@ -82,7 +82,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     command : callable
         Command that shows the window.
     options : WindowOptions
-        Options of the command; folder and address are replaced.
+        Options of the command; folder, host and port are replaced.
     folder : Path
         Folder for the files of the visitor.
 
@@ -97,7 +97,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_run_window, args=(command, own_options, sender), daemon=False)
     if os.name == "posix":
-        # Starting this tracker unblocks signals, so it is started before they are blocked.
+        # Starting this tracker unblocks signals, so it must be started before they are blocked.
         resource_tracker.ensure_running()
     block_interrupts()
     process.start()
@@ -107,13 +107,13 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
 
 
 async def wait_until_open(process: SpawnProcess, output: Connection, folder: Path) -> WindowProcess:
-    """Wait until a window is open.
+    """Wait until a window's process has printed the link of its window.
 
     Parameters
     ----------
     process : SpawnProcess
     output : Connection
-        Closed at the end.
+        Standard output of the process; closed afterwards.
     folder : Path
 
     Returns
@@ -137,20 +137,20 @@ async def wait_until_open(process: SpawnProcess, output: Connection, folder: Pat
 
 
 class _PipeOutput(TextIOBase):
-    """Standard output of a window's process, sent to the server, which reads it until the window is open."""
+    """Stream that sends the standard output of a window's process to the server."""
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
 
     def write(self, text: str, /) -> int:
-        """Send a text; it is lost if the server no longer reads."""
+        """Send text; it is lost if the server no longer reads."""
         with suppress(OSError):
             self._pipe.send(text)
         return len(text)
 
 
 def _run_window(command: WindowCommand, options: Any, pipe: Connection) -> None:
-    """Show a window until it is closed or the server's process ends. This is the target of the process."""
+    """Show a window until it is closed or the server's process ends; runs in the window's process."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 
@@ -167,7 +167,7 @@ def _run_window(command: WindowCommand, options: Any, pipe: Connection) -> None:
 
 
 def _receive_line(receiver: Connection) -> str:
-    """Return the first line that a window's process prints."""
+    """Return the first line that a window's process prints, or an error message if there is none."""
     with suppress(EOFError, OSError):
         if receiver.poll(OPENING_TIMEOUT_S):
             return str(receiver.recv())

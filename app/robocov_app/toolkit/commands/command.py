@@ -31,7 +31,7 @@ class Argument:
     parse : callable
         Converts the typed text; raises InputError if it is not valid.
     list_values : callable
-        Lists the texts that can be typed, if there are few.
+        Lists the valid inputs, if there are only a few.
     """
 
     description: str
@@ -52,16 +52,16 @@ class Command:
     group : str
         Heading in the help.
     run : callable
-        Called with the argument, if there is one. If it returns a text, that is shown as message.
+        Called with the argument, if there is one. If it returns a string, that string is shown as a message.
     keys : tuple of str
-        Keys, such as "ctrl+shift+z"; the last part is pygame's name of the key.
+        Key combinations that run it, such as "ctrl+shift+z"; the last part is pygame's name of the key.
     get_disabled_reason : callable
-        Returns why the command cannot be run now; an empty text if it can.
+        Returns why the command cannot be run now; an empty string if it can.
     argument : Argument or None
     repeats : bool
-        Whether it is run again and again while its key is held down.
+        Whether it repeats while its key is held down.
     hidden : bool
-        Whether palette and help leave it out.
+        Whether it is left out of the palette and the help page.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Command:
 
     @property
     def key_text(self) -> str:
-        """The first key as text for users; empty if there is none."""
+        """The first key combination, formatted for users; empty if there is none."""
         return format_key(self.keys[0]) if self.keys else ""
 
     @property
@@ -143,9 +143,9 @@ class CommandGroup:
         name : str
             Unique name.
         title : str
-            Text for users; empty to leave the command out of palette and help.
+            Text for users; if empty, the command is left out of the palette and the help page.
         action : callable
-            Runs the command. A text that it returns is shown as message.
+            Runs the command. If it returns a string, that string is shown as a message.
         *keys : str
             Keys, such as ``ctrl+z``.
         repeats : bool
@@ -153,7 +153,7 @@ class CommandGroup:
         argument : Argument, optional
             Argument that is typed after the name.
         hidden : bool
-            Whether palette and help leave it out.
+            Whether it is left out of the palette and the help page.
         """
         is_hidden = hidden or not title
         command = Command(
@@ -173,9 +173,9 @@ class CommandTable:
     ----------
     commands : iterable of Command
     attempt : callable
-        Calls a function, and shows the text that it returns, or the message of an error that it raises.
+        Calls a function, and shows the string that it returns or the message of the error that it raises.
     list_temporary : callable, optional
-        Lists commands that come and go, such as the gains of the present controller.
+        Lists commands that exist only for a while, such as those for the gains of the current controller.
 
     Attributes
     ----------
@@ -208,7 +208,7 @@ class CommandTable:
         return self._attempt(command.run_now)
 
     def press_key(self, event: pygame.event.Event) -> Command | None:
-        """Return the command of a key that was pressed; None while it is held, unless the command repeats."""
+        """Return the command of a pressed key; None while the key is held, unless the command repeats."""
         command = self._by_key.get(get_key_name(event))
         is_held = event.key in self._held_keys
         self._held_keys.add(event.key)
@@ -217,7 +217,7 @@ class CommandTable:
         return command
 
     def release_key(self, event: pygame.event.Event) -> None:
-        """Note that a key was released."""
+        """Record that a key was released."""
         self._held_keys.discard(event.key)
 
     def reset_keys(self, *held: int) -> None:
@@ -229,19 +229,19 @@ class CommandTable:
         return [*self._list_temporary(), *self.commands]
 
     def find_with_argument(self, name: str) -> Command | None:
-        """Return the command with an argument that has this name; None if there is none."""
+        """Return the command that takes an argument and has this name; None if there is none."""
         return self._list_with_argument().get(name)
 
     def _list_with_argument(self) -> dict[str, Command]:
         return {command.name: command for command in self.list_all() if command.argument is not None}
 
     def run_text(self, text: str) -> object:
-        """Run a command that was typed with its argument.
+        """Run a command that the user typed together with its argument.
 
         Parameters
         ----------
         text : str
-            As in "robots 8".
+            Name and argument, such as "robots 8".
 
         Returns
         -------
@@ -260,7 +260,7 @@ class CommandTable:
         return commands[name].run_now(argument)
 
     def search(self, text: str) -> list[Command]:
-        """Return the commands that match a typed text, without hidden ones."""
+        """Return the commands, except for hidden ones, that match what the user typed."""
         commands = list(self.commands)
         if text.strip():
             commands += self._list_temporary()
@@ -268,7 +268,7 @@ class CommandTable:
 
 
 def split_command(text: str) -> tuple[str, str]:
-    """Split a typed text into the name of a command and its argument, at a blank or an equals sign.
+    """Split typed input into the name of a command and its argument, at a space or an equals sign.
 
     >>> split_command("k_rep = 0.5")
     ('k_rep', '0.5')
@@ -278,7 +278,7 @@ def split_command(text: str) -> tuple[str, str]:
 
 
 def find_commands(commands: Sequence[Command], text: str) -> list[Command]:
-    """Return the commands whose titles or names contain all words of a text, the best matches first."""
+    """Return the commands whose title or name contains all words of a text, best matches first."""
     words = text.lower().split()
     start = text.lower().strip()
 

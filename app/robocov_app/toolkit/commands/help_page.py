@@ -1,4 +1,4 @@
-"""The help page: the keys of all commands."""
+"""The help page, which lists the keys of all commands."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -25,14 +25,14 @@ _HINT_SIZE_PX = 11
 _KEY_WIDTH_PX = 84
 
 _MIN_TEXT_PX = 8
-"""Size of texts in small windows, at any scale."""
+"""Minimum text size, at any scale."""
 _HEADING_ROWS = 2.6
-"""Rows that a heading needs, so that it is never alone at the foot of a column."""
+"""Rows that must be free for a heading, so that it is never the last line of a column."""
 
 
 @dataclass(frozen=True)
 class _Columns:
-    """Columns of rows in the card of the help page, px."""
+    """Layout of the help page: `count` columns of rows inside `box`, in pixels."""
 
     count: int
     row_height: float
@@ -65,17 +65,17 @@ def draw_help_page(
     groups: Sequence[str],
     hint: str,
 ) -> None:
-    """Draw the keys of commands over the window.
+    """Draw the help page with the keys of commands over the window.
 
     Parameters
     ----------
     screen : pygame.Surface
     theme : Theme
     scale : float
-        Size of texts; it becomes smaller in windows in which the page does not fit.
+        Scale of the text. The text is reduced further if the page does not fit into the window.
     commands : sequence of Command
     groups : sequence of str
-        Headings in their order.
+        Names of the command groups, in the order in which they are shown.
     hint : str
         Text next to the title.
     """
@@ -93,7 +93,7 @@ def draw_help_page(
 
 
 def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str | Command]:
-    """List headings, each followed by its commands."""
+    """List the headings, each followed by those of its commands that have a key and are not hidden."""
     lines: list[str | Command] = []
     for group in groups:
         lines.append(group)
@@ -103,11 +103,12 @@ def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str 
 
 
 def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
-    """Choose the number of columns, and the height of rows so that all of them fit."""
+    """Choose the number of columns, and a row height at which `rows` rows fit."""
     width, height = screen.get_size()
     count = 3
     if width >= _WIDE_WINDOW_PX * scale:
         count = 4
+    # One spare row, because a heading may have to move to the next column.
     rows_per_column = math.ceil(rows / count) + 1
     row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_per_column)
     box_width = round(min(width - 24 * scale, _MAX_WIDTH_PX * scale))
@@ -129,13 +130,13 @@ def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> 
 def _place_lines(
     lines: Sequence[str | Command], columns: _Columns
 ) -> Iterator[tuple[str | Command, float, float]]:
-    """Yield each line with its upper left corner, px."""
+    """Yield each line with the x and y coordinates of its upper left corner, px."""
     row_height = columns.row_height
     x = columns.box.left + _MARGIN_PX * columns.scale
     y = columns.top
     for line in lines:
         is_heading = isinstance(line, str)
-        # A heading is not separated from its first command.
+        # A heading must fit together with its first command.
         height = row_height
         if is_heading:
             height = row_height * _HEADING_ROWS

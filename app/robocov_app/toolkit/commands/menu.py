@@ -20,7 +20,7 @@ _KEY_STEPS = {"up": -1, "down": 1}
 
 
 class Menu(Dialog):
-    """Commands to choose from, at a position of the window.
+    """A context menu: commands to choose from, at a given position in the window.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Menu(Dialog):
     rows
         As passed.
     chosen : int
-        Number of the row that the arrow keys have chosen; -1 if there is none.
+        Index of the row highlighted with the arrow keys; -1 if there is none.
     """
 
     margin = 5.0, 5.0
@@ -75,7 +75,7 @@ class Menu(Dialog):
             self._run(command.name)
 
     def handle_key(self, name: str, ui: Ui) -> bool:
-        """Choose a command by the arrow keys, or run it by Enter."""
+        """Highlight a command with the arrow keys, or run it with Enter."""
         numbers = [number for number, row in enumerate(self.rows) if _is_enabled(row)]
         if name in _KEY_STEPS and numbers:
             self._move(_KEY_STEPS[name], numbers)
@@ -84,7 +84,15 @@ class Menu(Dialog):
         return True
 
     def _move(self, step: int, numbers: list[int]) -> None:
-        """Choose the next row of those that can be chosen, or the first or last one."""
+        """Highlight the next enabled row; the first or last one if none is highlighted yet.
+
+        Parameters
+        ----------
+        step : int
+            1 to move down, -1 to move up; the ends are connected.
+        numbers : list of int
+            Indices of the enabled rows.
+        """
         if self.chosen in numbers:
             index = numbers.index(self.chosen) + step
         elif step > 0:

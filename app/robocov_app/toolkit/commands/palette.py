@@ -22,7 +22,7 @@ def create_palette(table: CommandTable, placeholder: str, show_message: Callable
     placeholder : str
         Faint text in the empty field.
     show_message : callable
-        Called with the message of the command, which is empty if it returns none.
+        Called with the message that the command returns; empty if it returns none.
 
     Returns
     -------
@@ -30,6 +30,7 @@ def create_palette(table: CommandTable, placeholder: str, show_message: Callable
     """
 
     def accept(text: str, option: Option | None) -> object:
+        """Run the chosen command or the typed text; return text to type instead if an argument is missing."""
         if option is not None and option.value is None:
             return option.completion
         if option is not None and option.disabled_reason:
@@ -45,7 +46,7 @@ def create_palette(table: CommandTable, placeholder: str, show_message: Callable
 
 
 def list_options(table: CommandTable, text: str) -> list[Option]:
-    """List the lines of the palette for a typed text.
+    """List the palette entries for what the user has typed.
 
     Parameters
     ----------
@@ -68,10 +69,11 @@ def list_options(table: CommandTable, text: str) -> list[Option]:
 def _list_completions(
     table: CommandTable, command: Command, argument: Argument, argument_text: str, text: str
 ) -> list[Option]:
-    """List the values of an argument that match its typed part, and the typed text itself."""
+    """List the values of an argument that match what was typed of it, and the typed text itself."""
     values = list(argument.list_values())
     reason = command.get_disabled_reason()
     start = argument_text.lower()
+    # Values that start with the typed text come before those that only contain it.
     matches = [value for value in values if value.lower().startswith(start)]
     matches += [value for value in values if start in value.lower() and value not in matches]
     options = []

@@ -1,6 +1,6 @@
 """Dialogs over a window: questions with answers, lists that are filtered by typing, files.
 
-- `dialog`, `dialogs`: what all dialogs have in common; the one that is open gets the events
+- `dialog`, `dialogs`: the base class, and the object that passes events to the open dialog
 - `question`, `choice`, `file_choice`, `recovery`: the kinds of dialogs
 """
 

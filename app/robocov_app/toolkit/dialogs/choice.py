@@ -26,13 +26,13 @@ class Option:
     ----------
     text : str
     note : str
-        Faint text at its right end.
+        Faint text at the right end.
     completion : str
-        Text that Tab types; empty for `text`.
+        Text that Tab completes to; if empty, `text` is used.
     disabled_reason : str
         Why it cannot be chosen; empty if it can.
     value : object
-        Data for the function that accepts the line.
+        Data for the function that handles the choice.
     """
 
     text: str
@@ -44,28 +44,29 @@ class Option:
 
 @dataclass
 class Choice(Dialog):
-    """A list that typing narrows down.
+    """A list that is filtered as the user types.
 
     Attributes
     ----------
     title : str
     options : callable
-        Returns the lines for a typed text.
+        Returns the lines that match what the user typed.
     accept : callable
-        Accepts the typed text and the chosen line, which is None if there is none. If it returns a text, that
-        is typed instead. If it raises a RobocovError, the message is shown, and the typed text stays.
+        Called with the typed text and the chosen line, which is None if the list is empty. If it returns a
+        string, that string replaces the typed text and the dialog stays open. If it raises a RobocovError,
+        the message is shown and the typed text is kept.
     placeholder : str
         Faint text in the empty field.
     hint : str
-        Keys, shown below the list.
+        Keys that can be used, shown below the list.
     empty_text : str
         Shown if there are no lines.
     text : str
         Typed text.
     chosen : int
-        Number of the chosen line.
+        Index of the highlighted line.
     top : int
-        Number of the first visible line.
+        Index of the first visible line.
     error : str
         Why the text was not accepted.
     """
@@ -102,6 +103,7 @@ class Choice(Dialog):
         ui.label(count + self.hint, style="unit", align="center")
 
     def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
+        """Show the visible lines of the list, and accept the one that is clicked."""
         ui.row(height=26, below=1)
         if not options:
             ui.label(self.empty_text, style="unit")
@@ -118,11 +120,11 @@ class Choice(Dialog):
                 self._accept(option, ui)
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
-        """Move the box to the upper part of the screen, where it stays while the list grows."""
+        """Move the box to the upper part of the screen; its top edge stays there while the list grows."""
         box.midtop = screen.width // 2, round(_TOP_PX * scale)
 
     def read_widgets(self, ui: Ui) -> None:
-        """Read the typed text, even if more events come within the same frame."""
+        """Read the typed text after each event, because several events may arrive within one frame."""
         if ui.focus == _FIELD and ui.edit is not None and ui.edit.text != self.text:
             self._set_text(ui.edit.text)
 
@@ -148,7 +150,7 @@ class Choice(Dialog):
         ui.edit = TextEdit.append_to(text)
 
     def handle_key(self, name: str, ui: Ui) -> bool:
-        """Choose, complete or accept a line."""
+        """Highlight a line (arrow keys), complete it (Tab) or accept it (Enter)."""
         options = list(self.options(self.text))
         option = options[self.chosen] if self.chosen < len(options) else None
         if name in _KEY_STEPS:
@@ -163,12 +165,12 @@ class Choice(Dialog):
         return True
 
     def handle_wheel(self, notches: float) -> bool:
-        """Choose another line."""
+        """Highlight another line: each notch of the wheel moves by one."""
         self._move(-round(notches))
         return True
 
     def _move(self, step: int) -> None:
-        """Choose another line, and scroll it into view."""
+        """Highlight the line `step` lines below, and scroll it into view."""
         last = max(len(self.options(self.text)) - 1, 0)
         self.chosen = min(max(self.chosen + step, 0), last)
         self.top = min(max(self.top, self.chosen - VISIBLE_OPTIONS + 1), self.chosen)
@@ -177,15 +179,15 @@ class Choice(Dialog):
 def create_list_choice(
     title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object]
 ) -> Choice:
-    """Create a choice among given lines.
+    """Create a dialog that lets the user choose one of several lines.
 
     Parameters
     ----------
     title : str
     options : callable
-        Returns the lines. A typed text selects those that contain all of its words.
+        Returns all lines. Those that contain every typed word are listed.
     accept : callable
-        Accepts the chosen line.
+        Called with the chosen line.
 
     Returns
     -------

@@ -5,7 +5,7 @@ from pygame import Rect
 from robocov_app.toolkit.widgets.ui import Ui
 
 _HEIGHT_FRACTION = 0.42
-"""Fraction of the free height that is above a dialog."""
+"""Fraction of the free height that is left above a dialog."""
 
 
 class Dialog:
@@ -16,13 +16,13 @@ class Dialog:
     width : float
         Width at scale 1, px.
     margin : tuple of float
-        Space at the sides, and above and below, at scale 1, px.
+        Space left and right, and space above and below, at scale 1, px.
     has_veil : bool
-        Whether the rest of the window fades.
+        Whether the rest of the window is dimmed.
     closes_on_outside_click : bool
-        Whether a click next to the dialog cancels it.
+        Whether a click outside the dialog cancels it.
     is_done : bool
-        Whether it has been answered, and closes.
+        Whether it has been answered and is about to close.
     """
 
     width = 560.0
@@ -32,10 +32,10 @@ class Dialog:
     is_done = False
 
     def show_content(self, ui: Ui) -> None:
-        """Show and edit the content."""
+        """Show the widgets of the dialog, and handle their input; called in every run of the page."""
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
-        """Move the box of the dialog to its place on the screen."""
+        """Move the box of the dialog to its position on the screen."""
         top = round((screen.height - box.height) * _HEIGHT_FRACTION)
         box.midtop = screen.width // 2, max(top, 0)
 
@@ -51,11 +51,11 @@ class Dialog:
         return False
 
     def handle_wheel(self, notches: float) -> bool:
-        """Handle the wheel; return whether it was used. If not, the widgets get it."""
+        """Handle the mouse wheel; return whether it was used. If not, the widgets get it."""
         return False
 
     def read_widgets(self, ui: Ui) -> None:
         """Read the widgets after an event."""
 
     def handle_cancel(self) -> None:
-        """Handle that the dialog was canceled."""
+        """React to the dialog being canceled."""

@@ -1,4 +1,4 @@
-"""The dialog that is open: it gets the events, and is drawn over the window."""
+"""The open dialog of a window: passing events to it, and drawing it."""
 
 from contextlib import suppress
 
@@ -12,7 +12,7 @@ from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import MOUSE_EVENTS, get_key_name, get_wheel_notches
 
 _WINDOW_EVENTS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
-"""Events that the window gets, too, while a dialog is open."""
+"""Events that are passed on to the window even while a dialog is open."""
 _INITIAL_HEIGHT_PX = 100
 _SCREEN_MARGIN_PX = 24
 
@@ -25,7 +25,7 @@ class Dialogs:
     current : Dialog or None
         The dialog that is open.
     ui : Ui or None
-        Its page, once it has been drawn or has got an event.
+        Page with the widgets of the open dialog; None until it is drawn or receives an event.
     """
 
     def __init__(self) -> None:
@@ -40,14 +40,14 @@ class Dialogs:
         return self.current is not None
 
     def ask(self, dialog: Dialog) -> None:
-        """Open a dialog in place of the present one."""
+        """Open a dialog; it replaces the one that is open, if any."""
         self.current = dialog
         self.ui = None
         self._ignored_letter = ""
         self._is_drawn = False
 
     def ignore_letter(self, letter: str) -> None:
-        """Ignore the text event of the key that has opened the dialog."""
+        """Ignore the text event of the key that opened the dialog, so that its letter is not typed there."""
         self._ignored_letter = letter if self.is_open else ""
 
     def close(self) -> None:
@@ -69,7 +69,7 @@ class Dialogs:
         Returns
         -------
         bool
-            Whether the event was for the dialog alone.
+            Whether the event has been handled and must not reach the window.
         """
         dialog = self.current
         if dialog is None:
@@ -79,7 +79,7 @@ class Dialogs:
             return False
         if event.type in MOUSE_EVENTS and not self._is_drawn:
             return True
-        # Keys may come before the dialog is drawn for the first time.
+        # Keys may arrive before the dialog is first drawn; then theme and scale do not matter yet.
         ui = self.ui or self._create_ui(dialog, LIGHT, 1.0)
         ui.needs_redraw = True
         self._pass_event(event, dialog, ui)
@@ -89,6 +89,7 @@ class Dialogs:
         return event.type not in _WINDOW_EVENTS
 
     def _pass_event(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
+        """Pass an event to the dialog or to its widgets; a click outside may close the dialog."""
         if event.type == pygame.TEXTINPUT:
             ignored = self._ignored_letter
             self._ignored_letter = ""
@@ -106,6 +107,7 @@ class Dialogs:
             ui.handle_event(event)
 
     def _handle_key(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
+        """Handle a key press: Escape closes the dialog, unless an input method is composing text."""
         name = get_key_name(event)
         self._ignored_letter = ""
         is_composing = ui.edit is not None and bool(ui.edit.composed)
@@ -114,7 +116,7 @@ class Dialogs:
         elif is_composing or not dialog.handle_key(name, ui):
             ui.handle_event(event)
         if self.current is not dialog:
-            # The answer has opened another dialog, for which the letter of this key is not meant.
+            # The answer has opened another dialog, which must not receive the letter of this key.
             self.ignore_letter(event.unicode)
 
     def _create_ui(self, dialog: Dialog, theme: Theme, scale: float) -> Ui:

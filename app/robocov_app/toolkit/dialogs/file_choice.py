@@ -22,21 +22,21 @@ def create_file_choice(
     recent: Sequence[Path] = (),
     text: str = "",
 ) -> Choice:
-    """Create a choice of a file.
+    """Create a dialog in which the user chooses a file.
 
     Parameters
     ----------
     title : str
     folder : Path
-        Folder of paths that are not absolute.
+        Folder to which relative paths refer.
     accept : callable
-        Called with the path.
+        Called with the chosen path.
     suffixes : sequence of str
-        Suffixes of the files that are listed; by default all are.
+        Suffixes of the files that are listed; by default all files are listed.
     recent : sequence of Path
         Files that are listed before anything is typed.
     text : str
-        Name of a file to be saved; empty to choose a file that exists.
+        Proposed name of a file to be saved; empty to choose an existing file.
 
     Returns
     -------
@@ -46,6 +46,7 @@ def create_file_choice(
     saves = bool(text)
 
     def accept_text(typed: str, option: Option | None) -> object:
+        """Accept a file, or return the completion of a folder so that the dialog lists its content."""
         path = browser.resolve(typed.strip())
         is_new_file = saves and typed.strip() and not typed.endswith("/")
         if is_new_file:
@@ -82,21 +83,23 @@ class _FileBrowser:
     _options: dict[str, list[Option]] = field(default_factory=dict)
 
     def resolve(self, text: str) -> Path:
-        """Return the path that was typed."""
+        """Return the path for a typed text: relative to the folder, with ~ expanded."""
         # Unlike Path.expanduser, this does not raise if the user does not exist.
         return self.folder / os.path.expanduser(text)  # noqa: PTH111
 
     def list_options(self, text: str) -> list[Option]:
-        """List completions of a typed path; a folder is read once while the dialog is open."""
+        """List the completions of a typed path. Results are cached while the dialog is open."""
         if text not in self._options:
             self._options[text] = self._build_options(text)
         return self._options[text]
 
     def _build_options(self, text: str) -> list[Option]:
+        """Read the folder of a typed path, and list its entries: folders first, then files."""
         name = text.rpartition("/")[2]
         prefix = text.removesuffix(name)
         folder = self.resolve(prefix)
         try:
+            # False sorts before True: folders come first.
             entries = [(not path.is_dir(), path) for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES)]
         except (OSError, ValueError):
             return []
@@ -116,7 +119,7 @@ class _FileBrowser:
         return options
 
     def _is_listed(self, path: Path, name: str, *, is_file: bool) -> bool:
-        """Return whether a file or folder is listed for the name that was typed."""
+        """Return whether a file or folder matches the typed part of its name."""
         is_hidden = path.name.startswith(".") and not name.startswith(".")
         has_suffix = not is_file or not self.suffixes or path.suffix.lower() in self.suffixes
         return has_suffix and not is_hidden and name.lower() in path.name.lower()

@@ -11,7 +11,7 @@ from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import ENTER_KEYS
 
 MAX_LINES = 14
-"""Lines of the text that are shown."""
+"""Maximum number of lines of text that are shown."""
 
 # Lengths in pixels at scale 1.
 _TITLE_PX = 16
@@ -27,15 +27,15 @@ def _do_nothing() -> None:
 
 @dataclass
 class Answer:
-    """An answer to a question, shown as button.
+    """An answer to a question, shown as a button.
 
     Attributes
     ----------
     text : str
     call : callable
-        Called if this answer is given.
+        Called when the user gives this answer.
     key : str
-        Key that gives it, besides Enter while it is chosen.
+        Key that gives this answer; Enter does so, too, while it is highlighted.
     """
 
     text: str
@@ -54,9 +54,9 @@ class Question(Dialog):
         May have several lines.
     answers : sequence of Answer
     on_cancel : callable
-        Called if the question is not answered.
+        Called if the user closes the question without an answer.
     chosen : int
-        Number of the answer that Enter gives.
+        Index of the highlighted answer, which Enter gives.
     """
 
     title: str
@@ -95,7 +95,7 @@ class Question(Dialog):
         answer.call()
 
     def handle_key(self, name: str, ui: Ui) -> bool:
-        """Choose or give an answer."""
+        """Highlight an answer (arrow keys, Tab), or give one (Enter or its key)."""
         self.chosen = (self.chosen + _KEY_STEPS.get(name, 0)) % len(self.answers)
         given = next((answer for answer in self.answers if answer.key == name), None)
         if name in ENTER_KEYS:

@@ -1,4 +1,4 @@
-"""The question whether to recover work that a window has left behind unsaved."""
+"""The question whether to recover unsaved work of an earlier window."""
 
 from collections.abc import Callable
 
@@ -13,18 +13,18 @@ def create_recovery_question(
     discard: Callable[[], object],
     postpone: Callable[[], object],
 ) -> Question:
-    """Create the question.
+    """Create the question whether to recover unsaved work.
 
     Parameters
     ----------
     text : str
         Describes the unsaved work.
     others : int
-        Number of other windows whose work is unsaved, too.
+        Number of other windows that left unsaved work, too.
     recover, discard : callable
-        Opens the work, or removes it.
+        Open the unsaved work, and delete it.
     postpone : callable
-        Called if the work is kept to be offered again, also if the question is canceled.
+        Called if the work is kept and will be offered again; also if the question is canceled.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Outlines drawn with the mouse, point by point or with a single drag; tools make shapes of them."""
+"""Outlines drawn with the mouse, point by point or with a single drag; tools turn them into shapes."""
 
 from dataclasses import dataclass, field
 from math import dist
@@ -13,21 +13,21 @@ _UNLIMITED = 1_000_000
 
 @dataclass
 class DrawnOutline:
-    """Points that are being drawn.
+    """An outline that is being drawn.
 
     Attributes
     ----------
     min_points, max_points : int
-        Number of points that are needed, and with which the outline is complete.
+        Number of points the outline needs at least, and the number at which it is complete.
     closes : bool
-        Whether a press on the first point completes it.
+        Whether pressing on the first point again completes the outline.
     drags : bool
-        Whether it can also be drawn by a single drag.
+        Whether the outline can also be drawn with a single drag.
     points : list of (x, y), m
     cursor : (x, y), m
-        Position under the mouse.
+        Snapped position of the mouse.
     is_dragging : bool
-        Whether the button is held down since the first point.
+        Whether the button has been held down since the first point.
     """
 
     min_points: int = 2
@@ -40,14 +40,14 @@ class DrawnOutline:
     _pressed_at: Point = (0.0, 0.0)
 
     def press(self, point: Point, raw: Point, closing_reach: float, same_point: float = SAME_POINT_M) -> bool:
-        """Add a point.
+        """Add a point, or complete the outline.
 
         Parameters
         ----------
         point : (x, y), m
-            The snapped position of the mouse.
+            Position of the mouse after snapping.
         raw : (x, y), m
-            The position of the mouse.
+            Position of the mouse before snapping.
         closing_reach : float, m
             Distance from the first point within which a press completes a closed outline.
         same_point : float, m
@@ -75,12 +75,12 @@ class DrawnOutline:
         Parameters
         ----------
         point, raw : (x, y), m
-            Snapped position and position of the mouse.
+            Position of the mouse after and before snapping.
         reach : float, m
-            Distance that a drag must reach, so that a shaky click draws nothing. Not needed for outlines of
+            Minimum length of a drag, so that a shaky click draws nothing. It does not apply to outlines of
             two points.
         clicked : bool
-            Whether the mouse has hardly moved.
+            Whether the mouse has hardly moved since the press.
 
         Returns
         -------
@@ -96,7 +96,7 @@ class DrawnOutline:
         return self.max_points == 2 or dist(self._pressed_at, raw) >= reach
 
     def take_points(self) -> list[Point]:
-        """Return the points, with the cursor as the second of two, and start again."""
+        """Return the points and start over. If only the second of two points is missing, it is the cursor."""
         points = self.points
         if self.max_points == 2 and len(points) == 1:
             points = [*points, self.cursor]

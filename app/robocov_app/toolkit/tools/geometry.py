@@ -11,7 +11,7 @@ Point: TypeAlias = tuple[float, float]
 
 
 def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
-    """Find the points of edges that are nearest to a point.
+    """Find the point of each edge that is nearest to a given point.
 
     Parameters
     ----------
@@ -28,6 +28,7 @@ def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Arr
         Its distance from the point.
     """
     along = ends - starts
+    # Edges of length 0 are divided by 1 instead.
     squared = np.einsum("kd,kd->k", along, along)
     part = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
     feet = starts + np.clip(part, 0.0, 1.0)[:, None] * along
@@ -35,7 +36,7 @@ def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Arr
 
 
 def compute_cos_sin(degrees: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle, exact at quarters of a turn."""
+    """Return the cosine and sine of an angle; the values at multiples of 90° are exact."""
     quarters, rest = divmod(degrees, 90.0)
     if rest == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
@@ -43,5 +44,5 @@ def compute_cos_sin(degrees: float) -> tuple[float, float]:
 
 
 def compute_bearing(a: Point, b: Point) -> float:
-    """Return the direction from a point to another, degrees counter-clockwise from the x axis."""
+    """Return the direction from point a to point b, in degrees counterclockwise from the x axis."""
     return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))

@@ -1,4 +1,4 @@
-"""The mouse over the map of a window: presses become gestures, and the wheel zooms."""
+"""The mouse over the map of a window: button presses start gestures, and the wheel zooms."""
 
 from collections.abc import Callable
 from math import dist
@@ -18,18 +18,18 @@ Pixel: TypeAlias = tuple[int, int]
 
 
 class Gesture:
-    """Action of a mouse button while it is held down: base class of the gestures.
+    """What the mouse does while a button is held down: base class of the gestures.
 
     Attributes
     ----------
     is_pan : bool
-        Whether it moves the map instead of using the tool.
+        Whether it pans the map instead of using the tool.
     """
 
     is_pan = False
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Handle a move of the mouse; `is_click` while it has not moved farther than during a click."""
+        """Handle a move of the mouse; `is_click` is True while the press may still become a click."""
 
     def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
         """Handle the release of the button."""
@@ -41,9 +41,9 @@ class PanGesture(Gesture):
     Parameters
     ----------
     pan : callable
-        Moves the map by a number of pixels to the right and down.
+        Pans the map by the given numbers of pixels to the right and down.
     click : callable
-        Called with the event if the button is released before the mouse has moved.
+        Called with the event if the button is released before the mouse has really moved.
     """
 
     is_pan = True
@@ -53,10 +53,10 @@ class PanGesture(Gesture):
     ) -> None:
         self._pan = pan
         self._click = click
-        self._waiting = (0, 0)  # moves during the click, px, by which the map has not been moved yet
+        self._waiting = (0, 0)  # motion so far, px, that is applied once it is more than a click
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Move the map with the mouse, unless it may still be a click."""
+        """Pan the map with the mouse, unless the press may still become a click."""
         dx = self._waiting[0] + event.rel[0]
         dy = self._waiting[1] + event.rel[1]
         self._waiting = (dx, dy) if is_click else (0, 0)
@@ -70,11 +70,11 @@ class PanGesture(Gesture):
 
 
 class _Press(NamedTuple):
-    """A press of a button, to find double clicks."""
+    """The last press of a button, to detect double clicks."""
 
     time_s: float = _NEVER_S
     pixel: Pixel = (0, 0)
-    in_a_row: int = 0  # presses, each soon after the one before and at the same pixel
+    in_a_row: int = 0  # number of quick presses at the same pixel up to this one
 
 
 class Pointer:
@@ -102,24 +102,24 @@ class Pointer:
         self._is_click = False  # the mouse has hardly moved since the press
         self._last_press = _Press()
 
-    # What each window decides
+    # Methods that windows override
 
     def get_scale(self) -> float:
         """Return the scale of the window."""
         return 1.0
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        """Return what a press at a time, s, starts; None if it is complete, or means nothing."""
+        """Return the gesture that a press starts at time `now`, s; None if it starts none."""
         return None
 
     def hover(self, event: pygame.event.Event) -> None:
         """Handle a move of the mouse, before the gesture does."""
 
     def leave(self) -> None:
-        """Handle that the mouse has left the map."""
+        """React when the mouse leaves the map."""
 
     def turn_wheel(self, event: pygame.event.Event) -> None:
-        """Handle the wheel."""
+        """Handle a turn of the mouse wheel."""
 
     # Events
 
@@ -129,12 +129,12 @@ class Pointer:
         return self.gesture is not None
 
     def reset(self) -> None:
-        """Forget the button that is held down."""
+        """Drop the current gesture, as if no button were held down."""
         self.gesture = None
         self._button = 0
 
     def handle_event(self, event: pygame.event.Event, now: float) -> None:
-        """Handle a mouse event at a time, s."""
+        """Handle a mouse event that arrives at time `now`, s."""
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
         is_for_panel = not self.is_busy and self._panel.handle_event(event)
@@ -151,7 +151,7 @@ class Pointer:
             self.turn_wheel(event)
 
     def press(self, event: pygame.event.Event, now: float) -> None:
-        """Handle a press of a button at a time, s; while a button is held, others do nothing."""
+        """Handle a button press at time `now`, s; ignore it while another button is held."""
         if self.is_busy or event.button not in BUTTONS:
             return
         self._pressed_at = event.pos
@@ -167,7 +167,7 @@ class Pointer:
             self.gesture.move(event, is_click=self._is_click)
 
     def release(self, event: pygame.event.Event) -> None:
-        """Handle the release of a button; another one than that which is held does nothing."""
+        """Handle the release of a button; ignore it unless its press started the current gesture."""
         gesture = self.gesture
         if gesture is None or event.button != self._button:
             return
@@ -176,7 +176,7 @@ class Pointer:
         gesture.release(event, is_click=is_click)
 
     def count_clicks(self, event: pygame.event.Event, now: float) -> int:
-        """Return the number of presses in a row, including this one: 2 for a double click."""
+        """Return how many quick presses were made here in a row, including this one: 2 for a double click."""
         last = self._last_press
         is_quick = now - last.time_s < DOUBLE_CLICK_S
         is_same_place = self._is_near(last.pixel, event.pos)
@@ -185,5 +185,5 @@ class Pointer:
         return count
 
     def _is_near(self, first: Pixel, second: Pixel) -> bool:
-        """Return whether the mouse may move from one pixel to the other during a click."""
+        """Return whether two pixels are so close that moving between them still counts as a click."""
         return dist(first, second) < MAX_CLICK_MOVE_PX * self.get_scale()

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov_app.toolkit.tools.geometry import Point, find_nearest_on_edges
 
 PointKind: TypeAlias = Literal["vertex", "center", "middle"]
-MAX_EDGES = 8  # edges near a point: where there are more, nothing can be told apart
+MAX_EDGES = 8  # nearest edges that are considered; where there are more, they are too close to distinguish
 
 
 class Edges(NamedTuple):
@@ -31,19 +31,20 @@ _NO_EDGES = Edges(np.empty((0, 2)), np.empty((0, 2)))
 
 
 class SnapTargets:
-    """Vertices, centers and edges to which points can snap, and the middles of the edges.
+    """Vertices, centers and edges to which points can snap, and the midpoints of the edges.
 
     Parameters
     ----------
     vertices, centers : (k, 2) array, m
-        Points to snap to; points align with them, too.
+        Points to snap to. The pointer can also be aligned with them horizontally or vertically.
     edges : Edges
-        Edges to snap to, and to their middles.
+        Edges that can be snapped to, as can their midpoints.
     outlines : Edges
-        Edges to snap to, but not to their middles.
+        Edges that can be snapped to, but not their midpoints.
     """
 
     def __init__(self, vertices: Array, centers: Array, edges: Edges, outlines: Edges = _NO_EDGES) -> None:
+        """Index the points by kind, the bounding boxes of the edges, and the coordinates for alignment."""
         middles = (edges.starts + edges.ends) / 2
         points_by_kind = {"vertex": vertices, "center": centers, "middle": middles}
         self._trees = {
@@ -54,20 +55,21 @@ class SnapTargets:
         low = np.minimum(self._starts, self._ends)
         high = np.maximum(self._starts, self._ends)
         self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
-        # Points align with vertices and centers, sorted along each axis.
+        # The pointer aligns with vertices and centers. Sorting by each coordinate allows a binary search.
         marks = np.concatenate([vertices, centers])
         self._sorted_marks = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def find_nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
-        """Return the nearest target of a kind within `reach` meters, None if there is none."""
+        """Return the nearest target of a kind within `reach` meters; None if there is none."""
         if kind not in self._trees:
             return None
         tree, points = self._trees[kind]
+        # The tree excludes its upper bound; `reach` itself is included.
         gap, index = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
         return _to_point(points[index]) if gap <= reach else None
 
     def list_edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
-        """Return the ends of the edges within `reach` meters, the nearest first."""
+        """Return start and end of each edge within `reach` meters, nearest first, at most `MAX_EDGES`."""
         x, y = point
         indices = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts = self._starts[indices]
@@ -85,16 +87,16 @@ class SnapTargets:
         point : Point
             Position of the pointer, m.
         axis : int
-            0 for marks with nearly the same x, 1 for the same y.
+            0 for marks with nearly the same x coordinate, 1 for nearly the same y coordinate.
         reach : float
-            Maximum difference along the axis, m.
+            Maximum difference of that coordinate, m.
         horizon : float
             Maximum distance of the mark, m.
 
         Returns
         -------
         Point or None
-            The mark with the smallest difference along the axis, of several the nearest.
+            The mark with the smallest difference along the axis; among equals, the nearest.
         """
         marks = self._sorted_marks[axis]
         first, last = np.searchsorted(marks[:, axis], (point[axis] - reach, point[axis] + reach))

@@ -1,4 +1,4 @@
-"""Snapping to grid, vertices, edges, angles and alignment: of the pointer within its reach, and of moves."""
+"""Snapping of the pointer, and of dragged objects, to grid, vertices, edges, angles and aligned points."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,11 +16,11 @@ SnapKind: TypeAlias = Literal["vertex", "middle", "center", "crossing", "edge", 
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
 
-MAX_ALIGNMENT_REACHES = 60.0  # reaches within which marks align: about the width of a window
-MAX_MOVED_POINTS = 16  # points of dragged objects that may snap
+MAX_ALIGNMENT_REACHES = 60.0  # maximum distance of aligned marks, in reaches: about the width of a window
+MAX_MOVED_POINTS = 16  # points of a dragged object that are tried
 MAX_EDGE_LINES = 4  # edges near a point that are combined with other lines
 _PARALLEL = 1e-9
-_MIN_SHIFT_M = 1e-9  # a move that is shifted by less along an axis has not snapped along it
+_MIN_SHIFT_M = 1e-9  # a smaller shift along an axis means that nothing has snapped along it
 _EDGE_TOLERANCE_M = 1e-9
 
 
@@ -33,7 +33,7 @@ class Guide:
     kind : str
         Kind of the snap.
     line : tuple of Point
-        Line to the snapped point, m; a single point where a mark is enough.
+        Line to the snapped point, m; a single point for a mark.
     label : str
         Short text such as "vertex", "45°" or "in line".
     """
@@ -45,7 +45,7 @@ class Guide:
 
 @dataclass(frozen=True)
 class Snap:
-    """A snapped point and the guides that explain it; without guides it has not snapped."""
+    """A snapped point and the guides that explain it. Without guides, the point has not snapped."""
 
     point: Point
     guides: tuple[Guide, ...] = ()
@@ -58,13 +58,13 @@ class SnapSettings:
     Attributes
     ----------
     reach : float
-        Maximum distance between a point and where it snaps, m.
+        Maximum distance over which a point snaps, m.
     grid : float
         Spacing of the grid, m.
     angle : float
-        Step of the directions from the previous point, degrees from the x axis.
+        Directions from the previous point snap to multiples of this angle, degrees from the x axis.
     kinds : frozenset of str
-        Kinds of snaps that are on; empty for none.
+        Kinds of snaps that are enabled; empty for none.
     """
 
     reach: float
@@ -76,7 +76,7 @@ class SnapSettings:
 def snap_point(
     point: Point, targets: SnapTargets, settings: SnapSettings, origin: Point | None = None
 ) -> Snap:
-    """Snap a point to marks, crossings of lines, lines, or the grid, in this order.
+    """Snap a point to marks, intersections of lines, lines, or the grid, in this order of priority.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ def snap_point(
     settings : SnapSettings
         Reach, grid, and kinds of snaps that are on.
     origin : Point, optional
-        Point from which angles count, m.
+        Point from which directions are measured, m, such as the previous point of an outline.
 
     Returns
     -------
     Snap
-        The snapped point, or the same point without guides.
+        The snapped point; the unchanged point without guides if nothing is within reach.
     """
     return _SnapSearch(point, targets, settings, origin).find_best().snap
 
@@ -100,20 +100,20 @@ def snap_point(
 def snap_move(
     points: Sequence[Point], dx: float, dy: float, targets: SnapTargets, settings: SnapSettings
 ) -> Snap:
-    """Snap a move of several points: the one that snaps best decides.
+    """Snap the displacement of points that move together, by the one that snaps best.
 
-    Along axes without another snap, the first point snaps to the grid, even beyond the reach.
+    Along each axis that has not snapped otherwise, the first point snaps to the grid, even beyond the reach.
 
     Parameters
     ----------
     points : sequence of Point
-        Points that move together, m. Only the first snaps to grid, angles, middles and crossings.
+        Points that move together, m. Only the first one snaps to grid, angles, midpoints and intersections.
     dx, dy : float
         Displacement, m.
     targets : SnapTargets
         Points and edges to which they can snap.
     settings : SnapSettings
-        Reach, grid, and kinds of snaps that are on.
+        Reach, grid, and kinds of snaps that are enabled.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def snap_move(
     """
     best_rank = (math.inf, math.inf)
     best = Snap((dx, dy))
-    # Some of many points always happen to lie near the grid, so this says little about any one of them.
+    # Among many points, some lie near the grid by chance, which is no reason to snap.
     kinds_of_others = settings.kinds - {"grid", "angle", "middle", "crossing"}
     settings_of_others = replace(settings, kinds=kinds_of_others)
     for number, (x, y) in enumerate(_choose_moved_points(points)):
@@ -130,7 +130,7 @@ def snap_move(
         ranked = _SnapSearch(moved, targets, settings if number == 0 else settings_of_others).find_best()
         snapped_x, snapped_y = ranked.snap.point
         shift = (dx + snapped_x - moved[0], dy + snapped_y - moved[1])
-        # The distance is that of the shift, so that rounding does not extend the reach.
+        # The gap is computed from the shift, so that rounding errors do not extend the reach.
         gap = math.hypot(shift[0] - dx, shift[1] - dy)
         if ranked.snap.guides and gap <= settings.reach and (ranked.rank, gap) < best_rank:
             best_rank = (ranked.rank, gap)
@@ -141,7 +141,17 @@ def snap_move(
 
 
 def _snap_remaining_axes(first: Point, offset: Point, snapped: Point, grid: float) -> Point:
-    """Snap a point to the grid along the axes along which its displacement has not snapped yet."""
+    """Return a displacement in which each axis that has not snapped yet takes the first point to the grid.
+
+    Parameters
+    ----------
+    first : Point
+        The first moved point before the move, m.
+    offset, snapped : Point
+        Displacement before and after snapping, m.
+    grid : float
+        Spacing of the grid, m.
+    """
     shift = list(snapped)
     for axis in (0, 1):
         if abs(snapped[axis] - offset[axis]) < _MIN_SHIFT_M:
@@ -150,7 +160,7 @@ def _snap_remaining_axes(first: Point, offset: Point, snapped: Point, grid: floa
 
 
 def _choose_moved_points(points: Sequence[Point]) -> Sequence[Point]:
-    """Return the points that may snap: all, or the first one and some on the convex hull."""
+    """Return the points to try: all, or if there are many, the first one and some of the convex hull."""
     if len(points) <= MAX_MOVED_POINTS:
         return points
     hull = shapely.convex_hull(shapely.multipoints(np.array(points)))
@@ -163,13 +173,13 @@ def snap_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
     """Return the nearest multiple of `step` if it is within `reach`, all in degrees."""
     nearest = step * round(degrees / step)
     if abs(nearest - degrees) <= reach:
-        return nearest + 0.0
+        return nearest + 0.0  # Turns -0.0 into 0.0.
     return degrees
 
 
 @dataclass(frozen=True)
 class _SnapLine:
-    """A line to which points can snap; edges end, other lines do not."""
+    """A line to which points can snap. Edges have a finite length; other lines are infinite."""
 
     kind: SnapKind
     origin: Point
@@ -179,7 +189,7 @@ class _SnapLine:
     length: float = math.inf
 
     def project(self, point: Point) -> float:
-        """Return the distance from the origin to the foot of a point along the line, m."""
+        """Return the signed distance from the origin to the projection of a point onto the line, m."""
         dx = point[0] - self.origin[0]
         dy = point[1] - self.origin[1]
         return dx * self.direction[0] + dy * self.direction[1]
@@ -192,11 +202,11 @@ class _SnapLine:
         return self.locate(along)
 
     def locate(self, along: float) -> Point:
-        """Return the point at a distance along the line, m."""
+        """Return the point at a distance from the origin along the line, m."""
         return self.origin[0] + along * self.direction[0], self.origin[1] + along * self.direction[1]
 
     def find_crossing(self, other: Self) -> Point | None:
-        """Return where two lines cross, None if they do not."""
+        """Return the intersection with another line; None if there is none."""
         ux, uy = self.direction
         vx, vy = other.direction
         cross = ux * vy - uy * vx
@@ -216,7 +226,11 @@ class _SnapLine:
         return -_EDGE_TOLERANCE_M <= along <= self.length + _EDGE_TOLERANCE_M
 
     def find_grid_point(self, foot: Point, grid: float) -> Point | None:
-        """Return the grid point on the line near a foot; rays have grid points in steps from their origin."""
+        """Return the grid point on the line that is nearest to a point on the line; None if there is none.
+
+        On a ray at a fixed angle, these are the points at multiples of the spacing from its origin. Other
+        lines must be parallel to an axis.
+        """
         if grid <= 0.0:
             return None
         if self.kind == "angle":
@@ -237,13 +251,13 @@ class _SnapLine:
 
 
 class _RankedSnap(NamedTuple):
-    rank: int  # the lower the better
+    rank: int  # lower is better
     snap: Snap
 
 
 @dataclass(frozen=True)
 class _SnapSearch:
-    """Search for where a point snaps; angles count from `origin`."""
+    """Search for the best snap of a point; directions are measured from `origin`."""
 
     point: Point
     targets: SnapTargets
@@ -251,7 +265,7 @@ class _SnapSearch:
     origin: Point | None = None
 
     def find_best(self) -> _RankedSnap:
-        """Return the best snap within reach: marks rank before crossings, lines and the grid."""
+        """Return the best snap within reach: vertices rank before other marks, lines and the grid."""
         groups = (
             self.list_marks("vertex"),
             self.list_marks_and_crossings(),
@@ -270,12 +284,12 @@ class _SnapSearch:
         return math.dist(self.point, point) <= self.settings.reach
 
     def _sort_key(self, snap: Snap) -> tuple[int, int, float]:
-        # Two lines determine a point better than one, and the grid says little.
+        # An intersection of two lines is better than a point on one line, and both are better than the grid.
         lines = sum(guide.kind != "grid" for guide in snap.guides)
         return -lines, -len(snap.guides), math.dist(self.point, snap.point)
 
     def list_marks(self, *kinds: PointKind) -> Iterator[Snap]:
-        """Yield the snaps to the nearest marks of some kinds."""
+        """Yield the snaps to the nearest mark of each given kind that is enabled."""
         for kind in kinds:
             if kind not in self.settings.kinds:
                 continue
@@ -284,7 +298,7 @@ class _SnapSearch:
                 yield _snap_to_mark(kind, mark)
 
     def list_marks_and_crossings(self) -> Iterator[Snap]:
-        """Yield the snaps to centers, middles of edges and crossings of edges."""
+        """Yield the snaps to centers, midpoints of edges and intersections of edges."""
         yield from self.list_marks("center", "middle")
         if "crossing" in self.settings.kinds:
             for edge, other in combinations(self.list_edges(), 2):
@@ -293,11 +307,11 @@ class _SnapSearch:
                     yield _snap_to_mark("crossing", crossing)
 
     def list_line_snaps(self) -> Iterator[Snap]:
-        """Yield the snaps to lines, their crossings, and the grid on lines."""
+        """Yield the snaps to lines, to their intersections, and to grid points on lines."""
         lines: list[_SnapLine] = []
         for line in self.list_lines():
             for other in lines:
-                # Crossings of two edges have a snap kind of their own.
+                # Intersections of two edges are a kind of snap of their own, "crossing".
                 are_edges = line.kind == other.kind == "edge"
                 crossing = None if are_edges else line.find_crossing(other)
                 if crossing is not None:
@@ -312,7 +326,7 @@ class _SnapSearch:
             yield Snap(foot, (line.build_guide(foot),))
 
     def list_lines(self) -> Iterator[_SnapLine]:
-        """Yield the lines near the point: a ray at a round angle, aligned marks, edges."""
+        """Yield the lines near the point: a ray at a multiple of the angle step, alignment lines, edges."""
         reach = self.settings.reach
         origin = self.origin
         if "angle" in self.settings.kinds and origin is not None and not self._is_near(origin):
@@ -358,5 +372,5 @@ def _snap_to_mark(kind: SnapKind, mark: Point) -> Snap:
 
 
 def _round_to_multiple(value: float, step: float) -> float:
-    """Return the nearest multiple of a step as a decimal: 3 steps of 0.1 are 0.3."""
+    """Return the nearest multiple of a step, rounded to 9 decimals so that 3 steps of 0.1 are 0.3."""
     return round(step * round(value / step), 9) + 0.0

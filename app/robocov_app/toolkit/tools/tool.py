@@ -1,4 +1,4 @@
-"""Tools: base class of the mouse actions in a map, the events that they get, and what they show."""
+"""Tools: base class of the mouse tools for a map, the events that they get, and what they show."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ CursorShape: TypeAlias = Literal["arrow", "cross", "hand", "move", "sideways", "
 """Shape of the mouse cursor; "rising" and "falling" are arrows along the diagonals."""
 
 MOVED_FRACTION = 0.25
-"""Fraction of the pointer's reach from which on the pointer has moved on purpose."""
+"""Fraction of the pointer's reach; moves of at least this length are deliberate."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class PointerEvent:
     raw : (x, y), m
         Position before snapping.
     reach : float, m
-        Distance within which the pointer takes hold of something.
+        Distance within which the pointer grabs an object.
     shift, alt, ctrl : bool
         Whether the key is held down.
     """
@@ -37,7 +37,7 @@ class PointerEvent:
     ctrl: bool = False
 
     def has_moved_from(self, position: Point) -> bool:
-        """Return whether the pointer has moved on purpose since it was pressed at a position, m."""
+        """Return whether the pointer has moved deliberately since it was pressed at a position, m."""
         return dist(position, self.raw) >= MOVED_FRACTION * self.reach
 
 
@@ -68,7 +68,7 @@ class Tool(Generic[ContextT, EventT]):
     """A tool that does nothing: base class of the tools of both windows.
 
     Every method gets the context on which the tool acts: the session of the viewer, or the map and selection
-    of the editor. Texts that methods return are shown as messages.
+    of the editor. If a method returns a string, it is shown as a message.
 
     Attributes
     ----------
@@ -77,11 +77,11 @@ class Tool(Generic[ContextT, EventT]):
     title : str
         Name in the window.
     button_text : str
-        Text of its button, if the title is too long; empty for the title.
+        Label of its button if the title is too long; if empty, the title is used.
     key : str
-        Key that chooses the tool.
+        Key that selects the tool.
     hint : str
-        How to use it.
+        Short instructions, shown when the tool is selected.
     snaps : bool
         Whether pointer positions are snapped before the tool gets them.
     """
@@ -109,15 +109,15 @@ class Tool(Generic[ContextT, EventT]):
         return None
 
     def finish(self, context: ContextT) -> str | None:
-        """Complete the drawing: Enter, or a right click."""
+        """Complete what is being drawn; called on Enter and on a right click."""
         return None
 
     def cancel(self, context: ContextT) -> bool:
-        """Give up the action, as Escape does; return whether there was one."""
+        """Cancel the action in progress, as Escape does; return whether there was one."""
         return False
 
     def build_draw_state(self, context: ContextT) -> DrawState:
-        """Return what the tool shows in the map."""
+        """Return the overlay that the tool shows on the map."""
         return DrawState()
 
     def choose_cursor(self, context: ContextT) -> CursorShape:

@@ -1,7 +1,7 @@
-"""Widgets: functions of a page, one module for each family.
+"""Widgets, as functions that take a page; one module for each kind.
 
-- `appearance`: what widgets have in common: boxes, faces, the focus ring, texts
-- `labels`, `buttons`, `sections`: texts; buttons, options, tabs and check boxes; parts that fold
+- `appearance`: shared drawing functions: boxes, button faces, the focus ring, texts
+- `labels`, `buttons`, `sections`: texts; buttons, options, tabs and check boxes; collapsible sections
 - `slider`, `text_field`, `dropdown`: widgets that edit a value
-- `scroll_area`: content that is higher than its place
+- `scroll_area`: areas with a scroll bar
 """

@@ -1,4 +1,4 @@
-"""Common appearance of widgets: text sizes, boxes, faces, focus ring and texts."""
+"""Common appearance of widgets: text sizes, boxes, button faces, focus ring and texts."""
 
 import pygame
 from pygame import Rect
@@ -17,7 +17,7 @@ CORNER_RADIUS_PX = 4.0
 
 
 def shade(page: Page, fraction: float) -> Color:
-    """Return a color between the panel (0) and its text (1)."""
+    """Return a color between that of the panel (fraction 0) and that of its text (fraction 1)."""
     return mix(page.theme.panel, page.theme.ink, fraction)
 
 
@@ -29,7 +29,7 @@ def get_text_size(*, small: bool) -> float:
 
 
 def is_drawn(page: Page, rect: Rect) -> bool:
-    """Return whether something at this place is drawn in this run."""
+    """Return whether the page is being drawn and a rectangle is at least partly visible."""
     return page.surface is not None and bool(rect.colliderect(page.clip))
 
 
@@ -50,7 +50,7 @@ def draw_box(
     rect : pygame.Rect
     fill : color
     edge : color, optional
-        By default that of the filling.
+        By default the same as `fill`.
     radius : float
         Radius of the corners at scale 1, px.
     width : int
@@ -64,7 +64,24 @@ def draw_box(
 
 
 def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled: bool = True) -> Color:
-    """Draw the face of a button, and return the color of its text."""
+    """Draw the background of a button or menu, depending on its state, and return the color for its text.
+
+    Parameters
+    ----------
+    page : Page
+    rect : pygame.Rect
+        Position in the window, px.
+    key : str
+        Key of the widget.
+    chosen : bool
+        Whether it is highlighted with the accent color.
+    enabled : bool
+        Whether it can be used; otherwise it is gray.
+
+    Returns
+    -------
+    Color
+    """
     theme = page.theme
     is_hovered = page.is_hovered(rect)
     is_held = page.active == key and bool(rect.collidepoint(page.pointer))
@@ -73,6 +90,7 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
         edge = shade(page, 0.14)
         ink = shade(page, 0.45)
     elif chosen:
+        # `theme.final` is also the accent color of widgets.
         fill = mix(theme.final, theme.ink, _choose_strength(0.15, 0.25, is_hovered, is_held))
         edge = fill
         ink = get_accent_ink(theme)
@@ -89,7 +107,7 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
 
 
 def _choose_strength(hovered: float, held: float, is_hovered: bool, is_held: bool) -> float:
-    """Return how strongly a face is tinted."""
+    """Return the fraction of the tint of a face: `held` while pressed, `hovered` under the mouse, else 0."""
     if is_held:
         return held
     if is_hovered:
@@ -115,7 +133,7 @@ def draw_text(
     bold: bool = False,
     align: str = "left",
 ) -> None:
-    """Draw a line of text, cut to the width of a rectangle.
+    """Draw a line of text, shortened to the width of a rectangle.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ _CHECK_TEXT_LEFT_PX = 23
 _TICK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
 """Corners of the tick, as fractions of the check box."""
 _FINE = 4
-"""Factor by which the tick is drawn larger, and then smoothly reduced."""
+"""The tick is drawn larger by this factor and then scaled down, which smooths its edges."""
 _NO_TITLES: Mapping[str, str] = MappingProxyType({})
 
 
@@ -82,7 +82,7 @@ def show_button(
 def show_option(
     page: Page, text: str, note: str = "", *, key: str, chosen: bool = False, disabled_reason: str = ""
 ) -> bool:
-    """Show a line of a list.
+    """Show a line of a list that can be clicked.
 
     Parameters
     ----------
@@ -113,11 +113,13 @@ def show_option(
     inner = rect.inflate(-page.px(16), 0)
     draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
     if note:
+        # The text must not run into the note.
         inner.width -= measure_text(note, page.px(SMALL_TEXT_PX)) + page.px(12)
     lines = text.split("\n")
     ink = page.theme.ink
     if disabled_reason:
         ink = shade(page, 0.45)
+    # Texts are centered vertically in their rectangle: start half the extra lines higher.
     inner.top -= page.px(_LINE_PX * (len(lines) - 1) / 2)
     for number, line in enumerate(lines):
         draw_text(page, line, inner.move(0, page.px(_LINE_PX * number)), ink, TEXT_PX)
@@ -125,12 +127,12 @@ def show_option(
 
 
 def show_area(page: Page, key: str) -> tuple[Rect, bool]:
-    """Take the next cell for an image.
+    """Reserve the next cell for an image that can be clicked.
 
     Returns
     -------
     rect : pygame.Rect
-        Place in the window, px.
+        Position in the window, px.
     is_clicked : bool
         Whether it was just clicked.
     """
@@ -146,7 +148,7 @@ def show_tabs(
     *widths: float,
     titles: Mapping[str, str] = _NO_TITLES,
 ) -> str | None:
-    """Show a row of buttons of which one is chosen.
+    """Show a row of buttons, one of which is chosen.
 
     Parameters
     ----------
@@ -154,16 +156,16 @@ def show_tabs(
     key : str
     names : sequence of str
     value : str
-        Name of the chosen one.
+        Name of the chosen button.
     *widths : float
-        Widths of the buttons; by default they are equal.
+        Widths of the buttons at scale 1, px; by default they are equal.
     titles : mapping of str to str
-        Texts of the buttons by their names; by default the capitalized names.
+        Label of each button by its name; by default the capitalized name.
 
     Returns
     -------
     str or None
-        Name of another one that was just chosen.
+        Name of the button that was just clicked; None if none was, or only the chosen one.
     """
     page.row(*(widths or [0.0] * len(names)), below=8)
     picked = None
@@ -194,7 +196,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     Returns
     -------
     bool or None
-        The new value if it was just clicked.
+        The new value if it was just clicked; otherwise None.
     """
     key = key or text
     rect = page.cell()
@@ -213,6 +215,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
 
 
 def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> None:
+    """Draw the box of a check box, with a tick if its value is True."""
     theme = page.theme
     if value:
         fill = edge = theme.final
@@ -225,6 +228,7 @@ def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> 
     draw_box(page, box, fill, edge=edge, radius=3, width=max(1, page.px(0.75)))
     if not value or page.surface is None:
         return
+    # Lines with smooth edges: draw the tick enlarged, and scale it down.
     side = _FINE * box.width
     large = Surface((side, side), pygame.SRCALPHA, 32)
     corners = [(x * side, y * side) for x, y in _TICK]

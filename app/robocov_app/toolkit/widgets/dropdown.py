@@ -12,7 +12,7 @@ from robocov_app.toolkit.widgets.page import Page, Widget
 
 
 def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, tip: str = "") -> str | None:
-    """Show a menu that opens a list of options.
+    """Show a drop-down menu, which opens a list of options.
 
     Parameters
     ----------
@@ -20,14 +20,14 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
     key : str
     options : sequence of str
     value : str
-        Text of the menu.
+        The current option, shown while the list is closed.
     tip : str
         Tool tip.
 
     Returns
     -------
     str or None
-        Another option that was just picked.
+        Option that was just picked; None if none was, or only the current one.
     """
     rect = page.cell()
     picked = _read_list(page, key, options)
@@ -57,8 +57,9 @@ def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:
 
 
 def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: Rect) -> OpenList:
-    """Build the list below its menu, or above it if there is more space."""
+    """Build the list below its menu, or above the menu if there is not enough space below but more above."""
     row_height = page.px(LIST_ROW_PX)
+    # The list has an edge of 1 px at its top and bottom.
     height = min(len(options) * row_height + 2, page.px(MAX_LIST_HEIGHT_PX))
     space_below = page.box.bottom - menu.bottom - page.px(8)
     space_above = menu.top - page.box.top - page.px(8)
@@ -77,6 +78,7 @@ def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: 
 
 
 def _draw_menu(page: Page, key: str, value: str, rect: Rect) -> None:
+    """Draw a closed menu: its face, the current option, and a triangle that points down."""
     ink = draw_face(page, rect, key)
     text_rect = rect.inflate(-page.px(18), 0)
     text_rect.width -= page.px(12)

@@ -25,7 +25,7 @@ def show_label(
     key : str, optional
         By default the text.
     style : str
-        "header", "unit", "bold" or empty.
+        "header" (small, bold, gray), "unit" (small, gray), "bold", or empty for normal text.
     tip : str
         Tool tip.
     align : str
@@ -50,7 +50,7 @@ def show_paragraph(
     bold: bool = False,
     indent: float = 0.0,
 ) -> None:
-    """Show a text in as many rows as it needs.
+    """Show text that is wrapped to the width of the page, over several rows if necessary.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def show_paragraph(
     color : color, optional
     bold : bool
     indent : float
-        Margin at the left at scale 1, px.
+        Additional margin on the left at scale 1, px.
     """
     widths = (indent, 0.0) if indent else (0.0,)
     page.row(*widths, height=size + 4, gap=0, below=1)

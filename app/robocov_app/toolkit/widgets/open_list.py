@@ -18,7 +18,7 @@ LIST_ROW_PX = 24.0
 _TEXT_PX = 12.0
 
 _TO_END = 9999
-"""Step that leads beyond the end of any list, which limits it."""
+"""A step past the end of any list; the result is clamped to the list."""
 _KEY_STEPS = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -_TO_END, "end": _TO_END}
 
 
@@ -44,15 +44,15 @@ class OpenList:
         Key of its menu.
     options : list of str
     rect : pygame.Rect
-        Place in the window.
+        Position in the window, px.
     row_height : int
         Height of an option, px.
     chosen : int
-        Number of the highlighted option.
+        Index of the highlighted option.
     top : float
-        Length that is scrolled out of view at the top, px.
+        Scroll offset: the height of the options hidden above the visible part, px.
     picked : str or None
-        Option that was picked.
+        Option that the user has picked; None until then.
     """
 
     key: str
@@ -65,23 +65,24 @@ class OpenList:
 
     @property
     def max_top(self) -> float:
-        """Maximum of `top`: length of the options that does not fit into the list, px."""
+        """Maximum of `top`: the height by which the options exceed the list, px."""
         return max(len(self.options) * self.row_height + 2 - self.rect.height, 0)
 
     def get_item_rect(self, number: int) -> Rect:
-        """Return the place of an option, which may be out of view."""
+        """Return the position of an option in the window, even if it is scrolled out of view."""
         y = self.rect.top + 1 + number * self.row_height - round(self.top)
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row_height)
 
     def find_item(self, pixel: tuple[int, int]) -> int | None:
-        """Return the number of the option at a pixel; None if there is none."""
+        """Return the index of the option at a pixel; None if there is none."""
         number = int((pixel[1] - self.rect.top - 1 + self.top) // self.row_height)
         is_item = self.rect.collidepoint(pixel) and 0 <= number < len(self.options)
         return number if is_item else None
 
     def choose(self, number: int) -> None:
-        """Highlight an option, or the nearest one that exists, and scroll it into view."""
+        """Highlight the option with this index, limited to the list, and scroll it into view."""
         self.chosen = min(max(number, 0), len(self.options) - 1)
+        # Range of scroll offsets at which the whole option is visible.
         low = self.chosen * self.row_height
         high = (self.chosen + 1) * self.row_height + 2 - self.rect.height
         self.top = min(max(self.top, high, 0.0), low)
@@ -110,6 +111,7 @@ class OpenList:
         return ListResponse.IGNORED
 
     def _handle_key(self, name: str) -> ListResponse:
+        """Handle a key: move the highlight, pick an option, or close the list on any other key."""
         if name in _KEY_STEPS:
             self.choose(self.chosen + _KEY_STEPS[name])
             return ListResponse.HANDLED

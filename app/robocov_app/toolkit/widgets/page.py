@@ -1,7 +1,8 @@
-"""The page of an immediate-mode interface: it runs for every event, handles the focus, and draws.
+"""The page of an immediate-mode user interface: its content runs for every event and every drawing.
 
-`Page` knows no widgets. A widget is a function of a page, in `toolkit.widgets`, that takes a cell, reports
-how the user has used it, and draws itself; `toolkit.ui.Ui` is a page that has them as methods.
+`Page` defines no widgets. A widget is a function in `toolkit.widgets` that takes a page, occupies its next
+cell, draws itself and returns the user's input; `toolkit.widgets.ui.Ui` is a page with these functions as
+methods.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 
 _MAX_RUNS = 3
-"""Runs for one drawing. The height that a page needs is known only after it has run."""
+"""Maximum number of runs for one drawing. The height of the content is known only after a run."""
 
 
 @dataclass
@@ -31,9 +32,9 @@ class Widget:
     Attributes
     ----------
     kind : str
-        Such as "button".
+        Kind of widget, such as "button".
     key : str
-        Unique among the widgets of this kind.
+        Identifies the widget among those of its kind.
     rect : pygame.Rect
         Visible part in the window, px.
     text : str
@@ -53,7 +54,7 @@ class Widget:
 
 
 class Page(RowLayout):
-    """Runs the content of a page in a box of the window.
+    """Runs the content of a page, a function that shows widgets, inside a box of the window.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class Page(RowLayout):
     Attributes
     ----------
     background : color or None
-        Color behind the widgets; None if they are drawn over something else.
+        Background color; None if the widgets are drawn over something else.
     needs_redraw : bool
         Whether the page may have changed since it was drawn.
     surface : pygame.Surface or None
@@ -72,15 +73,15 @@ class Page(RowLayout):
     pointer : tuple of int
         Position of the mouse, px.
     focus : str or None
-        Key of the widget that gets the keys.
+        Key of the widget that receives key presses.
     active : str or None
         Key of the widget on which a mouse button is held down.
     grab_offset : float
-        Distance from the start of the knob that is dragged to the pointer, px.
+        Distance of the pointer from the left or upper end of the knob being dragged, px.
     edit : TextEdit or None
-        Text with the cursor, if the focused widget has one.
+        Text being edited, if the widget with the focus is a text field.
     clipboard : Clipboard
-        Text that is copied from text fields and pasted into them.
+        Clipboard for copying and pasting in text fields.
     open_list : OpenList or None
         List of the drop-down menu that is open.
     widgets : dict of str to Widget
@@ -88,7 +89,7 @@ class Page(RowLayout):
     folded_sections : set of str
         Keys of the sections whose content is hidden.
     scroll_offsets, content_heights : dict of str to float
-        Length that is scrolled out of view, and height of all content, by the key of the scroll area.
+        Scroll offset and total height of the content at scale 1, px, by the key of the scroll area.
     tool_tip : ToolTip
         Decides when the tip of the widget under the pointer appears.
     """
@@ -118,10 +119,10 @@ class Page(RowLayout):
         self.tool_tip = ToolTip()
 
     def build(self) -> None:
-        """Show and edit the content; called in every run."""
+        """Show the widgets and handle their input; called in every run."""
 
     def run(self, event: pygame.event.Event | None = None, surface: Surface | None = None) -> None:
-        """Run the content for an event, for drawing, or only to learn its height.
+        """Run the content to handle an event, to draw it, or only to measure its height.
 
         Parameters
         ----------
@@ -143,7 +144,7 @@ class Page(RowLayout):
             self.edit = None
 
     def list_focusable_keys(self) -> list[str]:
-        """Return the keys of the widgets that can have the focus, in the order of Tab."""
+        """Return the keys of the widgets that can have the focus, in the order in which Tab visits them."""
         widgets = self.widgets.values()
         return [widget.key for widget in widgets if widget.enabled and widget.kind not in ("label", "bar")]
 
@@ -151,7 +152,7 @@ class Page(RowLayout):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a text is edited, a list is open or a button is held down."""
+        """Whether text is being edited, a list is open or a mouse button is held down."""
         return self.active is not None or self.edit is not None or self.open_list is not None
 
     def stop_typing(self) -> None:
@@ -162,7 +163,7 @@ class Page(RowLayout):
         self.needs_redraw = True
 
     def set_focus(self, key: str) -> None:
-        """Give the focus to a widget; a text field gets the text cursor, too."""
+        """Give the focus to a widget; if it is a text field, start editing it."""
         self.focus = key
         self.open_list = None
         self.needs_redraw = True
@@ -172,7 +173,7 @@ class Page(RowLayout):
             self.edit = TextEdit.select_all(entry.text)
 
     def get_edit(self, key: str) -> TextEdit | None:
-        """Return the text that is edited in a field; None while the field is not edited."""
+        """Return the text being edited in a field; None while it is not being edited."""
         if self.focus != key:
             return None
         return self.edit
@@ -180,7 +181,7 @@ class Page(RowLayout):
     # Drawing
 
     def draw(self, screen: Surface) -> None:
-        """Draw the page, or copy the last drawing if nothing has changed."""
+        """Draw the page; if nothing has changed, copy the image of the last drawing."""
         if not self.needs_redraw and self._image is not None and self._image.get_size() == self.box.size:
             screen.blit(self._image, self.box)
             return
@@ -196,7 +197,7 @@ class Page(RowLayout):
             self._image = screen.subsurface(self.box.clip(screen.get_rect())).copy()
 
     def request_another_run(self) -> None:
-        """Run the content once more for this drawing, because the height of something has changed."""
+        """Request one more run for this drawing, because the height of something has changed."""
         self._runs_again = True
 
     def draw_overlays(self, screen: Surface) -> None:
@@ -222,11 +223,11 @@ class Page(RowLayout):
                     yield widget
 
     def find(self, kind: str, key: str) -> Widget | None:
-        """Return a widget of the last run; None if there is none with this kind and key."""
+        """Return the widget with this kind and key in the last run; None if there was none."""
         return self.widgets.get(f"{kind}:{key}")
 
     def is_event(self, event_type: int) -> bool:
-        """Return whether the run is for an event of a type that no widget has consumed."""
+        """Return whether the run is for an event of this type that no widget has consumed yet."""
         return self._event is not None and self._event.type == event_type
 
     def consume_event(self) -> None:
@@ -238,22 +239,22 @@ class Page(RowLayout):
         return self._event
 
     def get_key(self, key: str) -> str:
-        """Return the name of the key that was pressed for a widget; empty if there is none."""
+        """Return the name of the key just pressed, if this widget has the focus; otherwise empty."""
         if self._event is None or self.focus != key or self._event.type != pygame.KEYDOWN:
             return ""
         return get_key_name(self._event)
 
     def is_hovered(self, rect: Rect) -> bool:
-        """Return whether the pointer is over a visible part of the page, and no button or list is in use."""
+        """Return whether the pointer is over a visible part of `rect`, with no button held or list open."""
         is_free = self.open_list is None and self.active is None
         return is_free and bool(rect.collidepoint(self.pointer) and self.clip.collidepoint(self.pointer))
 
     def is_pressed(self, rect: Rect) -> bool:
-        """Return whether the left button was just pressed over a visible part of the page."""
+        """Return whether the left button was just pressed over the visible part of a rectangle."""
         return self.is_event(pygame.MOUSEBUTTONDOWN) and self.is_hovered(rect)
 
     def is_double_click(self, key: str) -> bool:
-        """Note a click on a widget, and return whether it is the second of a double click."""
+        """Record a click on a widget, and return whether it is the second one of a double click."""
         now = perf_counter()
         is_second = now - self._last_click_s < DOUBLE_CLICK_S and self._last_click_key == key
         self._last_click_s = now
@@ -261,14 +262,14 @@ class Page(RowLayout):
         return is_second
 
     def add_widget(self, widget: Widget, disabled_reason: str = "") -> None:
-        """Add a widget to those of this run.
+        """Register a widget of this run.
 
         Parameters
         ----------
         widget : Widget
-            Its rectangle is limited to the visible part.
+            The widget. Its rectangle is clipped to the visible part.
         disabled_reason : str
-            Why the widget is disabled, which becomes part of its tool tip; empty if it is enabled.
+            Why the widget is disabled, which is appended to its tool tip; empty if it is enabled.
         """
         widget.rect = widget.rect.clip(self.clip)
         widget.enabled = not disabled_reason
@@ -276,7 +277,10 @@ class Page(RowLayout):
         self.widgets[f"{widget.kind}:{widget.key}"] = widget
 
     def add_clickable(self, widget: Widget, disabled_reason: str = "") -> bool:
-        """Add a widget that is clicked, or used by Enter or Space; return whether it just was."""
+        """Register a widget that reacts to a click, Enter or Space; return whether it was just used.
+
+        A click is complete only when the button is released over the widget on which it was pressed.
+        """
         rect = widget.rect
         key = widget.key
         self.add_widget(widget, disabled_reason)

@@ -7,7 +7,7 @@ from robocov_app.toolkit.widgets.page import Page
 from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, is_function_key
 
 _WIDGET_KEYS = (*ENTER_KEYS, "space", "left", "right", "up", "down")
-"""Keys that mean something to a focused widget without a text cursor."""
+"""Keys that a focused widget without a text cursor reacts to."""
 
 
 class PageEvents:
@@ -42,6 +42,7 @@ class PageEvents:
         return handler is not None and handler(event)
 
     def _handle_motion(self, event: pygame.event.Event) -> bool:
+        """Handle a move of the mouse: restart the tool tip, or run the page while a widget is dragged."""
         page = self._page
         page.pointer = event.pos
         if page.open_list is not None:
@@ -58,6 +59,7 @@ class PageEvents:
         return True
 
     def _handle_press(self, event: pygame.event.Event) -> bool:
+        """Handle a press of a mouse button; outside the widget with the focus, it ends typing."""
         page = self._page
         page.pointer = event.pos
         if event.button != 1:
@@ -88,6 +90,7 @@ class PageEvents:
         return self._page.active is not None or self._page.is_pointer_inside()
 
     def _handle_key(self, event: pygame.event.Event) -> bool:
+        """Handle a key press while a widget has the focus: Tab, Escape, or a key for that widget."""
         page = self._page
         page.tool_tip.restart()
         if self._pass_to_list(event):
@@ -117,7 +120,7 @@ class PageEvents:
         return True
 
     def _handle_composition(self, event: pygame.event.Event) -> bool:
-        """Show the text that an input method is composing."""
+        """Show text that an input method is still composing."""
         page = self._page
         if page.edit is None:
             return False
@@ -130,7 +133,7 @@ class PageEvents:
         self._page.run(event)
 
     def _pass_to_list(self, event: pygame.event.Event) -> bool:
-        """Pass an event to the open list; return whether it was meant for that."""
+        """Pass an event to the open list; return whether the list has handled it."""
         page = self._page
         if page.open_list is None:
             return False
@@ -140,7 +143,7 @@ class PageEvents:
             page.stop_typing()
         elif response is ListResponse.PICKED:
             page.focus = None
-            page.run()  # Its menu reads the picked option.
+            page.run()  # In this run, the menu reads the picked option.
             page.open_list = None
         return response is not ListResponse.IGNORED
 

@@ -1,4 +1,4 @@
-"""Rows of cells, laid out from top to bottom in a box of the window."""
+"""Rows of cells that are laid out from top to bottom in a box of the window."""
 
 from pygame import Rect
 
@@ -7,7 +7,7 @@ _GAP = 6.0
 
 
 class RowLayout:
-    """Gives widgets their places: each takes the next cell of the current row.
+    """Assigns positions to widgets: each takes the next cell of the current row.
 
     When a row is full, another one with the same cells starts below it. Lengths are in pixels at scale 1,
     relative to the box; rectangles are in pixels of the window.
@@ -15,15 +15,15 @@ class RowLayout:
     Attributes
     ----------
     box : pygame.Rect
-        Part of the window that is laid out.
+        Part of the window in which rows are laid out, px.
     scale : float
-        Pixels for a length of 1.
+        Pixels per unit of length.
     x, y : float
-        Upper left corner of the next row.
+        Position of the upper left corner of the next row in the box.
     width : float
         Width of the rows.
     clip : pygame.Rect
-        Part of the window in which widgets can be seen.
+        Part of the window in which widgets are visible, px.
     """
 
     def __init__(self, scale: float) -> None:
@@ -61,7 +61,7 @@ class RowLayout:
         Parameters
         ----------
         *widths : float
-            Widths of the cells. Cells of width 0 share what the others leave. By default there is one cell.
+            Widths of the cells. Cells of width 0 share the remaining width. By default there is one cell.
         height : float
             Height of a row.
         gap : float
@@ -82,7 +82,7 @@ class RowLayout:
         self._space_below = below
 
     def end_row(self) -> None:
-        """Move below the current row, if a cell of it was taken."""
+        """Move below the current row, unless none of its cells has been used."""
         if self._next_cell:
             self.y += self._row_height + self._space_below
         self._next_cell = 0
@@ -97,7 +97,7 @@ class RowLayout:
         self.y += height
 
     def cell(self) -> Rect:
-        """Take the next cell, and return its place in the window."""
+        """Take the next cell, and return its position in the window, px."""
         if not self._cells:
             self.row()
         if self._next_cell == len(self._cells):

@@ -1,4 +1,4 @@
-"""Areas whose content scrolls when it is higher than its place."""
+"""Areas whose content scrolls when it is higher than the available space."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,16 +13,16 @@ from robocov_app.toolkit.window.input import get_wheel_notches
 # Lengths in pixels at scale 1.
 BAR_WIDTH_PX = 10.0
 PANEL_MARGIN_PX = 12.0
-"""Margin at the side of a panel, in which the scroll bar is."""
+"""Margin at the side of a panel, which contains the scroll bar."""
 _NOTCH_PX = 40.0
-"""Length by which a notch of the wheel scrolls."""
+"""Distance scrolled by one notch of the wheel."""
 _MIN_KNOB_PX = 20
 _HEIGHT_TOLERANCE_PX = 0.5
 
 
 @contextmanager
 def scroll(page: Page, key: str) -> Iterator[None]:
-    """Put the following widgets into an area that takes the rest of the page, and scrolls.
+    """Put the widgets shown in this context into a scroll area that fills the rest of the page.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def scroll(page: Page, key: str) -> Iterator[None]:
 
 
 def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
-    """Lay out many equal rows of one cell, and yield the numbers of those that can be seen.
+    """Lay out many rows of equal height with one cell each, and yield the indices of the visible ones.
 
     Parameters
     ----------
@@ -90,7 +90,24 @@ def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
 
 
 def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: float) -> float:
-    """Show the scroll bar of an area, and return the length that is scrolled out of view."""
+    """Show the scroll bar of an area and handle its input; return the new scroll offset.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+        Key of the scroll area.
+    area : pygame.Rect
+        Position of the area in the window, px.
+    content_height : float
+        Height of all content at scale 1, px; larger than the area.
+    offset : float
+        Scroll offset before this event, at scale 1, px.
+
+    Returns
+    -------
+    float
+    """
     height = area.height / page.scale
     max_offset = content_height - height
     bar_key = f"bar:{key}"
@@ -112,6 +129,7 @@ def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: f
             page.grab_offset = knob.height / 2
             if is_on_knob:
                 page.grab_offset = page.pointer[1] - knob.top
+        # A press beside the knob moves the middle of the knob there at once.
         if not is_on_knob:
             offset = (page.pointer[1] - page.grab_offset - track.top) / free_height * max_offset
     offset = min(max(offset, 0.0), max_offset)

@@ -1,11 +1,11 @@
-"""Sections of a page, whose content can be hidden."""
+"""Sections of a page that can be collapsed."""
 
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box, draw_focus_ring, draw_text, shade
 from robocov_app.toolkit.widgets.page import Page, Widget
 
 
 def show_section(page: Page, title: str, *, key: str = "") -> bool:
-    """Show the title of a section; a click hides or shows the content.
+    """Show the title of a section; a click on it hides or shows the content.
 
     Parameters
     ----------
@@ -17,14 +17,14 @@ def show_section(page: Page, title: str, *, key: str = "") -> bool:
     Returns
     -------
     bool
-        Whether the content is shown.
+        Whether the section is open, so that the caller shows its content.
     """
     key = f"section:{key or title}"
     page.row(height=20, below=4)
     rect = page.cell()
     widget = Widget("section", key, rect, title)
     if page.add_clickable(widget):
-        page.folded_sections ^= {key}
+        page.folded_sections ^= {key}  # Add the key, or remove it if it is there.
         page.needs_redraw = True
     is_open = key not in page.folded_sections
     widget.value = is_open

@@ -16,16 +16,16 @@ _KNOB_RADIUS_PX = 5
 
 _KEY_STEPS = {"left": -1, "down": -1, "right": 1, "up": 1}
 _STEPS_OF_KEYS = 50
-"""Steps of the arrow keys from one end to the other, if values have no steps of their own."""
+"""Number of arrow key presses from one end to the other, if `step` is 0."""
 
 
 @dataclass(frozen=True)
 class _Range:
-    """Values of a slider, and where they are on its track."""
+    """Range of values of a slider, and its track in the window."""
 
     low: float
     high: float
-    step: float  # 0 for any value
+    step: float  # spacing of the values; 0 if any value is possible
     track: Rect
     knob_width: int
 
@@ -36,7 +36,7 @@ class _Range:
 
     @property
     def free_width(self) -> int:
-        """Length by which the knob can move, px."""
+        """Distance over which the knob can move, px."""
         return max(self.track.width - self.knob_width, 1)
 
     def compute_fraction(self, value: float) -> float:
@@ -44,7 +44,7 @@ class _Range:
         return min(max((value - self.low) / self.span, 0.0), 1.0)
 
     def limit(self, value: float) -> float:
-        """Return the nearest value that the slider can have."""
+        """Return the nearest value that the slider allows."""
         value = min(max(value, self.low), self.high)
         if not self.step:
             return value
@@ -69,16 +69,16 @@ def show_slider(
     page : Page
     key : str
     value, low, high : float
-        The value, and those at the ends.
+        The current value, and the values at the left and right end.
     step : float
-        Distance of the values that it can have; 0 if it can have any.
+        Spacing of the possible values; 0 if any value is possible.
     disabled_reason : str
         Why it cannot be moved; empty if it can.
 
     Returns
     -------
     float or None
-        The value to which it was just moved.
+        The new value if the slider was just moved; otherwise None.
     """
     rect = page.cell()
     track = Rect(rect.left, 0, rect.width, page.px(_TRACK_HEIGHT_PX))
@@ -98,7 +98,7 @@ def show_slider(
 
 
 def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
-    """Return the value to which the mouse or the keys move a slider, which may be beyond its ends."""
+    """Return the value after the mouse or key event of this run; it may lie beyond the ends."""
     track = values.track
     knob_left = track.left + values.free_width * values.compute_fraction(value)
     is_pressed = page.is_pressed(track)
@@ -119,6 +119,7 @@ def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
 
 
 def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabled: bool) -> None:
+    """Draw the track, filled up to the knob, and the knob of a slider."""
     theme = page.theme
     track = values.track
     knob_offset = round(fraction * (track.width - values.knob_width))

@@ -1,4 +1,4 @@
-"""The text of a one-line field: cursor, selection, clipboard, undo, and what an input method composes."""
+"""Editing of a one-line text field: cursor, selection, clipboard, undo, and input methods."""
 
 import re
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from robocov.text import remove_controls
 from robocov_app.toolkit.window.clipboard import Clipboard
 
 MAX_CHARS = 10_000
-"""Characters of a field: as many as the longest texts in maps have."""
+"""Maximum length of the text, which is that of the longest texts in maps."""
 
 _State = tuple[str, int, int]  # text, caret and anchor
 
@@ -23,9 +23,9 @@ class TextEdit:
     caret : int
         Position of the text cursor, from 0 to the number of characters.
     anchor : int
-        Other end of the selection, which is empty if it is the caret.
+        Other end of the selection. The selection is empty if this equals the caret.
     composed : str
-        Text that an input method is composing. It is shown at the caret, but not yet part of the text.
+        Text that an input method is composing. It is shown at the caret but is not part of the text yet.
     """
 
     text: str = ""
@@ -38,12 +38,12 @@ class TextEdit:
 
     @classmethod
     def select_all(cls, text: str) -> Self:
-        """Start editing a text that is selected, so that typing replaces it."""
+        """Start editing with all text selected, so that typing replaces it."""
         return cls(text, len(text), 0)
 
     @classmethod
     def append_to(cls, text: str) -> Self:
-        """Start editing a text with the caret at its end."""
+        """Start editing with the caret at the end of the text."""
         return cls(text, len(text), len(text))
 
     @property
@@ -52,7 +52,7 @@ class TextEdit:
         return min(self.caret, self.anchor), max(self.caret, self.anchor)
 
     def place(self, caret: int, *, extend: bool = False) -> None:
-        """Move the caret, and start a new selection there unless the present one is extended."""
+        """Move the caret; extend the selection to it, or else clear the selection."""
         self.caret = min(max(caret, 0), len(self.text))
         if not extend:
             self.anchor = self.caret
@@ -65,12 +65,12 @@ class TextEdit:
                 self.anchor, self.caret = word.span()
 
     def type(self, text: str) -> None:
-        """Replace the selection by a text.
+        """Replace the selection with typed or pasted text.
 
         Parameters
         ----------
         text : str
-            Line ends become blanks; text beyond `MAX_CHARS` is cut off.
+            Line breaks become spaces; text beyond `MAX_CHARS` is cut off.
         """
         low, high = self.selection
         max_length = max(MAX_CHARS - len(self.text) + (high - low), 0)
@@ -80,20 +80,21 @@ class TextEdit:
         self.composed = ""
 
     def press_key(self, name: str, clipboard: Clipboard) -> None:
-        """Edit the text by a key; keys that mean nothing here are ignored.
+        """Edit the text in response to a key; keys without a function here are ignored.
 
         Parameters
         ----------
         name : str
             Name with modifiers, as in ``ctrl+z``.
         clipboard : Clipboard
-            Text that is copied and pasted.
+            Clipboard for Ctrl+C, Ctrl+X and Ctrl+V.
         """
         key = name.replace("shift+", "")
         if key == "ctrl+y" or name == "ctrl+shift+z":
             self._swap(self._redo, self._undo)
             return
         targets = self._find_targets()
+        # Backspace erases up to where the left arrow key would go, Delete up to where the right one would.
         erase_key = key.replace("backspace", "left").replace("delete", "right")
         if key in targets:
             self._move(key, targets[key], extend="shift+" in name)
@@ -128,12 +129,12 @@ class TextEdit:
     def _move(self, key: str, target: int, *, extend: bool) -> None:
         start, end = self.selection
         if start != end and not extend:
-            # An arrow key leaves the selection at its end on that side.
+            # Without Shift, an arrow key moves the caret to that end of the selection.
             target = {"left": start, "right": end}.get(key, target)
         self.place(target, extend=extend)
 
     def _erase(self, target: int) -> None:
-        """Erase the selection; if it is empty, erase the text between the caret and a position."""
+        """Erase the selection; if it is empty, erase the text between the caret and `target`."""
         start, end = self.selection
         if start == end:
             start, end = sorted((self.caret, target))
@@ -141,6 +142,7 @@ class TextEdit:
             self._replace(start, end, "")
 
     def _press_ctrl_key(self, key: str, clipboard: Clipboard) -> None:
+        """Select all, copy, cut, paste or undo."""
         start, end = self.selection
         if key == "ctrl+a":
             self.anchor = 0
@@ -155,7 +157,7 @@ class TextEdit:
             self._swap(self._undo, self._redo)
 
     def _replace(self, start: int, end: int, text: str, *, is_typing: bool = False) -> None:
-        # Characters that are typed one after the other are undone together.
+        # Characters typed in succession are undone together.
         continues_typing = is_typing and self._typing and start == end
         if not continues_typing:
             self._undo.append((self.text, self.caret, self.anchor))
@@ -166,7 +168,7 @@ class TextEdit:
         self.anchor = self.caret
 
     def _swap(self, source: list[_State], target: list[_State]) -> None:
-        """Return to the last state of one list, and add the present one to the other."""
+        """Restore the last state of one list, and append the present state to the other (undo or redo)."""
         if source:
             target.append((self.text, self.caret, self.anchor))
             self.text, self.caret, self.anchor = source.pop()

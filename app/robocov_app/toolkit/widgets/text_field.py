@@ -1,4 +1,4 @@
-"""Text fields of one line."""
+"""One-line text fields."""
 
 from bisect import bisect_left
 
@@ -28,18 +28,18 @@ def show_text_field(
     page : Page
     key : str
     text : str
-        Text while it is not edited.
+        Text that is shown while the field is not being edited.
     placeholder : str
         Faint text in the empty field.
     tip : str
         Tool tip.
     live : bool
-        Whether each change is returned, not only the text after Enter.
+        Whether every change is returned, not only the text confirmed with Enter.
 
     Returns
     -------
     str or None
-        The new text.
+        The new text; None if it has not changed or is not confirmed yet.
     """
     rect = page.cell()
     if page.is_pressed(rect):
@@ -60,7 +60,7 @@ def show_text_field(
 
 
 def _press(page: Page, key: str, text: str, rect: Rect) -> None:
-    """Start editing, or place the text cursor; a double click selects a word."""
+    """Handle a click: start editing, or move the text cursor; a double click selects a word."""
     page.consume_event()
     is_double = page.is_double_click(key)
     if page.focus != key or page.edit is None:
@@ -74,7 +74,7 @@ def _press(page: Page, key: str, text: str, rect: Rect) -> None:
 
 
 def _read_input(page: Page, key: str, rect: Rect) -> str | None:
-    """Pass a key or a drag to the text that is edited; return the text after Enter."""
+    """Pass a key or a mouse drag to the text being edited; return the text if Enter was pressed."""
     edit = page.get_edit(key)
     if edit is None:
         return None
@@ -106,7 +106,7 @@ def _get_inner(page: Page, rect: Rect) -> Rect:
 
 
 def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
-    """Return the caret position nearest to the pointer. Longer texts are wider, so it bisects."""
+    """Return the caret position nearest to the pointer, by bisection: longer text is wider."""
     x = page.pointer[0] - rect.left - page.px(_MARGIN_PX) + _compute_shift(page, edit, rect)
 
     def get_width_before(caret: int) -> int:
@@ -118,7 +118,7 @@ def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
 
 
 def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
-    """Return the length by which a long text is moved to the left so that its caret is visible, px."""
+    """Return how far a long text is shifted to the left to keep its caret visible, px."""
     width_before = measure_text(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
     return max(width_before - (rect.width - page.px(14)), 0)
 
@@ -134,7 +134,7 @@ def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
 
 
 def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placeholder: str) -> None:
-    """Draw a text with its selection, its cursor, and the text that an input method is composing."""
+    """Draw the text being edited, with selection, cursor, and what an input method is composing."""
     theme = page.theme
     size = page.px(TEXT_PX)
     clip = screen.get_clip()

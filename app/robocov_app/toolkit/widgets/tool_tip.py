@@ -1,4 +1,4 @@
-"""Tool tips: texts on widgets over which the mouse rests."""
+"""Tool tips: short texts that appear when the mouse rests on a widget."""
 
 from time import perf_counter
 
@@ -10,7 +10,7 @@ from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import draw_rounded_box, wrap_text
 
 TIP_DELAY_S = 0.6
-"""Time for which the mouse rests before a tool tip appears."""
+"""Time for which the mouse must rest before a tool tip appears."""
 
 _TEXT_COLOR: Color = (245, 247, 250)
 # Lengths in pixels at scale 1.
@@ -21,18 +21,18 @@ _DISTANCE_PX = 5.0
 
 
 class ToolTip:
-    """Decides when the tip of a widget is due, and draws it."""
+    """Decides when the tool tip of a widget is due."""
 
     def __init__(self) -> None:
         self._hovered = ""
         self._rested_since_s = perf_counter()
 
     def restart(self) -> None:
-        """Start waiting again, because a button or key was pressed."""
+        """Restart the waiting time, because a button or key was pressed."""
         self._rested_since_s = perf_counter()
 
     def note_hovered(self, widget: str) -> bool:
-        """Note the widget under the mouse, and return whether it is another one than before.
+        """Record the widget under the mouse, and return whether it has changed.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     x : int
         Left end of the tip, px.
     widget : pygame.Rect
-        Place of the widget.
+        Position of the widget in the window, px.
     """
     size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)

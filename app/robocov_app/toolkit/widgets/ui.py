@@ -1,7 +1,7 @@
-"""Immediate-mode widgets: the content of a page is a function that shows and edits each value in one place.
+"""Immediate-mode widgets: a page is a function that shows each value and handles its input in one place.
 
-The content runs once for every event and once for every drawing. A widget returns what the user did to it in
-this run: a button True, others the new value, None if nothing happened::
+The function runs once for every event and once for every drawing. A widget returns the user's input in this
+run: a button returns True when it is pressed; others return the new value, or None if nothing happened::
 
     def show_run(ui: Ui) -> None:
         ui.row(0, 0, 80)  # Widths of the cells at scale 1; cells of width 0 share what is left.
@@ -25,12 +25,12 @@ from robocov_app.toolkit.widgets.page_events import PageEvents
 
 
 class Ui(Page):
-    """A page with widgets as methods.
+    """A page that has the widgets as methods.
 
     Parameters
     ----------
     content : callable
-        Gets the page, and shows and edits its content.
+        Called with the page in every run; shows the widgets and handles their input.
     theme : Theme
     scale : float
         Size of texts and widgets.
@@ -58,7 +58,7 @@ class Ui(Page):
         self._events = PageEvents(self)
 
     def build(self) -> None:
-        """Show and edit the content."""
+        """Run the content function."""
         self._content(self)
 
     def handle_event(self, event: pygame.event.Event) -> bool:

@@ -1,1 +1,1 @@
-"""The main loop of a window, its display, its size and its end."""
+"""The main loop of a window, its display, its layout, and how it ends."""

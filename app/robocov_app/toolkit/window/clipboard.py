@@ -12,7 +12,7 @@ _NOT_AVAILABLE = (pygame.error, AttributeError, ValueError)  # ValueError: a tex
 class Clipboard:
     """The system's clipboard, which all windows share.
 
-    Where the display has no clipboard, the text that was put last stays in this object.
+    If the display has no clipboard, the text copied last is kept in this object.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class Clipboard:
         return remove_controls(text) or self._own_text
 
     def put(self, text: str) -> None:
-        """Put a text on the clipboard, without control characters."""
+        """Copy text to the clipboard, without control characters."""
         self._own_text = remove_controls(text)
         with suppress(*_NOT_AVAILABLE):
             pygame.scrap.put_text(self._own_text)

@@ -25,7 +25,7 @@ Action: TypeAlias = Callable[[], object]
 
 @dataclass(frozen=True)
 class WindowActions:
-    """Actions of the window that commands of both windows start.
+    """Functions of a window that are called by the commands that both windows have.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class WindowActions:
     save_screenshot : callable
         Saves a picture of the window.
     toggle_help : callable
-        Shows or hides the keys.
+        Shows or hides the help page.
     open_palette : callable
         Opens the palette.
     """
@@ -49,14 +49,14 @@ class WindowActions:
 
 
 class CommandWindow(BaseWindow):
-    """A window in which events go to the dialog, else to the panel, the keys of commands, or the map.
+    """A window that passes each event to the open dialog, or else to the panel, a command or the map.
 
     Parameters
     ----------
     model : WindowModel
         State of the window.
     dialogs : Dialogs
-        Open dialogs.
+        Shows the open dialog.
     size : (width, height), px
     scale : float
         Size of texts and widgets.
@@ -66,17 +66,17 @@ class CommandWindow(BaseWindow):
     Attributes
     ----------
     groups : tuple of str
-        Headings of the help, in their order.
+        Headings of the help page, in the order in which they are shown.
     keys_hint : str
-        Last line of the help.
+        Hint next to the title of the help page.
     palette_hint : str
         Faint text in the empty field of the palette.
     model : WindowModel
         State of the window.
     dialogs : Dialogs
-        Open dialogs.
+        Shows the open dialog.
     is_help_open : bool
-        Whether the keys are shown.
+        Whether the help page is shown.
     commands : CommandTable
         All commands.
     panel : CommandPanel
@@ -116,14 +116,14 @@ class CommandWindow(BaseWindow):
     # Commands
 
     def do(self, name: str) -> None:
-        """Run a command by its name; "cancel" closes the help first."""
+        """Run the command with this name; while the help page is open, "cancel" only closes that."""
         if name == "cancel" and self.is_help_open:
             self.is_help_open = False
         else:
             self.commands.run(name)
 
     def toggle_help(self) -> None:
-        """Show or hide the keys."""
+        """Show or hide the help page."""
         self.is_help_open = not self.is_help_open
 
     def open_palette(self) -> None:
@@ -131,13 +131,13 @@ class CommandWindow(BaseWindow):
         self.dialogs.ask(create_palette(self.commands, self.palette_hint, self.show_result))
 
     def show_result(self, message: str) -> None:
-        """Show the message of a command of the palette; empty for none."""
+        """Show the message that a command of the palette has returned; nothing if it is empty."""
         self.model.attempt(lambda: message)
 
     # Events
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event: by the dialog that is open, else by panel, commands or map."""
+        """Pass an event to the open dialog, or else to the panel, a command or the map."""
         if event.type == pygame.KEYUP:
             self.commands.release_key(event)
         elif event.type == pygame.WINDOWFOCUSLOST:
@@ -148,21 +148,22 @@ class CommandWindow(BaseWindow):
             self._handle_below_dialogs(event)
 
     def handle_quit(self) -> None:
-        """Handle that the user closes the window."""
+        """React when the user closes the window."""
         self.closed = True
 
     def open_file(self, path: Path) -> None:
         """Open a file that was dropped on the window."""
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Use a key for something other than a command; return whether it was."""
+        """Offer a key to the panel before commands get it; return whether it was used."""
         return self.panel.handle_event(event)
 
     def handle_mouse(self, event: pygame.event.Event) -> None:
-        """Handle an event of the mouse."""
+        """Handle a mouse event that no dialog has used."""
         self.pointer.handle_event(event, self.model.now)
 
     def _handle_below_dialogs(self, event: pygame.event.Event) -> None:
+        """Handle an event that no dialog has used."""
         if event.type == pygame.DROPFILE:
             self.model.attempt(lambda: self.open_file(Path(event.file)))
         elif event.type == pygame.KEYDOWN:
@@ -177,30 +178,30 @@ class CommandWindow(BaseWindow):
             self.panel.handle_event(event)
 
     def press_key(self, event: pygame.event.Event) -> None:
-        """Handle a key: as input, or as the key of a command."""
+        """Handle a key press: as input for the panel, or by running the command of that key."""
         if not self.use_key(event):
             command = self.commands.press_key(event)
             if command is not None:
                 self.do(command.name)
-        # The text of the key comes as an event of its own, and is not meant for a dialog that has opened.
+        # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
         self.dialogs.ignore_letter(event.unicode)
 
     # Faults and drawing
 
     def report_fault(self, message: str, *, in_drawing: bool) -> None:
-        """Show a message on an unexpected exception; if drawing raised it, close what may be the cause."""
+        """Show a message about an unexpected exception; close what may have caused it in drawing."""
         if in_drawing:
             self.restore_view()
         self.model.show_message(message, is_error=True)
         self.model.revision += 1
 
     def restore_view(self) -> None:
-        """Close everything that may be the cause of an exception in drawing."""
+        """Close everything that may have caused an exception while drawing."""
         self.is_help_open = False
         self.dialogs.discard()
 
     def draw_above_map(self) -> None:
-        """Draw help and dialog, and show the frame."""
+        """Draw the help page and the open dialog over the window, and show the frame."""
         scale = self.layout.scale
         if self.is_help_open:
             commands = self.commands.commands

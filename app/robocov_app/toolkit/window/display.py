@@ -1,4 +1,4 @@
-"""The display: SDL's driver, sizes and scale, and the title of the window."""
+"""The display: SDL's video driver, size and scale of the window, and its title."""
 
 import gc
 import os
@@ -17,26 +17,26 @@ from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 
 _DRIVER_VARIABLE = "SDL_VIDEODRIVER"
 _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
-"""Environment variables; Linux needs one of them for a visible window."""
+"""Environment variables. On Linux, one of them must be set for a visible window."""
 _INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
-"""Drivers that SDL chooses silently if there is no display; the program would run for ever, unseen."""
+"""Drivers that SDL silently falls back to without a display; the program would run forever, unseen."""
 _FULL_HD_HEIGHT_PX = 1080
 _MAX_SCALE = 3.0
 _SCALE_STEP = 0.25
 _COLLECTION_THRESHOLD = 50_000
-"""Allocations between two garbage collections: about one collection in a frame (Python's default is 700)."""
+"""Allocations between garbage collections: about one collection per frame (Python's default is 700)."""
 
 
 @contextmanager
 def open_display(*, headless: bool, missing_message: str = "no display") -> Iterator[None]:
-    """Start pygame's display, visible or not.
+    """Start pygame's display for the duration of a context.
 
     Parameters
     ----------
     headless : bool
-        Whether windows are drawn without a display.
+        Whether windows are drawn in memory only, without a display.
     missing_message : str
-        Message if a visible window is not possible.
+        Error message if a visible window is not possible.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def open_display(*, headless: bool, missing_message: str = "no display") -> Iter
         finally:
             pygame.display.quit()
     finally:
-        # Otherwise a later window of this process would be invisible, too.
+        # Otherwise, later windows of this process would be invisible, too.
         if previous_driver is None:
             os.environ.pop(_DRIVER_VARIABLE, None)
         else:
@@ -63,7 +63,7 @@ def open_display(*, headless: bool, missing_message: str = "no display") -> Iter
 
 
 def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
-    """Start pygame's display, or raise an InputError with a message if it would be invisible but must not."""
+    """Start pygame's display; raise an InputError if only an invisible one is available but not allowed."""
     has_display = sys.platform != "linux" or any(os.environ.get(name) for name in _DISPLAY_VARIABLES)
     if not has_display:
         raise InputError(missing_message)
@@ -79,14 +79,14 @@ def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
 
 
 def get_screen_scale() -> float:
-    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
+    """Return the scale at which text is readable on the largest display: 1 up to full HD, 2 for 4K."""
     height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=_FULL_HD_HEIGHT_PX)
     scale = round(height / _FULL_HD_HEIGHT_PX / _SCALE_STEP) * _SCALE_STEP
     return float(min(max(scale, 1.0), _MAX_SCALE))
 
 
 def choose_scale(requested: float | None, *, has_display: bool) -> float:
-    """Return the scale of a window: the requested one, or the one that suits the display.
+    """Return the scale of a window: the requested one, or by default one that suits the display.
 
     Parameters
     ----------
@@ -101,14 +101,14 @@ def choose_scale(requested: float | None, *, has_display: bool) -> float:
 
 
 def fit_to_screen(size: tuple[int, int]) -> tuple[int, int]:
-    """Return a size in pixels that is not larger than the screen."""
+    """Return a window size reduced to the size of the screen, px."""
     max_width, max_height = max(pygame.display.get_desktop_sizes(), default=size)
     width, height = size
     return min(width, max_width), min(height, max_height)
 
 
 def open_window(size: tuple[int, int]) -> Surface:
-    """Open the window that the user can resize, and return its surface.
+    """Open a window that the user can resize, and return its surface.
 
     Parameters
     ----------
@@ -120,14 +120,14 @@ def open_window(size: tuple[int, int]) -> Surface:
     """
     screen = pygame.display.set_mode(size, pygame.RESIZABLE)
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
-        # There is no other way yet to give a window of the display module a minimum size.
+        # The display module offers no other way yet to set the minimum size of its window.
         warnings.simplefilter("ignore", DeprecationWarning)
         pygame.Window.from_display_module().minimum_size = MIN_SIZE_PX
     return screen
 
 
 def set_title(title: str) -> None:
-    """Set the title of the window, without control characters, if it has changed."""
+    """Set the title of the window if it has changed; control characters are removed."""
     title = remove_controls(title, single_line=True)
     if title != pygame.display.get_caption()[0]:
         pygame.display.set_caption(title)
@@ -135,7 +135,7 @@ def set_title(title: str) -> None:
 
 @contextmanager
 def collect_garbage_rarely() -> Iterator[None]:
-    """Exempt existing objects from garbage collection, which would delay a frame by 25 ms."""
+    """Collect garbage less often, and exempt existing objects, which would delay a frame by 25 ms."""
     previous_threshold = gc.get_threshold()
     gc.collect()
     gc.freeze()

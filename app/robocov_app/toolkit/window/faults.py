@@ -1,6 +1,6 @@
-"""Unexpected exceptions in a window: logged with their traceback, and reported in one sentence.
+"""Unexpected exceptions in a window, which are logged with their traceback and reported in one sentence.
 
-The log is the file `LOG_FILE` in the folder for drafts, or standard error if no drafts are kept.
+The log is the file `LOG_FILE` in the folder for drafts, or standard error if there is no such folder.
 """
 
 import logging
@@ -15,16 +15,16 @@ from robocov.text import remove_controls
 
 LOG_FILE = "errors.log"
 _MAX_LOG_BYTES = 1_000_000
-"""Size of the file; one older file of this size is kept."""
+"""Maximum size of the log file; one older file of this size is kept."""
 _MAX_MESSAGE_CHARS = 120
 _MAX_LEVELS = 30
-"""Entries of a traceback; endless recursion has thousands."""
+"""Maximum number of traceback entries that are logged; infinite recursion has thousands."""
 
 
 class FaultLog:
     """Logs unexpected exceptions of a window.
 
-    The same exception may come with every frame. It is logged the first, the tenth, the hundredth time, ...
+    The same exception may be raised in every frame. Only its 1st, 10th, 100th, ... occurrence is logged.
 
     Parameters
     ----------
@@ -44,17 +44,18 @@ class FaultLog:
         ----------
         error : BaseException
         action : str
-            The action that raised it, as in "drawing".
+            What the window was doing, such as "drawing".
 
         Returns
         -------
         str
-            The exception in one sentence, with the place of the log.
+            One sentence with the exception and where the log is.
         """
         self.count += 1
         place = _find_place(error)
         self._counts[place] += 1
         count = self._counts[place]
+        # True for the powers of ten: 1, 10, 100, ...
         if str(count).strip("0") == "1":
             self._write(error, action, count)
         message = remove_controls(" ".join(str(error).split()), single_line=True)[:_MAX_MESSAGE_CHARS]
@@ -65,18 +66,20 @@ class FaultLog:
         return f"Internal error while {action} ({name}). Details: {log}."
 
     def _write(self, error: BaseException, action: str, count: int) -> None:
+        """Write an exception with its traceback to the log; `count` is how often it has occurred."""
         repeated = f" (number {count})" if count > 1 else ""
         lines = traceback.format_exception(type(error), error, error.__traceback__, limit=-_MAX_LEVELS)
         text = f"robocov: internal error while {action}{repeated}\n{''.join(lines)}"
         handler = self._open_handler()
         handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
         try:
-            # A handler reports its own errors, such as a full disk, on standard error, and raises nothing.
+            # A handler reports its own errors, such as a full disk, on standard error and never raises.
             handler.handle(logging.LogRecord("robocov", logging.ERROR, "", 0, text, None, None))
         finally:
             handler.close()
 
     def _open_handler(self) -> logging.Handler:
+        """Open the log file; if that fails, log to standard error from now on."""
         if self.file is not None:
             try:
                 self.file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -93,7 +96,7 @@ class FaultLog:
 
 
 def describe_os_error(error: OSError) -> str:
-    """Return the file and the reason of an error of the system, on one line."""
+    """Return the file name and the reason of an operating system error, on one line."""
     reason = error.strerror or str(error) or type(error).__name__
     if error.filename is not None:
         reason = f"{os.fsdecode(error.filename)}: {reason}"
@@ -101,7 +104,7 @@ def describe_os_error(error: OSError) -> str:
 
 
 def _find_place(error: BaseException) -> tuple[str, str, int]:
-    """Return the type of an exception, and the file and line that raised it."""
+    """Return the type of an exception, and the file and line number at which it was raised."""
     frames = traceback.extract_tb(error.__traceback__, limit=-1)
     if not frames:
         return type(error).__name__, "", 0

@@ -1,4 +1,4 @@
-"""Names of keys, events without control characters, and notches of the wheel."""
+"""Names of keys, cleaning of events, and notches of the mouse wheel."""
 
 import math
 from collections.abc import Sequence
@@ -8,11 +8,11 @@ import pygame
 from robocov.text import remove_controls
 
 KEY_REPEAT_MS = (350, 40)
-"""Time before a held key is repeated, and between further repetitions."""
+"""Delay before a held key repeats, and interval of the repetitions."""
 DOUBLE_CLICK_S = 0.35
 """Maximum time between the two clicks of a double click."""
 MAX_CLICK_MOVE_PX = 5.0
-"""Distance that the mouse may move during a click."""
+"""Distance at scale 1 that the mouse may move during a click."""
 ZOOM_PER_NOTCH = 1.15
 """Magnification of one notch of the wheel."""
 MOUSE_EVENTS = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
@@ -30,7 +30,7 @@ _KEY_SYMBOLS = {"left": "←", "right": "→", "up": "↑", "down": "↓", "retu
 def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
     """Remove control characters from the text of an event.
 
-    The name of a dropped file may contain any character but NUL, and is otherwise not changed.
+    From the name of a dropped file, only NUL is removed; file names may contain all other characters.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
     Returns
     -------
     pygame.event.Event or None
-        None if nothing is left of the text.
+        The event without control characters; None if no text is left.
     """
     if event.type in (pygame.TEXTINPUT, pygame.TEXTEDITING):
         text = remove_controls(event.text, single_line=True)
@@ -52,16 +52,16 @@ def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
 
 
 def drop_late_repeats(events: Sequence[pygame.event.Event], held: set[int]) -> list[pygame.event.Event]:
-    """Leave out repetitions of a key that was released while the window was busy.
+    """Drop the repeats of a key that was released while the window was busy.
 
-    A key that is tapped while a frame takes long seems to be held, because its release has not been read.
+    If a key is tapped during a long frame, it seems to be held, because its release has not been read yet.
 
     Parameters
     ----------
     events : sequence of pygame.event.Event
-        All events that have arrived, the oldest first.
+        All events that have arrived, oldest first.
     held : set of int
-        Keys that are held down before them; updated to those held down after them.
+        Keys held down before these events; updated in place to those held down after them.
 
     Returns
     -------
@@ -83,9 +83,9 @@ def drop_late_repeats(events: Sequence[pygame.event.Event], held: set[int]) -> l
 
 
 def get_key_name(event: pygame.event.Event) -> str:
-    """Return the name of a pressed key with its modifiers, as in ``ctrl+shift+z``."""
+    """Return the name of a pressed key with its modifiers, such as ``ctrl+shift+z``."""
     name = pygame.key.name(event.key)
-    name = name.strip("[]") or name  # Names of keys on the key pad are in brackets.
+    name = name.strip("[]") or name  # pygame puts the names of numeric keypad keys in brackets.
     modifiers = [modifier for modifier, mask in _MODIFIERS.items() if event.mod & mask]
     return "+".join([*modifiers, name])
 
@@ -103,7 +103,7 @@ def split_key_name(name: str) -> list[str]:
 
 
 def format_key(name: str) -> str:
-    """Format a key for users.
+    """Format the name of a key for display.
 
     >>> format_key("ctrl+shift+z")
     'Ctrl Shift Z'
@@ -115,7 +115,7 @@ def format_key(name: str) -> str:
 def get_wheel_notches(event: pygame.event.Event) -> float:
     """Return the number of notches by which the wheel was turned.
 
-    Touch pads turn it by fractions of a notch.
+    Touchpads report fractions of a notch. The result is limited to plus or minus `_MAX_NOTCHES`.
     """
     notches = float(getattr(event, "precise_y", event.y) or event.y)
     if not math.isfinite(notches):

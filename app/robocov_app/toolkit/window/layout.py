@@ -1,4 +1,4 @@
-"""Window layout: arena, panel, chart, timeline and status line. Pure arithmetic."""
+"""Layout of a window: boxes of arena, panel, chart, timeline and status line."""
 
 from math import ceil, floor
 from typing import NamedTuple, TypeAlias
@@ -16,13 +16,13 @@ STATUS_HEIGHT_PX = 26
 PANE_GAP_PX = 2
 LEGEND_ROW_PX = 22
 MIN_SIZE_PX = (900, 600)
-"""Width and height of a window in which everything fits at scale 1."""
+"""Minimum width and height of a window in which everything fits at scale 1."""
 MIN_PORTRAIT_SIZE_PX = (460, 600)
 """The same for a phone in portrait orientation, where the panel takes most of the width."""
 
 _MIN_SCALE = 0.25
 _SCALE_STEPS = 8
-"""Steps from one scale to the next integer, so that text does not tremble while the window is resized."""
+"""Scales are multiples of 1 / 8, so that text does not jitter while the window is resized."""
 
 
 class Layout(NamedTuple):
@@ -32,15 +32,15 @@ class Layout(NamedTuple):
     ----------
     size : (width, height), px
     scale : float
-        The requested scale, or the largest for which the window is large enough.
+        The requested scale, or the largest one at which everything fits into the window.
     arena, chart, track, status : Box
-        The track is the timeline below the chart.
+        `track` is the timeline below the chart.
     panel : Box
-        Of width 0 while it is hidden.
+        Its width is 0 while the panel is hidden.
     panes : tuple of Box
-        Parts of the arena.
+        Part of the arena for each pane.
     legend : Box
-        Above several panes, which share it; of height 0 above a single one.
+        The legend that several panes share, above them; its height is 0 for a single pane.
     """
 
     size: tuple[int, int]
@@ -70,15 +70,15 @@ def build_layout(
     ----------
     size : (width, height), px
     scale : float
-        Requested size of texts and widgets.
+        Requested scale of texts and widgets.
     panes : int
-        Number of panes, which all show the same map.
+        Number of panes, all of which show the same map.
     aspect : float
-        Width of the map by its height.
+        Width of the map divided by its height.
     panel : bool
         Whether the panel is shown.
     legend_rows : int
-        Rows of the legend that several panes share.
+        Number of rows of the shared legend.
     plot : bool
         Whether chart and timeline are shown.
 
@@ -115,7 +115,7 @@ def build_layout(
 def _arrange_panes(
     count: int, aspect: float, scale: float, width: int, arena_height: int, legend_height: int
 ) -> tuple[Box, ...]:
-    """Arrange panes in rows below the legend."""
+    """Return the boxes of the panes, arranged in a grid below the legend."""
     free_size = width, max(arena_height - legend_height, 1)
     columns = choose_column_count(count, aspect, free_size, row_margin=68 * scale, column_margin=31 * scale)
     rows = ceil(count / columns)

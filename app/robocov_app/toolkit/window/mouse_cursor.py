@@ -24,8 +24,8 @@ class MouseCursor:
     Attributes
     ----------
     shape : int
-        Constant of pygame, such as ``pygame.SYSTEM_CURSOR_HAND``. A display without cursors has a shape, too:
-        a page that shows the window in a browser uses it.
+        Constant of pygame, such as ``pygame.SYSTEM_CURSOR_HAND``. It is also set if the display has no
+        cursors, because a browser page that shows the window uses it.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,8 @@
-"""The end of a window by SIGTERM or SIGHUP: drafts are written, and the process ends in time.
+"""Ending of a window on SIGTERM or SIGHUP: drafts are written, and the process ends promptly.
 
-A window whose loop runs ends as if it had been closed, without questions; its draft stays. A window that is
-busy with something else, such as compiling, cannot do that. Then a separate thread, which the signal wakes,
-writes the drafts and ends the process.
+If the loop of the window is running, the window closes without asking questions, and its draft is kept. If
+the main thread is busy with something else, such as compiling, it cannot do that. Then a separate thread,
+which the signal wakes, writes the drafts and ends the process.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from types import FrameType
 from robocov_app.storage.autosave import flush_all
 
 _SIGNALS = ("SIGTERM", "SIGHUP")
-"""Signals that end the process; some systems lack one."""
+"""Signals that end the process; not all of them exist on every system."""
 _LOOP_GRACE_S = 0.7
-"""Time for the loop to notice that the process is to end."""
+"""Time for the loop to notice that the process should end."""
 _CLOSING_GRACE_S = 3.0
-"""Time from the signal to the end once the loop has noticed, for closing videos and saving settings."""
+"""Time from the signal to the end if the loop has noticed it: videos are closed and settings saved."""
 _CLOSED_GRACE_S = 0.1
-"""Time for Python's own end once everything is closed."""
+"""Time for Python to exit once everything is closed."""
 _FLUSH_S = 0.2
 _POLL_S = 0.02
 
@@ -34,7 +34,7 @@ _active: _Watcher | None = None
 
 
 def is_ending() -> bool:
-    """Return whether a signal has asked the process to end. The caller then stops and closes its files."""
+    """Return whether a signal has asked the process to end; if so, the caller must stop and close files."""
     if _active is None or not _active.number:
         return False
     _active.is_closing = True
@@ -43,7 +43,7 @@ def is_ending() -> bool:
 
 @contextmanager
 def ending_on_signals() -> Iterator[None]:
-    """End the process in time at SIGTERM and SIGHUP, unless it ignores them, as under nohup.
+    """End the process promptly on SIGTERM and SIGHUP, unless it ignores them, as under nohup.
 
     The context has no effect outside the main thread, and within another such context.
     """
@@ -61,13 +61,13 @@ def ending_on_signals() -> Iterator[None]:
     else:
         watcher.handle_closing(failed=False)
     finally:
-        if not watcher.number:  # Otherwise it still has to end the process.
+        if not watcher.number:  # After a signal, the watcher still has to end the process.
             watcher.stop()
             _active = None
 
 
 class _Watcher:
-    """A thread that waits for signals, and ends the process if it does not end by itself."""
+    """A thread that waits for signals, and ends the process if the main thread does not end it."""
 
     def __init__(self) -> None:
         self.number = 0  # Number of the signal that has arrived.
@@ -86,12 +86,12 @@ class _Watcher:
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 self._previous_handlers[number] = signal.signal(number, self._record_signal)
-        # Python's handler runs only when the main thread is back in Python; this wakes the thread at once.
+        # Python's handler runs only when the main thread executes Python code; this wakes our thread at once.
         self._previous_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
         self._thread.start()
 
     def handle_closing(self, *, failed: bool) -> None:
-        """Shorten the time to the end of the process, because everything is closed and saved."""
+        """Let the process end soon after a signal, because everything is closed and saved."""
         if self.number:
             with suppress(OSError, ValueError):
                 sys.stdout.flush()

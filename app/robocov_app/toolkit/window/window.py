@@ -1,4 +1,4 @@
-"""A window and its loop: events come in, and a frame is drawn if something has changed."""
+"""A window and its main loop, which handles events and draws a frame if something has changed."""
 
 from collections.abc import Callable
 from io import BytesIO
@@ -22,17 +22,17 @@ from robocov_app.toolkit.window.termination import is_ending
 FPS = 60
 """Frames per second on a screen while something moves."""
 CALM_S = 0.8
-"""Time without changes after which the loop waits for events. Tool tips appear earlier."""
+"""Time without changes after which the loop waits for events; longer than the delay of tool tips."""
 MAX_WAIT_S = 0.1
 """Maximum time between two checks for changes while the loop waits."""
 
 _MIN_SURFACE_PX = (320, 240)
-"""Size of what is drawn, however small the window is."""
+"""Minimum size of the surface that is drawn, however small the window is."""
 _MAX_FAULTS_IN_A_ROW = 5
-"""Faults of the same action after which it is tried only every `_RETRY_S` seconds."""
+"""Consecutive faults of an action after which it is tried only every `_RETRY_S` seconds."""
 _RETRY_S = 1.0
 _RATE_WEIGHT = 0.05
-"""Weight of a frame in the mean frame rate."""
+"""Weight of the last frame in the moving average of the frame rate."""
 _MAX_RATE = 1000.0
 
 RollBack = Callable[[], None]
@@ -51,20 +51,20 @@ class Remote(Protocol):
     fps: int
 
     def wait(self, seconds: float) -> None:
-        """Wait until a message arrives, at most for some seconds."""
+        """Wait until a message arrives, at most for the given time."""
 
     def receive(self, window: "BaseWindow") -> None:
-        """Give the window the size and appearance that are requested there, and post the input."""
+        """Give the window the size and appearance requested there, and post the input as events."""
 
     def send(self, surface: Surface, cursor: int) -> None:
-        """Show the present frame, and the shape of the cursor."""
+        """Show the current frame and the shape of the cursor (a pygame constant)."""
 
 
 class BaseWindow:
-    """A window that is drawn while something moves, and otherwise only when something has changed.
+    """A window that is redrawn while something moves, and otherwise only when something has changed.
 
-    An unexpected exception never ends it. The exception is logged by `faults` and reported in the window, the
-    changes that the event has made are reverted, and the loop continues.
+    An unexpected exception does not end it. The exception is logged by `faults` and reported in the window,
+    the changes made by the event are reverted, and the loop continues.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class BaseWindow:
     windowed_size : tuple of int or None
         Size before full screen, px; None if the window does not fill the screen.
     closed : bool
-        Whether the loop ends.
+        Whether the window is closed, which ends the loop.
     inner : BaseWindow or None
-        Window that is shown in its place for a while.
+        Window that is temporarily shown and used in its place.
     remote : Remote or None
-        Where the window is displayed, if that is not the screen.
+        Where the window is displayed, if not on the screen.
     cursor : MouseCursor
     faults : FaultLog
     frame_rate : float
@@ -116,20 +116,20 @@ class BaseWindow:
         """Handle an event."""
 
     def update(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance everything that moves by a time, s."""
 
     def draw(self) -> None:
         """Draw everything, and show it."""
 
     def get_visible_state(self) -> object:
-        """Return a key of everything that changes the frame without an event; None while something moves."""
+        """Return a value that changes whenever the frame must be redrawn; None while something moves."""
         return None
 
     def close(self) -> None:
-        """Stop everything that runs besides the window."""
+        """Stop threads and processes that the window has started."""
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Adopt the appearance that suits the place where the window is displayed.
+        """Adopt the appearance that suits the display of a `Remote`.
 
         Parameters
         ----------
@@ -141,11 +141,11 @@ class BaseWindow:
         """
 
     def create_save_point(self) -> RollBack:
-        """Return a function that reverts all later changes; it is called if an event raises."""
+        """Return a function that reverts all later changes; it is called if handling an event raises."""
         return _revert_nothing
 
     def report_fault(self, message: str, *, in_drawing: bool) -> None:
-        """Show a message about an unexpected exception; if drawing raised it, close what may be the cause."""
+        """Show a message about an unexpected exception; close what may have caused it in drawing."""
 
     # Loop
 
@@ -164,7 +164,7 @@ class BaseWindow:
             self._run_contained("closing", self.close)
 
     def _wait(self, clock: pygame.time.Clock, frame_start_s: float) -> None:
-        """Wait for the next frame; while the window rests, until something happens."""
+        """Wait until the next frame is due; while the window rests, until an event arrives."""
         if self.remote is not None:
             wait_s = 1.0 / self.remote.fps
             if self.is_resting:
@@ -172,7 +172,7 @@ class BaseWindow:
             self.remote.wait(frame_start_s + wait_s - perf_counter())
             return
         clock.tick(FPS)
-        # SDL's own function that waits for events polls a thousand times a second.
+        # SDL's own function for this polls a thousand times per second.
         while self.is_resting and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
             clock.tick(FPS)
 
@@ -182,7 +182,7 @@ class BaseWindow:
         return self._calm_s >= CALM_S
 
     def run_frame(self, seconds: float) -> None:
-        """Handle the events, let time pass, and draw what has changed."""
+        """Handle all events, advance by a time, s, and draw the window if something has changed."""
         was_resting = self.is_resting
         self.advance(seconds)
         if self.closed:
@@ -193,6 +193,7 @@ class BaseWindow:
             self._run_contained("sending a picture", lambda: remote.send(self.screen, self.cursor.shape))
 
     def _draw_if_changed(self, seconds: float, *, was_resting: bool) -> None:
+        """Draw the window unless its visible state is unchanged, and measure how long nothing has changed."""
         window = self.inner or self
         state = window.get_visible_state()
         if self._had_events or state is None:
@@ -201,12 +202,12 @@ class BaseWindow:
             self._calm_s += seconds
         is_unchanged = was_resting and self.is_resting and state == self._drawn_state
         if not is_unchanged:
-            self._drawn_state = None  # It is drawn again if drawing fails.
+            self._drawn_state = None  # If drawing raises, the next frame draws again.
             window.draw()
         self._drawn_state = state
 
     def advance(self, seconds: float) -> None:
-        """Handle all events that have arrived, and let time pass."""
+        """Handle all events that have arrived, and update the window for a time, s."""
         remote = self.remote
         if remote is not None:
             self._run_contained("receiving messages of a page", lambda: remote.receive(self))
@@ -228,6 +229,7 @@ class BaseWindow:
     # Faults
 
     def _handle_safely(self, event: pygame.event.Event) -> None:
+        """Handle an event, and revert its changes if it raises; closing the window always succeeds."""
         cleaned_event = clean_event(event)
         if cleaned_event is None:
             return
@@ -247,15 +249,15 @@ class BaseWindow:
         *,
         create_save_point: Callable[[], RollBack] | None = None,
     ) -> bool:
-        """Run one part of a frame; log and report any exception, and revert the changes before it.
+        """Run one part of a frame; log and report any exception, and revert the changes made before it.
 
-        An action that fails again and again is tried only now and then, so that the window can be used.
-        MemoryError, and everything that is raised after the display was closed, is passed on.
+        An action that keeps failing is tried only occasionally, so that the window stays usable. MemoryError,
+        and any exception after the display was closed, is raised.
 
         Returns
         -------
         bool
-            Whether it succeeded.
+            Whether the call succeeded.
         """
         if perf_counter() < self._retry_at_s.get(action, 0.0):
             return False
@@ -279,6 +281,7 @@ class BaseWindow:
         return True
 
     def _handle_fault(self, error: Exception, action: str, roll_back: RollBack | None) -> None:
+        """Log an exception, revert the changes before it, and report it in the window."""
         count = self._faults_in_a_row.get(action, 0) + 1
         self._faults_in_a_row[action] = count
         if count >= _MAX_FAULTS_IN_A_ROW:
@@ -305,7 +308,7 @@ class BaseWindow:
         return True
 
     def _draw_fault(self, message: str) -> None:
-        """Draw a message over what was drawn before drawing failed."""
+        """Draw a message over the incomplete frame."""
         width, height = self.screen.get_size()
         draw_message(self.screen, message, (0, 0, width, height), LIGHT, 1.0, is_error=True)
         self.show_screen()
@@ -313,9 +316,9 @@ class BaseWindow:
     # Display
 
     def adopt_display(self) -> None:
-        """Draw on the display from now on; if it is tiny, on a larger surface of which it shows a part.
+        """Draw on the display from now on; if it is tiny, on a larger surface, a part of which is shown.
 
-        Tiling window managers may make a window as small as a pixel, in which nothing can be laid out.
+        Tiling window managers may make a window as small as one pixel, for which there is no layout.
         """
         display = pygame.display.get_surface()
         if display is None:
@@ -328,18 +331,18 @@ class BaseWindow:
             self.screen = display
 
     def show_screen(self) -> None:
-        """Show what was drawn."""
+        """Show the frame that was drawn."""
         display = pygame.display.get_surface()
         if display is not None and display is not self.screen:
             display.blit(self.screen, (0, 0))
         pygame.display.flip()
 
     def toggle_fullscreen(self) -> None:
-        """Fill the screen, or return to the size before that."""
+        """Switch to full screen, or back to the previous size."""
         if self.remote is not None:
-            # The window has the size of a page, and a browser can do this by itself.
+            # The window has the size of a browser page, and the browser has a full-screen mode of its own.
             return
-        # pygame's own function keeps the size: the window would be in the middle of a black screen.
+        # pygame.display.toggle_fullscreen keeps the size, so the rest of the screen would be black.
         size = self.windowed_size
         if size is None:
             self.windowed_size = self.screen.get_size()
@@ -349,7 +352,7 @@ class BaseWindow:
             self.screen = open_window(size)
 
     def save_screenshot(self, folder: Path) -> str:
-        """Write the present frame to a new file, and return a message."""
+        """Write the current frame to a new PNG file in a folder, and return a message."""
         target = find_free_path(folder, "robocov", ".png")
         image = BytesIO()
         pygame.image.save(self.screen, image, ".png")

@@ -1,4 +1,4 @@
-"""The state that every window has: a status message, a clock, and actions whose errors are shown."""
+"""State that every window has: a status message, a clock, and actions whose errors are shown."""
 
 from collections.abc import Callable
 
@@ -10,14 +10,14 @@ MESSAGE_S = 5.0
 
 
 class WindowModel:
-    """State of a window without pictures and events: base class of the models of both windows.
+    """State of a window, independent of drawing and events: base class of the models of both windows.
 
     Attributes
     ----------
     error_message_s : float
         Time for which an error message is shown.
     revision : int
-        Grows whenever the window has to be drawn again.
+        Increases whenever the window must be redrawn.
     message : str
         Status message; empty after a few seconds.
     has_error_message : bool
@@ -36,7 +36,7 @@ class WindowModel:
         self._message_time = 0.0
 
     def show_message(self, text: str, *, is_error: bool = False) -> None:
-        """Show a status message; an empty one leaves the present message."""
+        """Show a status message; if it is empty, the current message stays."""
         if text:
             self.message = text
             self.has_error_message = is_error
@@ -56,7 +56,7 @@ class WindowModel:
             self.clear_message()
 
     def attempt(self, action: Callable[[], object]) -> None:
-        """Carry an action out; show the message that it returns, or its error."""
+        """Run an action, and show the message that it returns or the error that it raises."""
         try:
             self.carry_out(action)
         except RobocovError as error:
@@ -65,12 +65,12 @@ class WindowModel:
             self.show_message(describe_os_error(error), is_error=True)
 
     def carry_out(self, action: Callable[[], object]) -> None:
-        """Carry an action out, and show the message that it returns; errors are raised."""
+        """Run an action, and show the message that it returns; let its errors propagate."""
         self.revision += 1
         message = action()
         if isinstance(message, str):
             self.show_message(message)
 
     def describe_error(self, error: RobocovError) -> str:
-        """Return the message of an error as the window shows it."""
+        """Return the message that the window shows for an error."""
         return str(error)

@@ -1,4 +1,4 @@
-"""Settings that every window remembers."""
+"""Settings that every window saves and restores."""
 
 from typing import Literal
 
@@ -18,13 +18,13 @@ class WindowSettings(BaseModel):
     theme : {"light", "dark"}
         Colors.
     scale : float or None
-        Size of texts and widgets; None for that of the screen.
+        Scale of texts and widgets; None to choose one that suits the screen.
     width, height : int
         Size of the window, px.
     tab : str
-        Page of the panel.
+        Name of the panel's open tab.
     recent : tuple of str
-        Files used last, the newest first.
+        Files used recently, newest first.
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
@@ -38,7 +38,7 @@ class WindowSettings(BaseModel):
 
 
 def limit_window_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the nearest size that settings allow, px."""
+    """Return a window size clamped to what settings allow, px."""
     width = min(max(size[0], MIN_WIDTH_PX), MAX_WIDTH_PX)
     height = min(max(size[1], MIN_HEIGHT_PX), MAX_HEIGHT_PX)
     return width, height
