@@ -114,6 +114,7 @@ class CoverageCost:
         self.points = self.sites.points
         self.cells = self.sites.cells
         self.spacing = self.sites.spacing
+        # Which sites each corner sees does not depend on the robots.
         indices, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles),
             index_columns=INDEX_COLUMNS,
@@ -230,11 +231,12 @@ class CoverageCost:
     def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
         """Find the paths to the sites from the robots of teams, whose positions are (r, n, 2) grid steps.
 
-        `is_covered`, (r, c), says which components of the free space contain robots of each team.
+        `is_covered`, (r, c), says which components of the free space contain robots of each team. The search
+        uses an index of the walls around each robot. If it is too small, the search is repeated with a larger
+        one.
         """
         team_count, robot_count, _ = grid_positions.shape
         paths = SitePaths.allocate(team_count, len(self.points))
-        # The number of entries that the wall index needs is not known in advance.
         while True:
             # `add_walls` keeps one entry per bin free for the wall that it adds.
             max_entries = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
@@ -253,7 +255,10 @@ class CoverageCost:
     def _find_first_arrivals(self, grid_positions: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
         """Find the path to each site from the robot that arrives first.
 
-        Among robots of the same speed, the nearest one arrives first. There is one search for each speed.
+        `grid_positions` are (n, 2) grid steps, and `is_inside`, (n, c), says in which components of the free
+        space each robot is. Among robots of the same speed, the nearest one arrives first. There is one
+        search for each speed, the fastest robots first. A path replaces the one found before if it takes less
+        time.
         """
         # There is one team, which does not reach any site yet.
         shape = (1, len(self.points))
@@ -271,6 +276,7 @@ class CoverageCost:
             is_sooner = paths.distance / speed < times
             times[is_sooner] = paths.distance[is_sooner] / speed
             arrivals.distance[is_sooner] = paths.distance[is_sooner]
+            # The owners are indices of the robots of this speed.
             arrivals.owner[is_sooner] = robots[paths.owner[is_sooner]]
             arrivals.first_corner[is_sooner] = paths.first_corner[is_sooner]
             arrivals.last_corner[is_sooner] = paths.last_corner[is_sooner]
@@ -286,7 +292,9 @@ class CoverageCost:
     ) -> CoverageResult:
         """Build the result of the team with the given index, at positions (n, 2) m, from the paths.
 
-        `is_covered`, (c,), says which components of the free space contain robots of the team.
+        `is_covered`, (c,), says which components of the free space contain robots of the team. The cost is
+        the mean distance of the sites in these components (with speeds, the mean time) times the integral of
+        the density over them, `mass`.
         """
         distances = paths.distance[team]
         owner = paths.owner[team]

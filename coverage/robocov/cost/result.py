@@ -134,6 +134,7 @@ class CoverageResult(Drawable):
         if self.weights is not None:
             pull *= self.weights[site, None]
             total_weight = float(self.weights[site].sum())
+        # The value is the mean times the integral of φ, which is divided among the sites by weight.
         mean = self.mean_distance if self.mean_time is None else self.mean_time
         mass_per_weight = 0.0
         if total_weight and mean:

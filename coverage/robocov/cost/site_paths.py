@@ -276,7 +276,10 @@ def _list_robots_within(
     candidate_count: int,
     result: IntArray,
 ) -> int:
-    """Write the candidates within a squared distance of a box to `result`; return their number."""
+    """Write the candidates within a squared distance of a box to `result`; return their number.
+
+    The candidates are the robots in the first `candidate_count` entries of `candidates`.
+    """
     result_count = 0
     for k in range(candidate_count):
         i = candidates[k]
@@ -291,7 +294,12 @@ def _list_robots_within(
 def _find_nearest_robots_of_tile(
     tiles: Tiles, search: Search, robots: Array, tile: int, candidate_count: int
 ) -> None:
-    """Find which of the first robots in `search.tile_robots` is nearest to each site of a tile."""
+    """Find the robot that is nearest to each site of a tile in a straight line.
+
+    The candidates are the first `candidate_count` robots in `search.tile_robots`. Each slot of the tile
+    contains a site; an empty one repeats another site. The reach of a robot is its distance from the farthest
+    site to which it is the nearest robot.
+    """
     length = search.site_length
     nearest_robot = search.nearest_robot
     for slot in range(SLOTS):
@@ -361,7 +369,8 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
     """Try the straight path to each corner from the robot that is nearest to it.
 
-    Return the number of corners in the queue.
+    Robots that may be nearest to one of the corners are listed for each leaf of the corners' box tree, which
+    contains `LEAF_SIZE` consecutive corners. Return the number of corners in the queue.
     """
     boxes = walls.corner_boxes
     first_leaf = len(boxes) // 2
@@ -395,7 +404,8 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
 def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
     """Try the straight path to each corner from every robot that is near enough to shorten its path.
 
-    A robot at a larger distance than the length of the path so far cannot shorten it. Return the number of
+    A robot at a larger distance than the length of the path so far cannot shorten it. Robots are listed for
+    each leaf of the corners' box tree, which contains `LEAF_SIZE` consecutive corners. Return the number of
     corners in the queue.
     """
     boxes = walls.corner_boxes
@@ -438,7 +448,9 @@ def _find_nearest_candidate(
 def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting_count: int) -> int:
     """Use the straight path from a robot to a corner if it is the shortest so far.
 
-    Return the number of corners in the queue, which was `waiting_count` before.
+    The robot must see the corner, and a shortest path from the robot must be able to bend there. The corner
+    then joins the queue of those from which paths to other corners may be shortened. Return the number of
+    corners in the queue, which was `waiting_count` before.
     """
     paths = search.corner_paths
     corner_x = walls.corners[corner, 0]

@@ -139,9 +139,10 @@ class WeightedPolygons(Density):
 
     @cached_property
     def _jumps(self) -> Array:
-        """The lines across which φ jumps, (j, 5): all edges of the areas except horizontal ones.
+        """The lines across which φ jumps, (j, 5): the edges of the visible parts of the areas.
 
-        For the columns, see the constants at the top of the module.
+        A row contains x and y of the lower end, then of the upper end, and the change of φ from left to
+        right. Horizontal edges are left out, because there is no strip beside them.
         """
         jumps = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()

@@ -245,7 +245,12 @@ class _Edge(NamedTuple):
 
 @lru_cache(maxsize=_MAX_CACHED_GRIDS)
 def _build_grid(raster: Raster) -> _Grid:
-    """Build the grid of a raster. Its squares are the pixels, or lie between the centers of four pixels."""
+    """Build the grid of a raster, in whose squares the density is a polynomial.
+
+    For the interpolation "cells", the squares are the pixels, and the density is constant in each. For
+    "bilinear", they lie between the centers of four pixels, and the density is a + b ξ + c η + d ξ η, with ξ
+    and η from 0 to 1; d is called the twist.
+    """
     values = raster.values
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]

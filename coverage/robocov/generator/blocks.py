@@ -249,6 +249,7 @@ def cut_cell(
     Cell
         The remaining part; empty if nothing remains.
     """
+    # Signed distances of the corners from the line, positive on the side that is removed.
     heights = [(edge.x - origin[0]) * normal[0] + (edge.y - origin[1]) * normal[1] for edge in cell]
     remaining = []
     for k, edge in enumerate(cell):

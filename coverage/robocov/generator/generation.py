@@ -236,6 +236,7 @@ def _build_environment(
     width = float(request.width)
     height = float(request.height)
     about = "about " if GENERATORS[kind].is_approximate else ""
+    # Obstacles that overlap, or a start without room, make the map invalid: then another layout is tried.
     environment = Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),

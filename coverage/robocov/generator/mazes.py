@@ -233,6 +233,7 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
     columns, rows = shape
     newest_probability = rng.uniform(_MIN_NEWEST_PROBABILITY, _MAX_NEWEST_PROBABILITY)
     first = (int(rng.integers(columns)), int(rng.integers(rows)))
+    # `growing` contains the cells from which passages may grow on, the newest last.
     unreached = set(itertools.product(range(columns), range(rows)))
     unreached.remove(first)
     growing = [first]

@@ -337,8 +337,10 @@ def _divide_by_corridor(
 ) -> list[tuple[Box, int]]:
     """Add a corridor to the plan along the longer side of a rectangle, between two parts of it.
 
-    Return the two parts, each with its number of rooms; the whole rectangle if a corridor does not fit.
+    The corridor is itself one of the `count` rooms. Return the two parts, each with its number of rooms; the
+    whole rectangle if a corridor does not fit.
     """
+    # `axis` is the one that the corridor's walls cross, and `extent` the side of the rectangle along it.
     width, height = box.sides
     axis = 1 if width >= height else 0
     extent = box.sides[axis]
@@ -355,7 +357,7 @@ def _divide_by_corridor(
     plan.walls.append(Wall(axis, end, *wall_range))
     plan.corridor = len(plan.rooms)
     plan.rooms.append(box.crop(axis, low=start, high=end))
-    # One room is the corridor, and at least one room is on either side of it.
+    # The other rooms are divided in proportion to the depth of the parts, with at least one in each.
     first_share = start / (extent - corridor_width)
     first_count = min(max(round((count - 1) * first_share), 1), count - 2)
     return [
@@ -383,7 +385,12 @@ class _DoorPlace(NamedTuple):
 
 
 def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
-    """Add doors that connect all rooms, and some more; return whether all rooms are connected."""
+    """Add doors that connect all rooms, and some more; return whether all rooms are connected.
+
+    The places between two rooms where a door may be are visited in random order, but those to the corridor
+    first. A door is added if it connects rooms that are not connected yet, directly or via others. At random,
+    some more are added, which make loops. A piece of wall remains on both sides of each door.
+    """
     room_groups = DisjointSet(range(len(plan.rooms)))
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
     places = _find_door_places(plan)
@@ -396,8 +403,6 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
 
     for k in sorted(range(len(places)), key=compute_sort_key):
         place = places[k]
-        # A door is left out where it would be too narrow, or if the rooms are already connected, unless it is
-        # one of the random doors that close a loop.
         max_width = place.high - place.low - 2.0 * min_piece
         width = request.round_down(min(float(widths[k]), max_width))
         is_unneeded = room_groups.connected(*place.rooms) and loop_draws[k] > _LOOP_PROBABILITY
@@ -524,6 +529,8 @@ def _sample_piece_corners(
     request: Request, piece: _Piece, room: Box, rng: np.random.Generator
 ) -> Array | None:
     """Sample positions of a piece in a room where its gap to each wall is zero or at least the requested one.
+
+    A cabinet stands against a wall with its longer side. A round table touches no wall.
 
     Returns
     -------

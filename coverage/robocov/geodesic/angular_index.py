@@ -434,7 +434,8 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     dy = y - index.positions[source, 1]
     squared_distance = dx * dx + dy * dy
     k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
-    # These two comparisons settle most cases.
+    # Within the clear distance of the bin, nothing is hidden; beyond its horizon, everything is. These two
+    # comparisons settle most cases.
     if squared_distance <= index.squared_clear_distance[source, k]:
         return True
     if squared_distance > index.squared_horizon[source, k]:
@@ -471,7 +472,11 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
 def _is_visible_past_walls(
     walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
 ) -> bool:
-    """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k."""
+    """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k.
+
+    The walls of a bin are a linked list: `head` is its last entry, and `entry_before` leads to the one
+    before.
+    """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     if index.squared_clear_distance[source, k] == _MUST_CHECK_SECTORS:

@@ -44,6 +44,7 @@ def build_box_tree(low: Array, high: Array) -> Array:
     (nodes, 4) array
         The tree, as described at the top of this module.
     """
+    # The number of leaves is a power of 2, so that each node above them has two children.
     leaf_count = 1
     while leaf_count * LEAF_SIZE < len(low):
         leaf_count *= 2
@@ -76,6 +77,7 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     >>> compute_z_order(np.array([0, 1, 0, 1]), np.array([0, 0, 1, 1]))
     array([0, 1, 2, 3])
     """
+    # Interleave the bits of both coordinates.
     key = np.zeros(len(column), dtype=np.int64)
     for bit in range(Z_ORDER_BITS):
         key |= ((column >> bit) & 1) << (2 * bit)
@@ -96,7 +98,8 @@ def skip_subtree(node: int) -> int:
     int
         The node, or `END_OF_TREE`.
     """
-    # Second children have odd numbers. After them, the search continues after the subtree of their parent.
+    # The children of node i are 2 i and 2 i + 1. After a second child, whose number is odd, the search
+    # continues after the subtree of its parent; after a first child, with the second one.
     while node & 1:
         node >>= 1
     return node + 1 if node != 0 else END_OF_TREE

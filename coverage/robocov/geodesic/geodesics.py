@@ -112,6 +112,7 @@ class Geodesics:
         self.graph = self._build_graph(heartbeat)
 
     def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
+        """Build the graph of the corners that see each other."""
         count = len(self.corners)
         visible = np.empty(count, np.int64)
         pairs, lengths = self.run_for_corners(
@@ -165,7 +166,11 @@ class Geodesics:
         index_columns: int,
         length_columns: int,
     ) -> tuple[IntArray, Array]:
-        """Return the rows that a `CornerComputation` writes for one batch of corners."""
+        """Return the rows that a computation writes for one batch of corners.
+
+        The computation fills `indices` and `lengths`, and returns the number of rows, or `NO_SPACE` if they
+        or the wall index are too small. It is then repeated with more space.
+        """
 
         def compute_rows(index: AngularWallIndex) -> tuple[IntArray, Array] | None:
             max_rows = len(index.entry_wall)
@@ -333,7 +338,12 @@ class Geodesics:
     def _compute_corner_distances(
         self, grid_positions: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
-        """Return the index of n grid points, their distances to corners, (n, k), and the last one's paths."""
+        """Compute the distances of n grid points to the k corners.
+
+        With `must_be_straight`, corners that a point does not see are infinitely far away. Return the index
+        of the walls around the points, the distances, (n, k), and the paths from the last point to the
+        corners.
+        """
         corner_count = len(self.corners)
         distances = np.empty((len(grid_positions), corner_count))
         paths = CornerPaths.allocate(corner_count)

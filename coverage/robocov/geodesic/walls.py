@@ -282,8 +282,9 @@ def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float
 def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: float, y: float) -> bool:
     """Return whether a shortest path that bends at a corner can come from, or go to, a point.
 
-    The point must lie in the corner's sector, but not in front of both of its walls: a path from there that
-    bends at the corner could be shortened.
+    A corner is a wedge of free space wider than half a turn, between an incoming and an outgoing wall with
+    free space on their left. The point must lie in this sector, but not in front of both walls: a path from
+    there that bends at the corner could be shortened.
 
     Parameters
     ----------
@@ -323,6 +324,7 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
     int
         The vertex, or `NO_VERTEX`.
     """
+    # Binary search for the first vertex that is not before the point in the order.
     low = 0
     high = len(vertices)
     while low < high:

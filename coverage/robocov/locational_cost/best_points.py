@@ -185,7 +185,11 @@ def _search_uniform(cells: Cells, f: Performance, shape: CellDerivatives, centro
 def _search_weighted(
     cells: Cells, f: Performance, density: Density, shape: CellDerivatives, centroid: Array
 ) -> Array:
-    """Return the best points for a density that is not uniform, (n, 2) m relative to the generators."""
+    """Return the best points for a density that is not uniform, (n, 2) m relative to the generators.
+
+    Gradient and Hessian come from a quadrature, and the shapes of the cells from the integrals for density 1.
+    Cells that are not convex, or almost without mass, keep their centroids.
+    """
     is_convex = shape.clearance > _MIN_WEIGHTED_CLEARANCE * shape.half_perimeter
     has_mass = cells.mass > _MIN_MEAN_DENSITY * density.max_value * shape.area
     search = _start_search(centroid, is_convex & has_mass)
@@ -259,7 +263,10 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, toleran
 def _accept_trial(
     search: _Search, derivatives: CellDerivatives, i: int, sign: float, clearance: float
 ) -> None:
-    """Move the best point of cell i to the trial point, and compute the full step from there."""
+    """Move the best point of cell i to the trial point, and compute the full Newton step from there.
+
+    With `sign`, the derivatives are those of a cost to be minimized.
+    """
     search.points[i, 0] = search.trials[i, 0]
     search.points[i, 1] = search.trials[i, 1]
     gradient_x = sign * derivatives.x[i]

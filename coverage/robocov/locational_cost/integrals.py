@@ -328,8 +328,9 @@ def _sum_edge_costs(
 ) -> Array:
     """Return the cost of each cell: the sum of ∫ f over the triangles between its point and its edges.
 
-    With F(r) the integral of f(r) r dr from 0 to r, the integral over a triangle is d ∫ F(r)/r² ds. It is
-    negative if the point is on the outer side of the edge.
+    An edge is at the distance d from the point, and s runs along it from s1 to s2, so that r² = s² + d². With
+    F(r) the integral of f(ρ) ρ dρ from 0 to r, the integral over the triangle is d ∫ F(r)/r² ds. It is
+    negative if the point is on the outer side of the edge, where d is negative.
     """
     sums = np.zeros(len(points))
     for k in range(len(cell)):

@@ -217,7 +217,12 @@ class _Proof(NamedTuple):
 
 
 def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
-    """Alternate between searching for prices and proving bounds; return the best proof."""
+    """Alternate between searching for prices and proving bounds; return the best proof.
+
+    A search maximizes a smoothed dual over a table of candidate positions. A proof finds positions of a
+    higher profit than any in the table. They are added to it, and the next search is smoothed half as much.
+    Without smoothing, the dual would have no gradient where two positions are equally profitable.
+    """
     prices = dual.first_prices
     for smoothing in _ROUGH_SMOOTHINGS:
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
@@ -463,6 +468,7 @@ class _Dual:
         placement, unless the limit `_MAX_TRIANGLES` is reached. A triangle is a leaf if no robot in it can
         earn much more than one at the best position found so far. All other triangles are halved.
         """
+        # n times the slack is the allowed fraction of the cost.
         slack = tolerance * self.placement_cost / self._robot_count
         best_table_profit = self._table.compute_profits(prices, self._weights).max()
         profit_bound = 0.0

@@ -93,7 +93,8 @@ def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: 
 def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid_shares: Array) -> None:
     """Add up the shares of robots that each site pays for.
 
-    A site pays for a robot if its price is above the distance to the robot.
+    The smoothed search divides the robots among the positions of the table. A site pays for a robot if its
+    price is above the distance to the robot.
 
     Parameters
     ----------

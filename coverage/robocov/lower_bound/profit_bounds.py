@@ -146,6 +146,7 @@ def _set_triangle(
         scratch.vertices[vertex, 1] = triangle[vertex, 1] - y
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
         scratch.max_profits[vertex] = 0.0
+    # All corners are considered, from the first one on. `scratch.corners` receives those that are visible.
     corners = site_data.walls.corners
     first_corner = 0
     corner_count = find_visible_corners(
@@ -244,6 +245,7 @@ def halve_triangles(triangles: Array) -> Array:
     -------
     (2 t, 3, 2) array
     """
+    # The apex is the vertex opposite to the longest edge.
     edges = triangles - np.roll(triangles, -1, axis=1)
     longest = (edges * edges).sum(axis=2).argmax(axis=1)
     rows = np.arange(len(triangles))

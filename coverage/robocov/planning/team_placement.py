@@ -102,6 +102,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     own_node = planner.find_own_node(team.positions[0])
     if own_node == NO_NODE:
         return team.previous_goals
+    # Sources are the nodes that may become goals, and targets the nodes that count in the cost.
     is_reachable = np.isfinite(planner.get_distances(own_node))
     is_usable = is_reachable[planner.sources]
     sources = planner.sources[is_usable]
@@ -111,6 +112,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     distances = planner.source_distances[is_usable]
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
     # All other robots together are one more source, the last one, which is fixed.
+    # Row q of the table contains the weighted distances of a target q from all sources.
     target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
     table = np.ascontiguousarray((target_distances * weights[is_target]).T)
 

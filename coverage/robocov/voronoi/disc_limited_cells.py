@@ -66,6 +66,8 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     radius = np.minimum(radii, 2.0 * reach + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
     # First the triangles between the generators and the parts of the edges in the discs, then the sectors.
+    # Twice the area of a sector is r² times its angle, and twice its first moment 2/3 r³ (sin, -cos) between
+    # its ends.
     cross = cut.inner_start[:, 0] * cut.inner_end[:, 1] - cut.inner_start[:, 1] * cut.inner_end[:, 0]
     doubled_area = cross.copy()
     doubled_moment = cross[:, None] * (cut.inner_start + cut.inner_end) / 3.0

@@ -92,6 +92,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     int
         Number of edges, or `FAILED`; the triangulation may fail if robots coincide.
     """
+    # Three sentinels, far away, are triangulated together with the robots.
     half_edges = np.empty(len(points) + 3, np.intp)
     triangulation = Triangulation(mesh, np.empty(mesh.shape[1]), half_edges)
     if not _triangulate(triangulation, points, sides):
