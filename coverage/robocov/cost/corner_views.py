@@ -134,6 +134,7 @@ def _add_views(
     A search in the box tree of the tiles skips boxes that are entirely hidden by walls, and empty ones, which
     start at infinity.
     """
+    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     tree = tiles.tree
     first_leaf = len(tree) // 2
     node = ROOT

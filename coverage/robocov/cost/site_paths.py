@@ -207,6 +207,7 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
     _find_nearest_robots(tiles, search, robots)
     entry_count = 0
     for i in range(len(robots)):
+        # In a large team, walls beyond the farthest site to which a robot is the nearest one hardly matter.
         reach = np.inf
         if len(robots) > _MAX_SMALL_TEAM:
             reach = search.reach[i] * (1.0 + _REACH_PADDING)

@@ -258,6 +258,7 @@ def cut_cell(
         following_height = heights[(k + 1) % len(cell)]
         if height <= 0.0:
             remaining.append(edge)
+        # If the edge crosses the line, the point where it does is a new corner.
         if (height <= 0.0) == (following_height <= 0.0):
             continue
         fraction = height / (height - following_height)

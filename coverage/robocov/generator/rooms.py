@@ -310,10 +310,11 @@ def _divide_by_wall(
 ) -> list[tuple[Box, int]] | None:
     """Divide a rectangle by a wall across its longer side, and add the wall to the plan.
 
-    Each part is to contain half of the `count` rooms. Its share of the rectangle is about the same. Return
+    Each part will contain about half of the `count` rooms, and gets a similar share of the rectangle. Return
     the two parts, each with its number of rooms; None if they would be too small.
     """
     width, height = box.sides
+    # The axis that the wall crosses.
     axis = 1 if height > width else 0
     first_count = count // 2 if rng.random() < 0.5 else count - count // 2
     fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count

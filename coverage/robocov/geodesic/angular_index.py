@@ -219,6 +219,7 @@ def add_walls(
     int
         New number of entries, or `NO_SPACE`.
     """
+    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
     stack = index.stack
     first_leaf = len(boxes) // 2
@@ -252,6 +253,7 @@ def add_walls(
                 return NO_SPACE
             if walls.can_hide[wall]:
                 entry_count = _add_wall(walls, wall, index, source, entry_count)
+    # At a vertex, some directions lead into the obstacle: no clear distance may skip that test.
     if find_vertex(walls.vertices, x, y) != NO_VERTEX:
         for k in range(bin_count):
             index.squared_clear_distance[source, k] = _MUST_CHECK_SECTORS
@@ -521,6 +523,7 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
     Only walls whose boxes in the tree meet the segment between the two points are tested.
     """
+    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
     first_leaf = len(boxes) // 2
     node = ROOT

@@ -137,6 +137,7 @@ def find_visible_corners(
     int
         Number of corners that were found.
     """
+    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     corners = walls.corners
     boxes = walls.corner_boxes
     x = index.positions[source, 0]

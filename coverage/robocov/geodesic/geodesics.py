@@ -430,7 +430,8 @@ def _find_corner_distances(
             paths.first_corner[corner] = corner
             paths.previous_corner[corner] = NO_CORNER
             queue.is_waiting[corner] = False
-        # There are straight paths to the visible corners. The queue starts with them.
+        # There are straight paths to the visible corners. The queue of corners from which paths go on starts
+        # with them.
         first_corner = 0
         visible_count = find_visible_corners(walls, index, i, first_corner, queue.corners)
         for k in range(visible_count):

@@ -384,6 +384,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
     windings : (n, c) int array
         Result: 1 inside the component, more than 1 on its boundary, 0 outside.
     """
+    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
     first_leaf = len(boxes) // 2
     for i in range(len(points)):

@@ -79,8 +79,9 @@ def compute_weighted_derivatives(
     weight = weight * density.evaluate(positions.reshape(-1, 2)).reshape(weight.shape)
     dx = offset[..., 0]
     dy = offset[..., 1]
-    # Let c1 be the weight times f'(r)/r, where r² = dx² + dy², and c2 the weight times (f'(r)/r)'/r. Then the
-    # gradient of the integrand is -c1 (dx, dy), and its Hessian is c1 I + c2 (dx, dy)ᵀ (dx, dy).
+    # The cost to be minimized has f = r or f = -1/(r²+h²). Let c1 be the weight times f'(r)/r, where r² = dx²
+    # + dy², and c2 the weight times (f'(r)/r)'/r. Then the gradient of the integrand is -c1 (dx, dy), and its
+    # Hessian is c1 I + c2 (dx, dy)ᵀ (dx, dy).
     square = dx * dx + dy * dy
     if isinstance(f, Sensing):
         inverse = 1.0 / (square + f.height**2)

@@ -222,9 +222,9 @@ def _lower_to_tangent(
     """Lower the distance bounds of the vertices where the tangent of a path length is below them.
 
     The length of a path from a point to a site is a convex function of the point, and is therefore never
-    below its tangent at the center. The slope of the tangent is that of the first segment of the path. The
-    path starts at the center. `length` is the length of the whole path, and `first_length` that of its first
-    segment, whose end is at -(dx, dy) from the center.
+    below its tangent at the center. The slope of the tangent is that of the first segment of the path.
+    `length` is the length of the path from the center, and `first_length` that of its first segment, whose
+    end is at -(dx, dy) from the center.
     """
     # If the segment is empty, its direction (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)

@@ -231,6 +231,7 @@ def compute_distances(
     that are farther away by less than the shortest edge. No path via one of them can shorten the path to
     another.
     """
+    # The front contains the nodes that a path has reached and from which others may be reached.
     node_count = len(edges.first_edge) - 1
     distance = np.full(node_count, np.inf)
     front = np.empty(node_count, dtype=np.intp)
@@ -243,7 +244,6 @@ def compute_distances(
             front[front_size] = node
             is_in_front[node] = True
             front_size += 1
-    # The front contains the nodes that a path has reached and from which others may be reached.
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
         nearest = np.inf

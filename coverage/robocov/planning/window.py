@@ -61,6 +61,7 @@ class Window(NamedTuple):
         low_column, high_column = _compute_stepped_interval(int(column), half_width, columns)
         height = high_row - low_row
         width = high_column - low_column
+        # The stride is the smallest one, starting from an estimate, for which there are not too many nodes.
         stride = max(1, math.floor(math.sqrt(height * width / max_nodes)))
         while math.ceil(height / stride) * math.ceil(width / stride) > max_nodes:
             stride += 1

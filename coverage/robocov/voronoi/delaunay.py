@@ -238,8 +238,9 @@ def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> boo
 def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) -> bool:
     """Compute the cotangents in a triangle with first half-edge h; return whether it is counter-clockwise.
 
-    Each is computed from its own corner, so that its last bit does not depend on how the triangle is stored.
-    In a clockwise triangle the sign of the cross product is ignored, so that flips can correct it.
+    The cotangent of a half-edge is that of the angle opposite to it, at the apex of the triangle. It is
+    computed from there, so that its last bit does not depend on how the triangle is stored. In a clockwise
+    triangle the sign of the cross product is ignored, so that flips can correct it.
     """
     is_ccw = True
     for k in range(3):

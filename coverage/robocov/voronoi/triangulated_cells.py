@@ -223,6 +223,7 @@ def _walk_around(
     neighbor_rows = workspace.neighbors
     rings = workspace.rings
     n = len(points)
+    # The neighbor with the lowest number is remembered: cells start there, whichever triangle comes first.
     count = 0
     lowest_robot = n
     half_edge_to_lowest = first_half_edge
