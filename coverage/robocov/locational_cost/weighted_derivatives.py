@@ -73,6 +73,7 @@ def compute_weighted_derivatives(
     # Offsets of the nodes from the point, by edge, node along it and node outward: (e, 16, 12, 2).
     on_edge = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
     offset = on_edge[:, :, None, :] * u_nodes[:, None, :, None]
+    # The area element is twice the area of the triangle times u du dt; the weights of u include the factor u.
     doubled_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     weight = doubled_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
     positions = offset + (cells.generators + points)[cell][:, None, None]

@@ -233,6 +233,7 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray
     others at once.
     """
     rows, columns = is_free.shape
+    # The queue contains indices of the flattened array, from `head` up to `tail`.
     queue = np.empty(is_free.size, dtype=np.intp)
     head = 0
     tail = 0
