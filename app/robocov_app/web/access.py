@@ -1,6 +1,7 @@
 """Access to a served window: tokens in links and cookies."""
 
 import hmac
+import socket
 from collections.abc import Iterable
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qsl
@@ -9,11 +10,34 @@ from robocov.errors import InputError
 
 _LOOPBACK_ADDRESSES = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Addresses that a browser on this machine can open, for a server that listens at all addresses."""
+_PROBES = {"0.0.0.0": (socket.AF_INET, "192.0.2.1"), "::": (socket.AF_INET6, "2001:db8::1")}
+"""Families of these addresses, and addresses reserved for documentation, which lie in no local network."""
+
+
+def find_network_address(host: str) -> str:
+    """Find the address by which other computers reach a server that listens at a host.
+
+    Parameters
+    ----------
+    host : str
+        If it stands for all addresses, such as 0.0.0.0, the result is the address by which this machine
+        reaches others, or a loopback address without a network. Other hosts are returned as they are.
+    """
+    if host not in _PROBES:
+        return host
+    family, remote_address = _PROBES[host]
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            # A datagram socket sends nothing when it connects, but then knows its own address.
+            probe.connect((remote_address, 9))
+            return str(probe.getsockname()[0])
+    except OSError:
+        return _LOOPBACK_ADDRESSES[host]
 
 
 def build_link(host: str, port: int, token: str) -> str:
     """Return the address of a served window with its token."""
-    host = _LOOPBACK_ADDRESSES.get(host, host)
+    host = find_network_address(host)
     if ":" in host:
         host = f"[{host}]"
     return f"http://{host}:{port}/?token={token}"

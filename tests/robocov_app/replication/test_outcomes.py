@@ -27,7 +27,7 @@ from robocov_app.replication.results.outcomes import (
     find_best_gains,
     merge_outcomes,
 )
-from robocov_app.sweep.ledger import _compute_checksum
+from robocov_app.sweep.ledger import _compute_row_checksum
 from robocov_app.sweep.sweeping import sweep
 
 REFERENCES = {"blocks-a": ReferencePlacement(1.5, ((1.0, 1.0),), 1.0)}
@@ -88,7 +88,7 @@ def test_a_run_that_failed_is_nan(study, folder, tmp_path):
     entry = broken / "runs" / row["run"] / "row.json"
     content = json.loads(entry.read_text()) | {"figures": {}, "error": "it fell over"}
     del content["check_sum"]
-    content["check_sum"] = _compute_checksum(content)
+    content["check_sum"] = _compute_row_checksum(content)
     entry.write_text(json.dumps(content))
     sweep(study.study, broken, workers=1, quiet=True)
     outcomes = read_outcomes(broken, study, REFERENCES)

@@ -275,7 +275,7 @@ class ViewerCanvas:
         known = self.viewer.costs.known.get(pane.number)
         if known is not None and known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
             # The mean is that of the rest, and gets better when robots are locked out of a room.
-            text += f" without {known.result.uncovered_area:.1f} m² cut off"
+            text += f" ({known.result.uncovered_area:.1f} m² cut off)"
         if displayed.time - time > MAX_COST_LAG_S:
             return f"{text} at {time:.1f} s"
         return text

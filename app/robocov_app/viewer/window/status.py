@@ -12,8 +12,8 @@ HINT = "Space pause · F1 keys"
 
 MAX_SUGGESTIONS = 3
 _MAX_COST_LAG_S = 0.05  # an older cost is shown with its time
-MIN_UNCOVERED_AREA_M2 = 1e-9
-"""Area above which a part of the map counts as cut off."""
+MIN_UNCOVERED_AREA_M2 = 0.05
+"""Area above which a part of the map counts as cut off: the smallest that is not displayed as 0.0 m²."""
 _MAX_SITE_DISTANCE = 1.5  # spacings of the lattice: farther points are not free
 
 _SUGGESTIONS = {
