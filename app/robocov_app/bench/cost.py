@@ -1,8 +1,9 @@
-"""The exact coverage cost in comparison with fast marching, by scikit-fmm, and with a k-d tree.
+"""Benchmark of the exact coverage cost, compared with fast marching (scikit-fmm) and with a k-d tree.
 
-Fast marching of second order travels over the same lattice with the same free sites, from the cells that
-contain a robot. It is not exact and does not find the nearest robot of a site. The robots move by up to a
-quarter of a cell between calls. The k-d tree finds straight distances, the minimum work of a coverage cost.
+Second-order fast marching covers the same lattice and the same free sites, starting at the cells that contain
+a robot. It is not exact, and it does not tell which robot is nearest to a site. The robots move by up to a
+quarter of a cell between calls. The k-d tree computes straight-line distances, the least work that any
+coverage cost requires.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -67,14 +68,14 @@ BEFORE = {
 }
 """Earlier ratios to the time of the tree, by map, lattice and robots; see `Row.before`."""
 SPEEDUPS = {64: 4.0, 128: 2.5, 256: 1.7}
-"""Minimum speedups by lattice."""
+"""Minimum speedups over the ratios in `BEFORE`, by lattice."""
 _CAMPUS_FACTOR = 2.0
 _LARGE_TEAM = 1000
 _LARGE_TEAM_SPEEDUP = 10.0
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of the cost among random obstacles."""
+    """Return the benchmark cases of the cost on a square with random obstacles."""
     sizes = QUICK_SIZES
     if not quick:
         sizes = tuple((lattice, vertices) for vertices in VERTICES for lattice in LATTICES)
@@ -82,7 +83,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 
 
 def list_map_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of the cost on bundled maps."""
+    """Return the benchmark cases of the cost on bundled maps; quick cases use the smallest lattice only."""
     sizes = sorted({(name, lattice) for name, lattice, _ in BEFORE if not quick or lattice == 64})
     return [partial(_measure_map, name, lattice, quick) for name, lattice in sizes]
 
@@ -93,21 +94,23 @@ def has_yardstick() -> bool:
 
 
 def build_random_map(vertices: int, seed: int = 0) -> Environment:
-    """Build a unit square with obstacles of five corners each. About a quarter of it is blocked."""
+    """Build a unit square in which obstacles with five corners each block about a quarter of the area."""
     rng = np.random.default_rng(seed)
+    # 0.23: share of the area to block. 2.2: mean area of an obstacle in units of radius**2.
     radius = np.sqrt(0.23 / (vertices / _OBSTACLE_CORNERS) / 2.2)
     obstacles: list[PolygonObstacle] = []
     while len(obstacles) < vertices // _OBSTACLE_CORNERS:
         angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, _OBSTACLE_CORNERS))
         directions = np.column_stack([np.cos(angle), np.sin(angle)])
         ring = rng.random(2) + radius * rng.uniform(1.0, 1.5) * directions
+        # Slivers are drawn again.
         if shapely.Polygon(ring).area > 0.3 * radius**2:
             obstacles.append(PolygonObstacle(tuple((float(x), float(y)) for x, y in ring)))
     return Environment("random", ((0, 0), (1, 0), (1, 1), (0, 1)), tuple(obstacles))
 
 
 class MovingRobots:
-    """Robots that move by up to a quarter of a cell in every round, and stay in the free space.
+    """Robots that move by up to a quarter of a cell in each round without leaving the free space.
 
     Parameters
     ----------
@@ -117,7 +120,7 @@ class MovingRobots:
     Attributes
     ----------
     positions : (n, 2) array, m
-        Present positions.
+        Current positions.
     blocked : (lattice, lattice) array of bool
         Cells without a site.
     """
@@ -133,7 +136,7 @@ class MovingRobots:
         self.blocked = blocked.reshape(cost.lattice, cost.lattice)
 
     def move(self) -> None:
-        """Move the robots to new positions."""
+        """Move each robot to a random point near its start, or to the start if the point is not free."""
         steps = self._rng.uniform(-self._max_step, self._max_step, self._start.shape)
         positions = self._start + steps
         is_free = shapely.intersects_xy(self._geodesics.free, *self._geodesics.grid.snap(positions).T)
@@ -141,7 +144,7 @@ class MovingRobots:
 
 
 def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
-    """Measure the cost among random obstacles: its construction, then an evaluation for each team."""
+    """Measure how long the cost takes to build among random obstacles, and to evaluate for each team size."""
     environment = build_random_map(vertices)
     start = perf_counter()
     cost = CoverageCost(environment, lattice)
@@ -164,6 +167,7 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
 
 
 def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
+    """Measure the cost on a bundled map for each team size in `BEFORE`, compared with a k-d tree."""
     cost = CoverageCost(load_map(name), lattice)
     for (other_name, other_lattice, robots), before in BEFORE.items():
         if (other_name, other_lattice) != (name, lattice):
@@ -193,7 +197,7 @@ def _measure_costs(
     other: Callable[[CoverageCost, MovingRobots], object] | None,
     quick: bool,
 ) -> dict[str, float]:
-    """Return the times of the "exact" cost and of an "other" measure, s, while the robots move."""
+    """Measure the "exact" cost and, if given, an "other" method in alternation; return median times, s."""
     calls: dict[str, Call] = {"exact": lambda: cost(moving.positions).mean_distance}
     if other is not None:
         calls["other"] = partial(other, cost, moving)
@@ -201,16 +205,17 @@ def _measure_costs(
 
 
 def _measure_by_marching(cost: CoverageCost, moving: MovingRobots) -> float:
-    """Return the mean distance by fast marching."""
+    """Compute the mean distance to the nearest robot by fast marching."""
     import skfmm
 
     column, row = np.floor(moving.positions / cost.spacing).astype(int).T
     front = np.ones((cost.lattice, cost.lattice))
+    # skfmm starts at the zero contour, which surrounds the cells of the robots.
     front[row, column] = -1.0
     masked = np.ma.MaskedArray(front, moving.blocked)
     return float(skfmm.distance(masked, dx=cost.spacing, order=2).mean())
 
 
 def _measure_by_tree(cost: CoverageCost, moving: MovingRobots) -> object:
-    """Return the straight distances by a k-d tree."""
+    """Find the straight-line distance from each site to its nearest robot with a k-d tree."""
     return cKDTree(moving.positions).query(cost.points)

@@ -1,4 +1,4 @@
-"""Steps of learning environments in comparison with a plain one of gymnasium: point masses in a square."""
+"""Benchmark of learning environments, compared with a plain gymnasium one: point masses in a square."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -16,9 +16,9 @@ from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 ROBOTS = 6
 LATTICE = 32
 ENVIRONMENTS = 64
-"""Number of environments that are stepped together."""
+"""Number of environments that are stepped together in the vector environment."""
 SIDE_M = 20.0
-"""Side of the square of the point masses."""
+"""Side of the square in which the point masses move."""
 YARDSTICK = f"{ROBOTS} point masses, gymnasium"
 SINGLE_GOAL = 0.7
 VECTOR_GOAL = 4.0
@@ -31,7 +31,7 @@ _ACTION_SETS = 100
 
 
 class PointMasses(gymnasium.Env[Any, Any]):
-    """Robots without bodies, rewarded in each step by straight distances, in numpy."""
+    """Yardstick: robots without bodies, in numpy, rewarded in each step by straight-line distances."""
 
     def __init__(self) -> None:
         self.action_space = Box(-_MAX_FORCE_N, _MAX_FORCE_N, (ROBOTS, 2), np.float32)
@@ -40,15 +40,16 @@ class PointMasses(gymnasium.Env[Any, Any]):
         self._sites = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 1, 2)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Place the robots at random."""
+        """Place the robots at random positions, at rest."""
         super().reset(seed=seed)
         self._positions = self.np_random.uniform(0.0, SIDE_M, (ROBOTS, 2))
         self._velocities = np.zeros((ROBOTS, 2))
         return self._observe(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Any]:
-        """Move the robots by forces."""
+        """Apply a force to each robot for one time step; the reward is the negative mean distance."""
         self._velocities += (action - _VISCOSITY * self._velocities) * _DT_S
+        # The speed is limited to 1 m/s.
         self._velocities /= np.maximum(np.hypot(*self._velocities.T)[:, None], 1.0)
         self._positions = np.clip(self._positions + self._velocities * _DT_S, 0.0, SIDE_M)
         distances = np.hypot(*np.moveaxis(self._sites - self._positions, -1, 0))
@@ -59,11 +60,12 @@ class PointMasses(gymnasium.Env[Any, Any]):
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of learning environments."""
+    """Return the benchmark case of learning environments."""
     return [partial(_measure_environments, quick)]
 
 
 def _measure_environments(quick: bool) -> Iterator[Row]:
+    """Measure a step of one environment, and of many together, compared with a step of point masses."""
     options: dict[str, Any] = {"robots": ROBOTS, "lattice": LATTICE, "repeat": 1, "duration": 1e6}
     plain = PointMasses()
     single = CoverageEnv(**options)
@@ -78,7 +80,7 @@ def _measure_environments(quick: bool) -> Iterator[Row]:
         "single": lambda: single.step(next(actions)[0]),
         "vector": lambda: vector.step(next(actions)),
     }
-    # Processor time: a step of many environments is long enough to be interrupted by other programs.
+    # CPU time, because a step of many environments is long enough to be interrupted by other programs.
     times = measure_in_alternation(calls, 20 if quick else 200, clock=process_time)
     for name, count, goal in (("single", 1, SINGLE_GOAL), ("vector", ENVIRONMENTS, VECTOR_GOAL)):
         seconds = times[name] / count
@@ -89,6 +91,7 @@ def _measure_environments(quick: bool) -> Iterator[Row]:
             seconds,
             yardstick=YARDSTICK,
             yardstick_seconds=times["plain"],
+            # The goals are speed ratios; a row needs a time ratio.
             goal=1 / goal,
             note=f"{times['plain'] / seconds:.2f} times its steps a second",
             before=_BEFORE,

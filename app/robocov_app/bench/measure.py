@@ -1,4 +1,4 @@
-"""Measuring times that are meaningful on a shared machine: calls in alternation, medians, ratios."""
+"""Timing that is meaningful on a shared machine: alternating calls, medians and ratios."""
 
 import gc
 import itertools
@@ -9,14 +9,14 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 Call: TypeAlias = Callable[[], object]
-"""Work whose time is measured."""
+"""A call whose duration is measured."""
 Case: TypeAlias = Callable[[], Iterable["Row"]]
-"""Measures some rows."""
+"""A benchmark case: runs its measurements and yields their rows."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A median time, and that of its yardstick in the same measurement.
+    """A row of the benchmark: a median time, and the yardstick's time in the same measurement.
 
     Parameters
     ----------
@@ -31,15 +31,15 @@ class Row:
     yardstick : str, optional
         Name of the yardstick.
     yardstick_seconds : float, optional
-        Its median time, s.
+        Median time of the yardstick, s.
     goal : float, optional
-        Maximum ratio of both times.
+        Maximum ratio of the time to the yardstick's.
     goal_seconds : float, optional
         Maximum time, s.
     note : str
         The time in another unit, for example "95 x real time".
     before : float, optional
-        Approximate ratio when nothing was compiled (commit 8838167).
+        Approximate ratio before any code was compiled (commit 8838167).
     """
 
     part: str
@@ -55,14 +55,14 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ratio of the time to that of the yardstick; None without a yardstick."""
+        """Ratio of the time to the yardstick's; None without a yardstick."""
         if self.yardstick_seconds is None:
             return None
         return self.seconds / self.yardstick_seconds
 
     @property
     def met(self) -> bool | None:
-        """Whether all goals are met; None without any goal."""
+        """Whether all goals are met; None if there are none."""
         limits = ((self.ratio, self.goal), (self.seconds, self.goal_seconds))
         results = [value <= goal for value, goal in limits if value is not None and goal is not None]
         if not results:
@@ -71,7 +71,7 @@ class Row:
 
     @property
     def case(self) -> str:
-        """The parameters as text, for example "128 x 128, 6 robots"."""
+        """Parameters as text, for example "128 x 128, 6 robots"."""
         texts = []
         for name, value in self.parameters.items():
             if name == "lattice":
@@ -83,7 +83,7 @@ class Row:
         return ", ".join(texts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the row for JSON."""
+        """Return the row, with its ratio and result, as a dictionary for JSON."""
         return asdict(self) | {"ratio": self.ratio, "met": self.met}
 
 
@@ -95,9 +95,9 @@ def measure_in_alternation(
     clock: Callable[[], float] = perf_counter,
     before: Call = lambda: None,
 ) -> dict[str, float]:
-    """Measure calls in alternation, so that other programs slow all of them equally.
+    """Time several calls in alternation, so that other programs slow all of them down equally.
 
-    The first round does not count.
+    The first round is a warm-up and does not count.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def measure_in_alternation(
     count : int
         Minimum number of rounds.
     seconds : float
-        Minimum time of all rounds, s.
+        Minimum total time of the rounds, s.
     clock : callable
         Returns a time, s.
     before : callable

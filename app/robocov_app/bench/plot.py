@@ -1,4 +1,4 @@
-"""The ratios of a benchmark as a figure, with a dot for each."""
+"""Figure of the ratios of a benchmark, one dot for each row."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -23,16 +23,16 @@ HEADINGS = {
     "window": "Window",
     "start": "Start",
 }
-"""Headings of the parts."""
+"""Heading of each part of the benchmark."""
 _WIDTH_PX = 1100
 _TITLE_HEIGHT_PX = 92
 _ROW_HEIGHT_PX = 26
 _LEFT_PX = 400
-"""Width of the labels of rows."""
+"""Width of the row labels, left of the axes."""
 _RIGHT_PX = 90
-"""Width of the values of rows."""
+"""Width of the row values, right of the axes."""
 _HEADING_HEIGHT_PX = 66
-"""Space between two parts, for the heading of the second."""
+"""Space above a part for its heading."""
 _PART_BOTTOM_PX = 16
 _AXES_OFFSET_PX = 26
 _MAX_TICKS = 7
@@ -44,9 +44,9 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     Parameters
     ----------
     rows : sequence of Row
-        Those without a ratio are left out.
+        Rows without a ratio are left out.
     path : Path
-        A file as in `robocov_app.figures.files.save_figure`.
+        Output file; see `robocov_app.figures.files.save_figure` for the formats.
     theme : Theme
     """
     with_ratio = [row for row in rows if row.ratio is not None]
@@ -68,7 +68,7 @@ def _compute_part_height(rows: Sequence[Row]) -> int:
 
 
 def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) -> None:
-    """Draw the heading and the rows of a part, below a vertical position, px."""
+    """Draw the heading and the rows of a part, starting at the vertical position `top`, px."""
     page.write(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
     axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
     width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
@@ -77,6 +77,7 @@ def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) 
     axes.set_xscale("log")
     axes.axvline(1.0, color=to_plot_color(page.theme.faint), linewidth=1)
     for number, row in enumerate(rows):
+        # y points up in the axes, and the first row is at the top.
         _draw_row(axes, row, len(rows) - 1 - number, page.theme)
         _draw_row_texts(page, row, axes_top + _ROW_HEIGHT_PX * (number + 0.5))
     low, high = _find_limits(rows)
@@ -89,9 +90,11 @@ def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) 
 
 
 def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
+    """Draw the dot of a row, a line from it to ratio 1, and a bar at its goal."""
     ratio = cast("float", row.ratio)
     color = to_plot_color(theme.get_controller_color("rapf"))
     if row.met is False:
+        # A missed goal has another color.
         color = to_plot_color(theme.get_controller_color("rpf"))
     axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
     axes.plot(ratio, y, "o", color=color, markersize=6.5)
@@ -109,7 +112,7 @@ def _draw_row_texts(page: FigurePage, row: Row, y: float) -> None:
 
 
 def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:
-    """Return the horizontal limits: all ratios and goals, and 1, with some margin."""
+    """Return horizontal limits that include all ratios, all goals and 1, with some margin."""
     values = [1.0]
     for row in rows:
         values += [value for value in (row.ratio, row.goal) if value is not None]
@@ -117,7 +120,7 @@ def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:
 
 
 def _choose_ticks(low: float, high: float) -> list[float]:
-    """Return round numbers between two limits, few enough to be legible.
+    """Choose round numbers between two limits as ticks, at most `_MAX_TICKS` if possible.
 
     >>> _choose_ticks(0.08, 6.0)
     [0.1, 0.2, 0.5, 1.0, 2.0, 5.0]

@@ -1,4 +1,4 @@
-"""Sweeps, and the start of commands, in comparison with an interpreter that imports numpy."""
+"""Benchmark of sweeps and of command start-up, compared with an interpreter that imports numpy."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
 YARDSTICK = "import numpy"
-"""Code of the yardstick."""
+"""Program of the yardstick, as for `python -c`."""
 MAPS = ("rooms", "museum", "campus")
 CONTROLLERS = ("rapf", "lloyd")
 DURATION_S = 20.0
@@ -34,23 +34,24 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "import robocov": ("-c", "import robocov"),
     "import robocov, all of it": ("-c", _IMPORT_EVERYTHING),
 }
-"""First commands of a user, with the arguments of the interpreter."""
+"""Commands that a new user runs first, with the arguments of the Python interpreter."""
 START_GOALS = {"robocov --help": 2.0}
-"""Maximum ratios of commands."""
+"""Maximum ratio of each command with a goal."""
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the case of a sweep."""
+    """Return the benchmark case of a sweep."""
     seeds = 1 if quick else _FULL_SEEDS
     return [partial(_measure_sweep, seeds)]
 
 
 def list_start_cases(*, quick: bool = False) -> list[Case]:
-    """Return the case of the start of commands."""
+    """Return the benchmark case of command start-up."""
     return [partial(_measure_starts, quick)]
 
 
 def _measure_sweep(seeds: int) -> Iterator[Row]:
+    """Measure a sweep over maps, controllers and seeds; report the CPU time for each run."""
     maps = tuple(StudyMap(name, load_map(name)) for name in MAPS)
     study = Study(maps=maps, controllers=CONTROLLERS, seeds=range(seeds), robots=(6,), duration=DURATION_S)
     numbers = count()
@@ -61,7 +62,7 @@ def _measure_sweep(seeds: int) -> Iterator[Row]:
                 subprocess.run([sys.executable, "-c", YARDSTICK]) for _ in range(_YARDSTICK_REPEATS)
             ],
         }
-        # Processor time of all processes: a sweep uses all cores.
+        # CPU time of all processes, because a sweep runs in several of them.
         times = measure_in_alternation(calls, 1, clock=_get_processor_time)
     seconds = times["sweep"] / len(study)
     yield Row(
@@ -78,12 +79,13 @@ def _measure_sweep(seeds: int) -> Iterator[Row]:
 
 
 def _get_processor_time() -> float:
-    """Return the processor time of this process and of those that it has waited for, s."""
+    """Return the CPU time of this process and its finished child processes, s."""
+    # The first four fields: user and system time, of this process and of its children.
     return sum(os.times()[:4])
 
 
 def _measure_starts(quick: bool) -> Iterator[Row]:
-    """Measure how long commands take before they do anything."""
+    """Measure the start-up time of each command."""
     run_silently = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
     commands = {YARDSTICK: ("-c", YARDSTICK), **COMMANDS}
     calls = {

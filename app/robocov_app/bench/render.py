@@ -1,4 +1,4 @@
-"""Drawing a frame in comparison with filling and copying an empty one; encoding with drawing."""
+"""Benchmark of drawing, compared with filling and copying an empty frame, and of encoding, with drawing."""
 
 import tempfile
 from collections.abc import Iterator
@@ -22,21 +22,22 @@ from robocov_app.runs.settings import VideoSettings
 
 SIZE_PX = (1280, 720)
 FRAME_GOALS_S = {50: 4e-3}
-"""Maximum time of a frame by number of robots."""
+"""Maximum time to draw a frame, by number of robots."""
 FRAME_YARDSTICK = "clear and flip"
 _FRAME_CASES = (("rooms", 6), ("rooms", 50), ("campus", 200))
-"""Maps and numbers of robots."""
+"""Map and number of robots of each case."""
 _RUN_DURATION_S = 5.0
 _WHITE = (255, 255, 255)
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of frames, videos and PNGs."""
+    """Return the benchmark cases of frames, and of videos and PNGs."""
     frames = [partial(_measure_frames, name, robots, quick) for name, robots in _FRAME_CASES]
     return [*frames, partial(_measure_encoding, quick)]
 
 
 def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
+    """Measure the drawing of the frames of a run, compared with clearing and copying a frame."""
     record = _simulate(name, robots)
     painter = Painter(record.environment, SIZE_PX)
     canvas = pygame.Surface(SIZE_PX)
@@ -55,13 +56,14 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
 
 
 def build_clearing_call(canvas: pygame.Surface | None) -> Call:
-    """Return a call that fills an empty surface and copies it to a canvas."""
+    """Build the yardstick: a call that fills an empty surface and copies it to a canvas."""
     assert canvas is not None
     empty = pygame.Surface(SIZE_PX)
     return lambda: (empty.fill(_WHITE), canvas.blit(empty, (0, 0)))
 
 
 def _measure_encoding(quick: bool) -> Iterator[Row]:
+    """Measure the encoding of the frames of a run as a video and as PNGs, compared with drawing them."""
     record = _simulate("rooms", 6)
     settings = VideoSettings(colors="robots")
     rows = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)

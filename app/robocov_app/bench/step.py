@@ -1,4 +1,7 @@
-"""A whole step (observe, cells, forces, physics) compared with Qhull's triangulation and bare physics."""
+"""Benchmark of a whole step (observations, cells, forces, physics).
+
+The yardsticks are Qhull's Delaunay triangulation of the robots, and a step of the bare physics engine.
+"""
 
 from collections.abc import Iterator
 from functools import partial
@@ -14,7 +17,7 @@ from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
 
 
 class Ratios(NamedTuple):
-    """Ratios of the time of a step to those of its yardsticks."""
+    """Ratios of the time of a step to the time of each yardstick."""
 
     triangulation: float
     physics: float
@@ -26,7 +29,7 @@ GOALS = {
     200: Ratios(triangulation=0.75, physics=26.0),
     1000: Ratios(triangulation=0.65, physics=16.0),
 }
-"""Maximum ratios by number of robots: 1.5 times those of an engine that bypassed pymunk's interface."""
+"""Maximum ratios by number of robots: 1.5 times the ratios of an engine that bypasses pymunk's interface."""
 BEFORE = {
     6: Ratios(triangulation=4.2, physics=80.0),
     50: Ratios(triangulation=2.6, physics=57.0),
@@ -37,13 +40,13 @@ BEFORE = {
 BATCH_RUNS = 64
 """Number of runs that are simulated together."""
 BATCH_GOAL = 5.0
-"""Maximum ratio of a step of one of them to bare physics."""
+"""Maximum ratio of one step of one run in the batch to a step of bare physics."""
 BATCH_ROBOTS = 6
 BARE_PHYSICS = "bare Space.step"
 """Yardstick: the physics engine alone, with the same bodies in an empty space."""
 TRIANGULATION = "Qhull's Delaunay"
 WARM_UP_STEPS = 120
-"""Steps before the measurement: two seconds, after which the team is moving."""
+"""Steps before the measurement: two seconds of simulation time, after which the team is moving."""
 _MIN_SPEED = 60.0
 """Minimum ratio of simulation time to real time for six robots."""
 _LARGE_TEAM = 500
@@ -52,11 +55,12 @@ _ROBOT_RADIUS_M = 0.1
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of single simulations, and of a batch."""
+    """Return the benchmark cases of single simulations of each team size, and of a batch."""
     return [*(partial(_measure_step, robots, quick) for robots in GOALS), partial(_measure_batch, quick)]
 
 
 def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
+    """Measure a step of one simulation, compared with each of the two yardsticks."""
     campus = load_map("campus")
     simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(robots, seed=0))
     space = _warm_up(simulation, robots)
@@ -103,13 +107,14 @@ def _get_rounds(robots: int, quick: bool) -> int:
 
 
 def _measure_batch(quick: bool) -> Iterator[Row]:
+    """Measure a step of a batch of simulations, compared with the same number of bare physics steps."""
     campus = load_map("campus")
     starts = [campus.start("uniform").sample(BATCH_ROBOTS, seed=seed) for seed in range(BATCH_RUNS)]
     simulation = SimulationBatch(campus, Rapf(), starts)
     space = _warm_up(simulation, BATCH_ROBOTS)
 
     def step_spaces() -> None:
-        # One call is too short for the clock, so there are as many as runs.
+        # A single step is too short to time accurately, so it is repeated once for each run.
         for _ in range(BATCH_RUNS):
             space.step(simulation.dt)
 
@@ -128,7 +133,10 @@ def _measure_batch(quick: bool) -> Iterator[Row]:
 
 
 def _warm_up(simulation: Simulation | SimulationBatch, robots: int) -> pymunk.Space:
-    """Run a simulation for a while; return an empty space with discs at the positions of its first robots."""
+    """Run a simulation until its robots move; return a pymunk space with discs at the same positions.
+
+    The space has no obstacles. In a batch, the discs are the robots of the first run.
+    """
     for _ in range(WARM_UP_STEPS):
         simulation.step()
     space = pymunk.Space()

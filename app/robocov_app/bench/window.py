@@ -1,4 +1,4 @@
-"""The interactive window, used for some seconds with its live cost, without a display."""
+"""Benchmark of the interactive window, which runs for some seconds with its live cost, without a display."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -28,34 +28,35 @@ TEAM_SIZES = (6, 50, 200, 1000)
 DRAWING_GOALS_S = {50: 4e-3}
 """Maximum time to draw a frame, by number of robots."""
 FRAME_GOALS_S = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
-"""Maximum time of everything that a frame needs, by number of robots."""
+"""Maximum total time of a frame (simulation, cost and drawing), by number of robots."""
 MAX_FRAME_S = 50e-3
-"""Maximum time of any frame."""
+"""Maximum time of the slowest frame."""
 _MIN_CROWD = 100
-"""Minimum number of robots that are smaller, so that there is space for them."""
+"""Team size from which the robots are smaller, so that all of them fit on the map."""
 _CROWD_RADIUS_M = 0.05
 _MAX_FIRST_START = 10
-"""Maximum number of robots for which the first start of the map has space."""
+"""Largest team that fits into the first start of the map."""
 
 
 @dataclass
 class _Measurements:
-    """Times of frames, and the number of costs that were computed meanwhile."""
+    """Times of the measured frames, and the number of costs computed while they were shown."""
 
     frames: list[float] = field(default_factory=list)
     """Time of each frame, s."""
     drawing: list[float] = field(default_factory=list)
-    """Time of the drawing of each frame, s."""
+    """Time to draw each frame, s."""
     costs: int = 0
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
-    """Return the cases of the window, one for each size of the team."""
+    """Return the benchmark cases of the window, one for each team size."""
     seconds = 4.0 if quick else 15.0
     return [partial(_measure_window, robots, seconds) for robots in TEAM_SIZES]
 
 
 def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
+    """Use the window for some seconds; yield the median frame time, drawing time and slowest frame."""
     session = _build_session(robots)
     with open_display(headless=True):
         layers = {layer.name for layer in build_standard_layers() if layer.is_default}
@@ -97,6 +98,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
 
 
 def _build_session(robots: int) -> Session:
+    """Build a session on the map "rooms", with smaller robots and another start for large teams."""
     properties = RobotProperties()
     if robots >= _MIN_CROWD:
         properties = RobotProperties(radius=_CROWD_RADIUS_M)
@@ -110,9 +112,9 @@ def _build_session(robots: int) -> Session:
 
 
 def _use_window(window: ViewerWindow, seconds: float) -> _Measurements:
-    """Advance and draw the window for some seconds."""
+    """Advance and draw the window for some seconds, and measure each frame."""
     clock = pygame.time.Clock()
-    # The first frames prepare the cost of the map, and draw everything that is stored afterwards.
+    # Warm-up: the first second prepares the cost of the map and fills the caches of the drawing.
     for _ in range(FPS):
         window.run_frame(clock.tick(FPS) / 1000.0)
     curve = window.viewer.pane.distance_curve

@@ -1,1 +1,1 @@
-"""The map editor: a model without a window, and the window on top of it."""
+"""The map editor: a model that works without a window, and the window on top of it."""

@@ -1,4 +1,4 @@
-"""The editor without its window: open map, selection, visible layers, and changes."""
+"""The editor without its window: open map, selection, visible layers, and editing actions."""
 
 from collections.abc import Callable
 from functools import partial
@@ -23,21 +23,21 @@ from robocov_app.jobs.workers import Worker
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
 from robocov_app.toolkit.window.clipboard import Clipboard
 
-MAX_LIVE_VERTICES = 1500  # larger maps are not measured while something is dragged
+MAX_LIVE_VERTICES = 1500  # larger maps are not measured during a drag
 GRIDS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 MAX_ROBOTS = 1000
 MAX_LENGTHS_M = {"grid": 100.0, "wall_width": 100.0, "radius": 10.0}
 
 
 class Editor(EditorContext):
-    """State of the editor, and the actions of the user on it.
+    """State of the editor, and the actions by which the user changes it.
 
     Parameters
     ----------
     document : Document
         The open map.
     measurement_worker : Worker of Measurement
-        Measures the map, given a sketch and the radius of a robot.
+        Measures a map in the background, given a sketch and the radius of a robot.
     folder : Path
         Folder of files without a path.
     settings : EditorSettings
@@ -52,7 +52,7 @@ class Editor(EditorContext):
     shows_panel : bool
         Whether the panel is shown.
     shown : set of str
-        Layers that are shown, see `LAYERS`.
+        Names of the visible layers; see `LAYERS`.
     radius : float
         Radius of a robot, m.
     robots : int
@@ -60,23 +60,23 @@ class Editor(EditorContext):
     seed : int
         Seed of the team's positions.
     start : str or None
-        Start chosen for the team.
+        Start that the user chose for the team.
     recent : list of str
-        Paths of recent maps, the newest first.
+        Paths of recently opened maps, the newest first.
     measurement : Measurement or None
-        Latest measurement of the map.
+        Latest measurement of the map; None before the first one.
     problem : Problem or None
         Problem whose message is shown on the sheet.
     dialogs : Dialogs
-        The open dialog.
+        Dialogs of the window.
     clipboard : Clipboard
-        Text that is copied and pasted.
+        Clipboard for copied text.
     cursor : Point or None
         Position of the pointer over the map, m.
     typed : str
         Value that is being typed for the tool.
     moves_since : float or None
-        Time since which moving obstacles are shown moving, s; None while they stand still.
+        Time at which the animation of moving obstacles started, s; None while they are shown at rest.
     """
 
     error_message_s = 8.0
@@ -120,7 +120,7 @@ class Editor(EditorContext):
 
     @property
     def displayed(self) -> tuple[Sketch, Selection]:
-        """Map and selection as shown: during a drag, as a release would make them."""
+        """Map and selection as displayed: during a drag, as if it ended now."""
         drag = self.toolbox.selector.drag
         if drag is None or drag.change is None:
             return self.sketch, self.selection
@@ -135,7 +135,7 @@ class Editor(EditorContext):
 
     @property
     def shown_measurement(self) -> Measurement | None:
-        """The measurement, if passages that are too narrow are shown."""
+        """Latest measurement; None if passages that are too narrow are not shown."""
         if "impassable" in self.shown:
             return self.measurement
         return None
@@ -147,7 +147,7 @@ class Editor(EditorContext):
 
     @property
     def start_name(self) -> str | None:
-        """Start at which the team is shown: the selected one, the chosen one, or the first."""
+        """Start at which the team is shown: the selected start, the chosen one, or the map's first one."""
         for name in (*sorted(self.selection.starts), self.start, *self.start_names):
             if name in self.start_names:
                 return name
@@ -160,7 +160,10 @@ class Editor(EditorContext):
         self.request_measurement()
 
     def request_measurement(self) -> None:
-        """Request a measurement of the map as displayed, unless it is the same as before."""
+        """Request a measurement of the displayed map unless it was requested already.
+
+        During a drag, large maps are measured without the drag, because that would take too long.
+        """
         sketch, _ = self.displayed
         if sketch is not self.sketch and count_vertices(sketch) >= MAX_LIVE_VERTICES:
             sketch = self.sketch
@@ -170,7 +173,7 @@ class Editor(EditorContext):
             self.measurement_worker.put(self._measured)
 
     def undo_steps(self, steps: int) -> None:
-        """Undo a number of changes, or redo them if it is negative."""
+        """Undo a number of changes; a negative number redoes changes."""
         history = self.document.history
         undone: Change | None = None
         redone: Change | None = None
@@ -185,7 +188,7 @@ class Editor(EditorContext):
         self._handle_change()
 
     def open_document(self, document: Document) -> None:
-        """Replace the document."""
+        """Replace the open document, and choose the select tool."""
         self.document = document
         self.measurement = None
         self._measured = None
@@ -194,7 +197,7 @@ class Editor(EditorContext):
         self._handle_change()
 
     def choose_tool(self, name: str, *, shows_hint: bool = True) -> None:
-        """Choose a tool by its name."""
+        """Choose a tool by name; this cancels what the current tool is doing."""
         self.tool.cancel(self)
         self.toolbox.current = self.toolbox.by_name[name]
         self.typed = ""
@@ -203,12 +206,12 @@ class Editor(EditorContext):
             self.show_message(self.tool.hint)
 
     def carry_out(self, action: Callable[[], object]) -> None:
-        """Carry an action out, and show the message that it returns.
+        """Run an action, and show the message that it returns.
 
         Raises
         ------
         MapError
-            If the action fails. Objects are named as in the window, not by their place in the file.
+            If the action fails. The message names objects as the window does, not by their place in the file.
         """
         try:
             super().carry_out(action)
@@ -216,20 +219,20 @@ class Editor(EditorContext):
             raise MapError(translate_message(str(error), self.sketch)) from None
 
     def ask_question(self, title: str, text: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
-        """Ask a question.
+        """Open a dialog with a question.
 
         Parameters
         ----------
         title, text : str
-            The question.
+            Title and text of the dialog.
         *answers : tuple of str, str and callable
-            Label, key and action of each answer; Escape gives the last one.
+            Label, key and action of each answer. Escape chooses the last answer.
         """
         buttons = [Answer(label, partial(self.attempt, action), key) for label, key, action in answers]
         self.dialogs.ask(Question(title, text, buttons, on_cancel=buttons[-1].call))
 
     def pass_time(self, seconds: float) -> None:
-        """Advance the clock: old messages go, and measurements arrive."""
+        """Advance the clock: remove old messages, and receive a finished measurement."""
         super().pass_time(seconds)
         measurement = self.measurement_worker.poll()
         if measurement is not None:
@@ -247,7 +250,7 @@ class Editor(EditorContext):
         self.show_message(_describe_switch(SNAPS[name].title, is_on=name in self.snaps))
 
     def toggle_all_snaps(self) -> None:
-        """Switch all snap modes off, or on if all are off."""
+        """Switch all snap modes off if any is on, otherwise switch all on."""
         if self.snaps:
             self.snaps = set()
             self.show_message("snaps to nothing")
@@ -256,7 +259,7 @@ class Editor(EditorContext):
             self.show_message("snaps to everything")
 
     def set_length(self, name: str, length: float) -> None:
-        """Set the attribute grid, wall_width or radius to a length, m."""
+        """Set the attribute grid, wall_width or radius to a length, m; raise MapError if out of range."""
         maximum = MAX_LENGTHS_M[name]
         if not MIN_SIZE_M <= length <= maximum:
             label = name.replace("_", " ")
@@ -267,6 +270,7 @@ class Editor(EditorContext):
 
     def refine_grid(self) -> None:
         """Choose the next finer grid."""
+        # The factor allows for rounding errors.
         finer = [grid for grid in GRIDS_M if grid < self.grid * 0.999]
         self.set_length("grid", max(finer, default=GRIDS_M[0]))
 
@@ -276,12 +280,12 @@ class Editor(EditorContext):
         self.set_length("grid", min(coarser, default=GRIDS_M[-1]))
 
     def set_robots(self, count: int) -> None:
-        """Set the number of robots in the team."""
+        """Set the number of robots in the team; raise MapError if it is out of range."""
         require(1 <= count <= MAX_ROBOTS, f"robots: expected 1 to {MAX_ROBOTS}, got {count}")
         self.robots = count
 
     def add_robots(self, count: int) -> None:
-        """Add robots to the team, or remove some if the number is negative."""
+        """Add robots to the team, or remove robots if the number is negative."""
         self.set_robots(min(max(self.robots + count, 1), MAX_ROBOTS))
 
     def switch_theme(self) -> None:

@@ -1,4 +1,4 @@
-"""Settings that the editor remembers between sessions, and the layers that it can show."""
+"""Settings that the editor stores between sessions, and the layers that it can show."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.toolkit.window.window_settings import WindowSettings
 
 SETTINGS_FILE = "editor.json"
-MAX_RECENT = 10  # recent maps
+MAX_RECENT = 10  # number of recent maps that are stored
 
 
 class LayerSwitch(NamedTuple):
@@ -18,9 +18,9 @@ class LayerSwitch(NamedTuple):
     Attributes
     ----------
     title : str
-        Its label.
+        Label of the layer.
     key : str
-        Key that shows or hides it.
+        Key that shows or hides the layer.
     """
 
     title: str
@@ -62,7 +62,7 @@ class EditorSettings(WindowSettings):
     snaps : tuple of str
         Snap modes that are on.
     shown : tuple of str
-        Layers that are shown.
+        Names of the visible layers.
     radius : float
         Radius of a robot, m.
     robots : int

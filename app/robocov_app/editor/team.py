@@ -1,4 +1,4 @@
-"""The team shown at a start of the map, sampled in a thread so that the window does not wait."""
+"""The team shown at a start of the map, sampled in a thread so that the window does not block."""
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from robocov_app.editor.model.sketch import Sketch
 
 @dataclass(frozen=True)
 class TeamRequest:
-    """Describes a team and where it starts.
+    """Request to place a team at a start.
 
     Attributes
     ----------
     sketch : Sketch
         The map.
     start : str or None
-        Name of the start; None for anywhere in the free space.
+        Name of the start; None for random positions in the free space.
     robots : int
         Number of robots.
     seed : int
@@ -34,12 +34,12 @@ class TeamRequest:
 
 @dataclass(frozen=True)
 class Team:
-    """A team at a start.
+    """A team with the positions of its robots at a start.
 
     Attributes
     ----------
     start : str or None
-        Name of the start; None for anywhere in the free space.
+        Name of the start; None for random positions in the free space.
     robots : int
         Number of robots.
     radius : float
@@ -47,7 +47,7 @@ class Team:
     positions : tuple of Point
         Positions of the robots, m; empty if they do not fit.
     message : str
-        Why they do not fit.
+        Reason why the robots do not fit; empty if they do.
     """
 
     start: str | None
@@ -58,11 +58,11 @@ class Team:
 
 
 def sample_team(request: TeamRequest) -> Team:
-    """Sample the positions of a team; a failure is in the team's message."""
+    """Sample the positions of a team; if that fails, return a team without positions and with a message."""
     try:
         start = request.sketch.build_environment().start(request.start)
         positions = start.sample(request.robots, seed=request.seed, radius=request.radius)
-    except Exception as error:  # An unforeseen error must not end the window.
+    except Exception as error:  # An unexpected error must not crash the window.
         message = str(error).removeprefix("map: ")
         return Team(request.start, request.robots, request.radius, message=message)
     points = tuple((x, y) for x, y in positions.tolist())
@@ -78,7 +78,10 @@ class TeamSampler:
         self._future: Future[Team] | None = None
 
     def poll(self, request: TeamRequest) -> Team | None:
-        """Request a team unless it was requested before, and return it once when it is ready."""
+        """Start to sample a team if the request is new; return the team once it is ready, otherwise None.
+
+        Call this regularly. Each team is returned only once.
+        """
         if self._request != request:
             self._request = request
             if self._future is not None:

@@ -1,9 +1,9 @@
-"""Work in processes of their own.
+"""Background work in separate processes.
 
-A *service* is a class without arguments whose objects answer questions, see `messages.Service`.
+A *service* is a class that is built without arguments and answers questions; see `messages.Service`.
 
-- `workers`: a service for a window that must not wait; only the newest question counts
-- `processes`: a service in a process, for callers that wait
-- `serving`: the other side, in the process of the service
-- `messages`: the messages between the two
+- `workers`: runs a service for a window that must not block; only the newest question counts
+- `processes`: starts the process of a service, for callers that wait for each answer
+- `serving`: main loop inside the process of a service
+- `messages`: messages between a program and its services
 """

@@ -10,11 +10,11 @@ from typing import IO, Any, Protocol
 from robocov.errors import RobocovError
 
 READY = "ready"
-"""First message of a process, when its service is loaded."""
+"""First message from a process, sent when its service is loaded."""
 
 
 class Service(Protocol):
-    """Answers questions.
+    """Interface of a service: a callable that answers questions.
 
     Attributes
     ----------
@@ -37,26 +37,29 @@ class Service(Protocol):
 
 
 class Wire:
-    """Translates questions and answers; used by threads, in order. Each process has a wire of its own."""
+    """Converts questions before they are sent, and answers after they are received; by default not at all.
+
+    Each process has its own wire. Questions and answers are converted in order, each kind in its own thread.
+    """
 
     def encode(self, question: Any) -> object:
-        """Return a question as it is sent."""
+        """Convert a question to the object that is sent."""
         return question
 
     def decode(self, answer: Any) -> Any:
-        """Return the answer that was received."""
+        """Convert a received object to the answer."""
         return answer
 
 
 class Channel:
-    """Channel of a service while it works: newer questions in, progress out."""
+    """Connection of a working service to its program: it receives newer questions and sends progress."""
 
     def get_newer_questions(self) -> list[Any]:
         """Return the questions that have arrived since the service started to work."""
         return []
 
     def report_progress(self, progress: object) -> None:
-        """Report progress."""
+        """Report the progress of the current question."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +71,11 @@ class Reply:
     number : int
         Number of the question.
     answer : object
-        The answer; None if there is none. Of a reply that is not final, the progress.
+        The answer, or None if there is none. If the reply is not final, the progress so far.
     problem : str
         Reason why there is no answer.
     is_final : bool
-        Whether it is the answer, rather than progress.
+        Whether the reply holds the answer, rather than progress.
     """
 
     number: int
@@ -82,19 +85,19 @@ class Reply:
 
 
 def answer_questions(service: Service, questions: list[tuple[int, Any]], channel: Channel) -> Reply:
-    """Let a service answer questions.
+    """Ask a service for its answer, and turn errors into replies.
 
     Parameters
     ----------
     service : Service
     questions : list of (int, object)
-        Numbers and questions.
+        Numbered questions, oldest first.
     channel : Channel
 
     Returns
     -------
     Reply
-        An unexpected error is part of the reply, so that it does not end the window.
+        Reply to the newest question. An error becomes its `problem`, so that it does not crash the window.
     """
     number = questions[-1][0]
     try:
@@ -107,13 +110,13 @@ def answer_questions(service: Service, questions: list[tuple[int, Any]], channel
 
 
 def send(stream: IO[bytes], message: object) -> None:
-    """Write one message."""
+    """Write one message to a stream."""
     stream.write(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
     stream.flush()
 
 
 def receive(stream: IO[bytes]) -> Any:
-    """Read one message; None at the end of the stream, also in the middle of a message."""
+    """Read one message from a stream; return None if the stream ends, even within a message."""
     try:
         return pickle.load(stream)
     except (EOFError, pickle.UnpicklingError):

@@ -1,4 +1,4 @@
-"""Processes of services, for callers that wait for answers."""
+"""Start, query and end processes of services, for callers that wait for each answer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import IO
 from robocov_app.jobs.messages import READY, Reply, receive, send
 
 _PIPE_BYTES = 1 << 20
-"""Capacity of the pipe of answers. If it takes a whole answer, its reader wakes up less often."""
+"""Capacity of the pipe for answers. If a whole answer fits, its reader wakes up less often."""
 
 
 def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
@@ -20,22 +20,23 @@ def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subproces
     Parameters
     ----------
     service : str
-        ``package.module:Class``.
+        Class of the service as ``package.module:Class``.
     stderr : binary file or None
-        Its standard error; by default that of this process.
+        File for the standard error of the process; by default, that of this process.
 
     Returns
     -------
     subprocess.Popen
-        Its standard input and output are pipes.
+        The process, with pipes as standard input and output.
 
     Raises
     ------
     OSError
         If the process cannot be started.
     """
-    # It has to import the same modules as this process.
+    # The process must be able to import the same modules as this one.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    # Linear algebra uses one thread in each process, unless the user has chosen another number.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(name, "1")
     program = f"from robocov_app.jobs.serving import serve; serve({service!r})"
@@ -49,14 +50,14 @@ def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subproces
     if sys.platform == "linux":
         import fcntl
 
-        # Not every user is allowed to have such large pipes.
+        # Not every user is allowed to create pipes of this size; smaller ones work, too.
         with suppress(OSError):
             fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)  # type: ignore[arg-type]
     return process
 
 
 def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | None:
-    """Ask the process of a service, and wait for the answer.
+    """Send a question to the process of a service, and wait for the reply.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
     Returns
     -------
     Reply or None
-        None if the process ends.
+        None if the process ended without a reply.
     """
     assert process.stdin is not None
     assert process.stdout is not None
@@ -81,7 +82,7 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
 
 
 def end_process(process: subprocess.Popen[bytes]) -> int:
-    """End the process of a service, and return its exit status."""
+    """Close the pipes of a service, which ends its process, and return its exit status."""
     for stream in (process.stdin, process.stdout):
         assert stream is not None
         with suppress(OSError):

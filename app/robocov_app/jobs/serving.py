@@ -1,4 +1,4 @@
-"""The process of a service, which answers until its program ends."""
+"""Main loop of the process of a service, which answers questions until its program ends."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from typing import Any, BinaryIO
 from robocov_app.jobs.messages import READY, Channel, Reply, answer_questions, receive, send
 
 _SET_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux."""
+"""Value of PR_SET_PDEATHSIG in Linux: the signal that a process receives when its parent ends."""
 
 
 class _PipeChannel(Channel):
-    """The channel of a process, over two pipes."""
+    """Channel of a service over two pipes, to and from its program."""
 
     def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
         self._source = source
@@ -44,7 +44,7 @@ class _PipeChannel(Channel):
             os._exit(0)
 
     def wait_for_questions(self) -> list[tuple[int, Any]]:
-        """Wait for at least one question, and return all with their numbers."""
+        """Wait until there is a question, and return all new questions with their numbers."""
         with self._has_questions:
             self._has_questions.wait_for(lambda: self._questions)
             questions = self._questions
@@ -53,7 +53,7 @@ class _PipeChannel(Channel):
         return questions
 
     def listen(self) -> None:
-        """Collect questions until the input ends, then end the process."""
+        """Collect incoming questions, and exit the process when the input ends; the target of a thread."""
         while True:
             question = receive(self._source)
             if question is None:
@@ -64,12 +64,14 @@ class _PipeChannel(Channel):
 
 
 def serve(service: str) -> None:
-    """Answer questions until the standard input ends, as it does even if the program crashes.
+    """Load a service, and answer questions until the standard input is closed.
+
+    It is closed when the program ends, even if it crashes.
 
     Parameters
     ----------
     service : str
-        ``package.module:Class``.
+        Class of the service as ``package.module:Class``.
     """
     _prepare_process()
     source, target = _take_standard_streams()
@@ -84,9 +86,9 @@ def serve(service: str) -> None:
 
 
 def _prepare_process() -> None:
-    """Report crashes, end together with the program, and leave Ctrl-C to it."""
+    """Report crashes, end when the parent program ends, and ignore Ctrl-C, which the parent handles."""
     if sys.version_info >= (3, 14):
-        # The frames of the physics engine would hide those of a user's code.
+        # The C stack of the physics engine would hide the Python stack of a user's code.
         faulthandler.enable(c_stack=False)
     else:
         faulthandler.enable()
@@ -96,7 +98,11 @@ def _prepare_process() -> None:
 
 
 def _take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes; the standard streams of other code are empty input and standard error."""
+    """Return the input and output pipes, and detach the standard streams from them.
+
+    Code that prints then writes to standard error instead of into the messages, and code that reads standard
+    input gets no data.
+    """
     source = os.fdopen(os.dup(0), "rb")
     target = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)

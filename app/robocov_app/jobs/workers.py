@@ -1,4 +1,4 @@
-"""Workers of a window that must not wait: only the newest question counts."""
+"""Background workers for a window that must not block: only the newest question counts."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ _Answer = TypeVar("_Answer")
 
 
 class LatestWorker(Generic[_Answer]):
-    """A service in a process of its own; a question starts it if it is not running.
+    """A service in its own process, which is started when a question arrives and it is not running.
 
     Parameters
     ----------
     service : str
-        ``package.module:Class``.
+        Class of the service as ``package.module:Class``.
     task : str
-        Its work as a verb phrase for messages, such as ``measures the map``.
+        What the service does, as a verb phrase for messages, such as ``measures the map``.
     wire : type
-        Translates questions and answers.
+        Converts questions and answers; see `Wire`.
     patience : float, s
-        A process that works longer on an older question is ended for a newer one.
+        If a new question arrives after an older one has been unanswered for longer than this, the process is
+        restarted.
 
     Attributes
     ----------
     problem : str
         Reason why there is no answer to the last question; empty if there is one.
     process : subprocess.Popen or None
-        One thread writes to it, and another one reads from it.
+        Process of the service. One thread writes to it, and another one reads from it.
     """
 
     def __init__(self, service: str, task: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
@@ -60,7 +61,7 @@ class LatestWorker(Generic[_Answer]):
 
     @property
     def is_alive(self) -> bool:
-        """Whether there is a process that can answer."""
+        """Whether the process is running and can answer."""
         return self.process is not None and not self._has_ended
 
     @property
@@ -70,14 +71,14 @@ class LatestWorker(Generic[_Answer]):
 
     @property
     def progress(self) -> Any:
-        """Progress of the newest question, as the service reports it; None if it has not yet."""
+        """Latest progress that the service reported for the newest question; None if there is none yet."""
         latest = self._progress
         if latest is None or latest.number != self._number:
             return None
         return latest.answer
 
     def put(self, question: object) -> None:
-        """Ask a question. Older questions without an answer are dropped.
+        """Ask a question without waiting for the answer. Older questions that were not sent yet are dropped.
 
         Parameters
         ----------
@@ -92,7 +93,7 @@ class LatestWorker(Generic[_Answer]):
             try:
                 self._start()
             except OSError as error:
-                # There is no memory or no process left. The next question tries again.
+                # The system is out of memory or processes. The next question tries again.
                 self._number += 1
                 self._answered_number = self._number
                 reason = error.strerror or error
@@ -103,7 +104,9 @@ class LatestWorker(Generic[_Answer]):
         self._has_question.set()
 
     def _start(self) -> None:
+        """Start the process, and the two threads that write questions to it and read its replies."""
         process = start_process(self._service)
+        # A new wire, because it may remember what the previous process has received.
         wire = self._wire()
         self.process = process
         self._has_ended = False
@@ -116,16 +119,16 @@ class LatestWorker(Generic[_Answer]):
             thread.start()
 
     def poll(self) -> _Answer | None:
-        """Return the newest answer since the last call, once.
+        """Return the newest answer that has arrived since the last call; call this regularly.
 
         Returns
         -------
         object or None
-            While the worker is `is_busy`, it is the answer to an older question. None if there is none.
+            None if no answer has arrived. While `is_busy`, the answer belongs to an older question.
         """
         if self.process is None:
             return None
-        # Read before the replies, because the last one may arrive just before the process ends.
+        # This is read before the replies, because the last reply may arrive just before the process ends.
         has_ended = self._has_ended
         reply = None
         if self._replies:
@@ -144,7 +147,7 @@ class LatestWorker(Generic[_Answer]):
         return answer
 
     def _describe_end(self) -> str:
-        """Return how the process has ended, and whether that was while it started."""
+        """Describe the exit status of the process, and whether it ended during its start."""
         assert self.process is not None
         status = self.process.poll()
         description = ""
@@ -155,10 +158,11 @@ class LatestWorker(Generic[_Answer]):
         return description
 
     def close(self) -> None:
-        """End the process."""
+        """End the process and its threads, and drop questions and answers."""
         if self.process is None:
             return
         process = self.process
+        # Wakes the writing thread, which ends because the process is no longer that of the worker.
         self.process = None
         self._has_question.set()
         process.kill()
@@ -169,10 +173,10 @@ class LatestWorker(Generic[_Answer]):
         self._replies.clear()
 
     def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
-        """Send the newest question whenever there is one; the target of a thread."""
+        """Send the newest question whenever there is one; the target of the writing thread."""
         assert process.stdin is not None
         try:
-            # If the process has ended, the thread that reads notices it.
+            # If the process has ended, the reading thread notices it.
             with suppress(OSError), process.stdin as stream:
                 while self._has_question.wait() and self.process is process:
                     self._has_question.clear()
@@ -180,13 +184,13 @@ class LatestWorker(Generic[_Answer]):
                         number, question = self._questions.pop()
                         send(stream, (number, wire.encode(question)))
         except Exception:
-            # A question that cannot be sent must not be waited for.
+            # Nobody must wait for the answer to a question that cannot be sent.
             traceback.print_exc()
             if self.process is process:
                 self._has_ended = True
 
     def _read(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
-        """Receive replies until the process ends; the target of a thread."""
+        """Receive replies until the process ends; the target of the reading thread."""
         assert process.stdout is not None
         try:
             with process.stdout as stream:
@@ -199,20 +203,20 @@ class LatestWorker(Generic[_Answer]):
                         reply = Reply(reply.number, wire.decode(reply.answer), reply.problem)
                     self._replies.append(reply)
         except Exception:
-            # An answer that cannot be read must not be waited for either.
+            # Nobody must wait for an answer that cannot be read.
             traceback.print_exc()
         finally:
             self._has_ended = True
 
 
 class DirectWorker(Generic[_Answer]):
-    """A service that answers in this process at once, for frames without a display and for tests.
+    """A service that answers immediately in this process, for rendering without a display and for tests.
 
     Parameters
     ----------
     service : Service
     wire : Wire or None
-        Translates questions and answers.
+        Converts questions and answers; see `Wire`.
 
     Attributes
     ----------
@@ -237,7 +241,7 @@ class DirectWorker(Generic[_Answer]):
         self._answer = reply.answer
 
     def poll(self) -> _Answer | None:
-        """Return the answer to the last question, once; None if there is none."""
+        """Return the answer to the last question, or None if there is none or it was returned before."""
         encoded = self._answer
         self._answer = None
         if encoded is None:

@@ -1,9 +1,9 @@
-"""Learning environments: the simulation for gymnasium and PettingZoo (``pip install "robocov[rl]"``).
+"""Learning environments for gymnasium and PettingZoo (``pip install "robocov[rl]"``).
 
-`CoverageParallelEnv` has one learner for each robot, `CoverageEnv` one for all of them, `CoverageVectorEnv`
-many of these at once. All are defined by a `CoverageTask`, and their observations by an `ObservationLayout`.
-A learned policy becomes a controller as a `PolicyController`; a controller acts in the environments as a
-`ControllerPolicy`.
+`CoverageParallelEnv` has one learner for each robot, `CoverageEnv` has one learner for the whole team, and
+`CoverageVectorEnv` runs many environments of the latter kind at once. A `CoverageTask` defines the
+environment, and an `ObservationLayout` its observations. `PolicyController` turns a learned policy into a
+controller, and `ControllerPolicy` lets a controller act in an environment.
 
     import numpy as np
     from robocov_app.learning import CoverageEnv, ObservationLayout
@@ -37,7 +37,7 @@ A learned policy becomes a controller as a `PolicyController`; a controller acts
     best_return = mean_return(policy(best), seeds=range(10, 14))
     print("median", np.median(returns), "best on other starts", best_return)
 
-Names are loaded on first use; only the two environments need the extra.
+Names are loaded on first use; only the environments need the extra packages.
 """
 
 from __future__ import annotations
@@ -77,10 +77,11 @@ _MODULES = {
 }
 """Module of each public name."""
 _EXTRA_PACKAGES = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}
-"""Packages of the extra that modules need."""
+"""Packages of the extra "rl" that each module needs."""
 
 
 def __getattr__(name: str) -> Any:
+    """Import the module of a public name on first use."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = _MODULES[name]

@@ -1,4 +1,4 @@
-"""Actions of robots: forces or velocities, and the forces that drive the robots by them."""
+"""Actions of robots, which are forces or velocities, and the driving forces that result from them."""
 
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -12,15 +12,15 @@ Action: TypeAlias = Literal["force", "velocity"]
 """Kind of an action: a force in N, or a velocity in m/s."""
 ACTIONS: tuple[Action, ...] = get_args(Action)
 VELOCITY_TIME_CONSTANT_S = 0.1
-"""Time constant with which a robot follows a desired velocity."""
+"""Time constant with which a robot approaches a desired velocity."""
 
 
 def compute_action_limits(action: Action, team: Team) -> Array:
-    """Compute the largest useful component of an action for each robot.
+    """Compute the largest useful value of each component of an action, for each robot.
 
     A force of m a + ν v suffices to move at the maximum speed v and to accelerate by the maximum acceleration
-    a at the same time; a larger force has no effect. Larger actions are no error: the world limits speed and
-    acceleration, for learners as for all controllers.
+    a at the same time; a larger force has no further effect. Larger actions are not an error, because the
+    world limits speed and acceleration, for learners as for all controllers.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def compute_action_limits(action: Action, team: Team) -> Array:
 
 
 def compute_driving_forces(action: Action, actions: Array, velocities: Array, team: Team) -> Array:
-    """Compute the forces of actions.
+    """Compute the forces with which robots execute their actions.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def compute_driving_forces(action: Action, actions: Array, velocities: Array, te
         Kind of the actions.
     actions : (n, 2) array, N or m/s
     velocities : (n, 2) array, m/s
-        Present velocities.
+        Current velocities.
     team : Team
 
     Returns
@@ -55,8 +55,9 @@ def compute_driving_forces(action: Action, actions: Array, velocities: Array, te
 
     Notes
     -----
-    For a desired velocity u the force is ``F = ν u + m (u - q') / τ``, where q' is the present velocity, and
-    τ is `VELOCITY_TIME_CONSTANT_S`. It compensates the viscosity of (28), and accelerates towards u.
+    For a desired velocity u, the force is ``F = ν u + m (u - q') / τ``, where q' is the current velocity, and
+    τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates the viscosity of (28), the second one
+    accelerates the robot towards u.
     """
     if action == "force":
         return actions
@@ -65,7 +66,7 @@ def compute_driving_forces(action: Action, actions: Array, velocities: Array, te
 
 
 def compute_actions(action: Action, forces: Array, velocities: Array, team: Team) -> Array:
-    """Compute the actions that give forces, the inverse of `compute_driving_forces`.
+    """Compute the actions that result in given forces: the inverse of `compute_driving_forces`.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def compute_actions(action: Action, forces: Array, velocities: Array, team: Team
         Kind of the actions.
     forces : (n, 2) array, N
     velocities : (n, 2) array, m/s
-        Present velocities.
+        Current velocities.
     team : Team
 
     Returns
@@ -87,12 +88,12 @@ def compute_actions(action: Action, forces: Array, velocities: Array, team: Team
 
 
 def _compute_velocity_gains(team: Team) -> tuple[Array, Array]:
-    """Return ν and m / τ of each robot, (n, 1) each."""
+    """Return the viscosity ν and the gain m / τ of each robot, both (n, 1)."""
     return team.viscosity[:, None], team.mass[:, None] / VELOCITY_TIME_CONSTANT_S
 
 
 def check_actions(actions: Any, count: int) -> Array:
-    """Check the actions of a team.
+    """Check the actions of a team, and convert them to an array.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def check_actions(actions: Any, count: int) -> Array:
     Raises
     ------
     ParameterError
-        If the shape is another one, or a number is not finite.
+        If the shape is wrong, or a number is not finite.
     """
     array = np.asarray(actions, dtype=np.float64)
     if array.shape != (count, 2):

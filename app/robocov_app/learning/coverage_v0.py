@@ -1,4 +1,4 @@
-"""The environment under PettingZoo's usual names: `parallel_env`, and `env`, whose robots act one by one."""
+"""The environment under PettingZoo's standard names: `parallel_env`, and `env` (agents act in turn)."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ parallel_env = CoverageParallelEnv
 
 
 def env(**options: Any) -> Any:
-    """Return the environment as PettingZoo's ``AECEnv``, in which the robots act one after the other.
+    """Build the environment as PettingZoo's ``AECEnv``, in which the robots act one after the other.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ THEMES = ("light", "dark")
 MIN_SIDE_PX = 64
 MAX_SIDE_PX = 8192
 _FRAME_RATE = 10
-"""Frames per second of a video of the default task, one for each action."""
+"""Frames per second of a video of the default task, with one frame for each action."""
 
 
 def draw_episode(
@@ -37,7 +37,7 @@ def draw_episode(
     options: Mapping[str, Any] | None = None,
     shared_run: SharedRun | None = None,
 ) -> Episode:
-    """Draw a new episode.
+    """Draw a random episode.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def draw_episode(
         Maps of the task.
     rng : numpy.random.Generator
     options : Mapping, optional
-        Values that replace random ones. ``map``: a map, its name or path. ``start``: the name of one of its
-        starts. ``start_seed``: the seed of the positions, as in `robocov run`. ``positions``: the positions
-        themselves, (n, 2) m. ``conditions_seed``: the seed of the task's conditions.
+        Values to use instead of random ones. ``map``: a map, or its name or path. ``start``: name of a start
+        of the map. ``start_seed``: seed of the positions, as in `robocov run`. ``positions``: the positions
+        themselves, (n, 2) m. ``conditions_seed``: seed of the task's conditions.
     shared_run : SharedRun, optional
-        A simulation that is shared with other episodes on the same map.
+        Place in a simulation that is shared with other episodes on the same map.
 
     Returns
     -------
@@ -59,11 +59,12 @@ def draw_episode(
     Raises
     ------
     StartError
-        If the positions are invalid, or there is no such start.
+        If the positions are invalid, or the map has no start of the given name.
     InputError
         If a map cannot be read.
     """
     options = options or {}
+    # A map is drawn even if an option replaces it, so that the numbers that follow stay the same.
     environment = sampler.draw(rng)
     if "map" in options:
         environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))
@@ -86,11 +87,11 @@ def draw_episode(
 def _choose_start(
     task: CoverageTask, environment: Environment, random_values: _RandomValues, options: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the arguments of a `Scenario` about the start: a name with a seed, or positions."""
+    """Return the `Scenario` arguments for the start: a start of the map with a seed, or given positions."""
     name = options.get("start", task.start)
     if name == "*":
         name = random_values.start
-    # The name is checked in any case.
+    # This checks the name even if positions are given.
     start = environment.start(name)
     if "positions" in options:
         return {"start": None, "seed": None, "starts": _parse_positions(options["positions"])}
@@ -107,6 +108,7 @@ class _RandomValues(NamedTuple):
     start_seed : int
         Seed of the positions.
     conditions_seed : int
+        Seed of the conditions.
     """
 
     start: str
@@ -115,7 +117,7 @@ class _RandomValues(NamedTuple):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, environment: Environment) -> Self:
-        """Draw all values, even those that options replace, so that the others stay the same."""
+        """Draw all values, even those that options replace, so that the others do not change."""
         start_names = list(environment.starts) or ["uniform"]
         start = start_names[int(rng.integers(len(start_names)))]
         start_seed = int(rng.integers(SEED_LIMIT))
@@ -136,22 +138,22 @@ class EpisodeEnv:
     Parameters
     ----------
     task : CoverageTask, optional
-        By default the task with all defaults.
+        By default, a task with default values.
     render_mode : str, optional
         "rgb_array", or "human", which opens a window and needs a display.
     size : (int, int)
-        Width and height of the pictures, px.
+        Width and height of the rendered images, px.
     theme : str
         "light" or "dark".
     sampler : MapSampler, optional
         Maps of the task. Several environments may share one.
     **changes
-        Attributes of the task that differ.
+        Attributes of the task to change.
 
     Attributes
     ----------
     episode : Episode or None
-        The present episode; None before the first one.
+        The current episode; None before the first one.
 
     Raises
     ------
@@ -185,7 +187,7 @@ class EpisodeEnv:
         self._clock: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state to pickle or to copy, without the window and the painter."""
+        """Return the state for pickling or copying, without the window and the painter."""
         return {**vars(self), "_painter": None, "_window": None, "_clock": None}
 
     def _get_episode(self) -> Episode:
@@ -194,7 +196,7 @@ class EpisodeEnv:
         return self.episode
 
     def render(self) -> Frame | None:
-        """Return a picture, (height, width, 3) from 0 to 255, in the mode "rgb_array", else None."""
+        """Return an image, (height, width, 3) from 0 to 255, in the mode "rgb_array"; None in other modes."""
         episode = self._get_episode()
         if self.render_mode != "rgb_array":
             return None
@@ -219,6 +221,7 @@ class EpisodeEnv:
         return self._painter
 
     def _build_scene(self, episode: Episode) -> Scene:
+        """Build the scene of the current state of an episode, with the trails of its robots."""
         from robocov_app.render.scene import Scene
 
         trail = np.array(episode.trail)
@@ -234,7 +237,7 @@ class EpisodeEnv:
         )
 
     def _update_window(self) -> None:
-        """Draw the present episode in the window, in the mode "human"."""
+        """Draw the current episode in the window in the mode "human"; do nothing in other modes."""
         if self.render_mode != "human":
             return
         import pygame
@@ -248,6 +251,7 @@ class EpisodeEnv:
         self._clock.tick(1.0 / self.task.period)
 
     def _open_window(self) -> None:
+        """Open the window; raise RobocovError if there is no display."""
         import pygame
 
         try:

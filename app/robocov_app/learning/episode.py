@@ -1,4 +1,4 @@
-"""One episode: a simulation that is driven by actions, and their rewards."""
+"""One episode: a simulation that is driven by actions, and the rewards of these actions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from robocov_app.learning.task import CoverageTask
 
 @dataclass(frozen=True)
 class ExternalController:
-    """Placeholder for the controller of a simulation whose forces are given from outside.
+    """Placeholder controller of a simulation that receives its forces from a learner.
 
     Parameters
     ----------
@@ -43,21 +43,21 @@ class ExternalController:
 
     @classmethod
     def from_task(cls, task: CoverageTask) -> ExternalController:
-        """Build the controller with the scans of a task."""
+        """Build the controller with the scans that the observations of a task need."""
         rays = task.observation.rays
         return cls(Scanning(rays, task.period) if rays else None)
 
     def begin(self, region: Region, team: Team) -> None:
-        """Return no memory."""
+        """Return None, because the controller needs no memory."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
-        """Return no forces. Those of the actions are given at each step."""
+        """Return zero forces. The forces of the actions are passed to each simulation step instead."""
         return Decision(np.zeros_like(seen.positions))
 
 
 @dataclass(frozen=True, eq=False)
 class ActionOutcome:
-    """Outcome of the actions of n robots.
+    """Rewards and contact times of one action of each robot.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ class ActionOutcome:
 
 
 class SharedSimulation:
-    """One simulation of several episodes on one map, which are advanced together.
+    """One batch simulation of several episodes on the same map, which are advanced together.
 
-    The episodes have no conditions, and the map no moving obstacles.
+    The episodes have no conditions, and the map has no moving obstacles.
 
     Parameters
     ----------
@@ -93,16 +93,17 @@ class SharedSimulation:
         self._rows: Rows = np.empty((0, 0, 0), dtype=np.float32)
 
     def start_episode(self, run: int, positions: Array) -> SimulationBatch:
-        """Start an episode, and return the simulation of all.
+        """Start an episode, and return the simulation of all episodes.
 
         Parameters
         ----------
         run : int
-            Number of the episode in the simulation.
+            Index of the episode in the simulation.
         positions : (n, 2) array, m
+            Initial positions.
         """
         if self._simulation is None:
-            # The other episodes take their own positions when they start.
+            # The other episodes set their own positions when they start.
             self._simulation = SimulationBatch(
                 self.environment,
                 ExternalController.from_task(self._task),
@@ -114,25 +115,25 @@ class SharedSimulation:
         return self._simulation
 
     def advance(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, ActionOutcome]:
-        """Hold the actions of all episodes for one decision.
+        """Advance all episodes by one action period.
 
         Parameters
         ----------
         actions : (count, n, 2) array, N or m/s
         episodes : Mapping
-            Episodes that are advanced, by their numbers.
+            Episodes whose outcomes are computed, by index.
 
         Returns
         -------
         dict
-            Outcomes of these episodes.
+            Outcomes of these episodes, by index.
         """
         assert self._simulation is not None
         contact_time = hold_actions(self._task, self._simulation, actions)
         due = [run for run, episode in episodes.items() if episode.is_reward_due()]
         results: dict[int, CoverageResult] = {}
         if due:
-            # The episodes are on one map, so that any of them has its cost.
+            # All episodes are on the same map, so the cost of any of them can be used.
             cost = episodes[due[0]].cost
             costs = cost.evaluate_teams(self._simulation.positions[due])
             results = dict(zip(due, costs, strict=True))
@@ -142,9 +143,10 @@ class SharedSimulation:
         }
 
     def build_rows(self) -> Rows:
-        """Return the present observations of the robots of all episodes, (count, n, size)."""
+        """Return the current observation rows of all episodes, (count, n, size)."""
         assert self._simulation is not None
         observations = self._simulation.observe()
+        # The simulation returns the same object until it advances, so each episode may ask again.
         if observations is not self._observed:
             rows = self._task.observation.build_rows(observations, self._joint_team)
             self._rows = rows.reshape(self._count, -1, rows.shape[1])
@@ -153,11 +155,11 @@ class SharedSimulation:
 
 
 class SharedRun(NamedTuple):
-    """An episode in a shared simulation."""
+    """Place of an episode in a shared simulation."""
 
     simulation: SharedSimulation
     run: int
-    """Number of the episode."""
+    """Index of the episode in the simulation."""
 
 
 class Episode:
@@ -167,18 +169,18 @@ class Episode:
     ----------
     task : CoverageTask
     scenario : Scenario
-        The run.
+        Map, start, team and conditions of the episode.
     cost : CoverageCost
-        The coverage cost of its map.
+        Coverage cost of the map.
     shared_run : SharedRun, optional
-        A shared simulation. It is used if it is on the same map.
+        Place in a shared simulation, which is used if it is on the same map.
 
     Attributes
     ----------
     working : (n,) array of bool
         Which robots have joined and not failed.
     result, initial : CoverageResult
-        Their present cost, and the one at the start.
+        Coverage cost when it was last evaluated, and at the start.
     reference : float
         Unit of rewards, m.
     trail : list of (n, 2) arrays, m
@@ -205,7 +207,7 @@ class Episode:
         self._scenario = scenario
         self.shared: SharedSimulation | None = None
         self.simulation: Simulation | SimulationBatch
-        # The index of the episode's robots in the arrays of the simulation.
+        # Selects the robots of this episode in the arrays of the simulation: all, or those of one run.
         self._index: int | slice = slice(None)
         if shared_run is not None and shared_run.simulation.environment is scenario.environment:
             self.shared = shared_run.simulation
@@ -248,29 +250,29 @@ class Episode:
         return len(self.trail) - 1
 
     def build_rows(self) -> Rows:
-        """Return the present observations of learners, one row for each robot, (n, size)."""
+        """Return the current observations for learners, one row for each robot, (n, size)."""
         if self.shared is not None:
             return self.shared.build_rows()[self._index]
         return self.task.observation.build_rows(self.simulation.observe(), self.team, self._scans)
 
     def observe(self) -> Observations:
-        """Return the present observations of all robots."""
+        """Return the current observations of all robots, as controllers receive them."""
         if isinstance(self.simulation, SimulationBatch):
             assert isinstance(self._index, int)
             return self.simulation.observe_run(self._index)
         return self.simulation.observe()
 
     def take_snapshot(self) -> Snapshot:
-        """Return the present step, without forces."""
+        """Return a snapshot of the current state, with zero forces."""
         if isinstance(self.simulation, Simulation):
             return self.simulation.observe_and_decide()
         return Snapshot(self.observe(), Decision(np.zeros_like(self.positions)))
 
     def build_state(self) -> Rows:
-        """Return positions and velocities of all robots, (4 n,) from -1 to 1.
+        """Return the normalized positions and velocities of all robots, (4 n,) from -1 to 1.
 
-        Positions are from the center of the region, relative to its diagonal, velocities relative to the
-        maximum speed.
+        Each robot has four values: its position from the center of the region's bounding box, divided by the
+        diagonal, and its velocity, divided by its maximum speed.
         """
         positions = normalize_positions(self.positions, self.environment.region)
         velocities = self.simulation.velocities[self._index] / self.team.max_speed[:, None]
@@ -278,7 +280,7 @@ class Episode:
         return rows.ravel()
 
     def summarize(self) -> dict[str, float]:
-        """Return time, mean distance and uncovered area for the info of an environment."""
+        """Return time, mean distance and uncovered area for the info dictionary of an environment."""
         return {
             "time_s": self.time,
             "mean_distance_m": self.result.mean_distance,
@@ -286,13 +288,13 @@ class Episode:
         }
 
     def advance(self, actions: Array, *, is_last: bool = False) -> ActionOutcome:
-        """Hold actions for one decision.
+        """Execute one action of each robot, held for one action period.
 
         Parameters
         ----------
         actions : (n, 2) array, N or m/s
         is_last : bool
-            Reward the action in any case, because it is the last.
+            Whether this is the last action of the episode, which is always rewarded.
         """
         snapshots = self._snapshots if self.task.recording else None
         checked = check_actions(actions, len(self.team))
@@ -309,15 +311,16 @@ class Episode:
     def finish_action(
         self, contact_time: Array, is_rewarded: bool, result: CoverageResult | None = None
     ) -> ActionOutcome:
-        """Finish an action that has been held, and compute its rewards.
+        """Record the positions after an action, and compute its rewards.
 
         Parameters
         ----------
         contact_time : (n,) array, s
+            Time in contact during the action.
         is_rewarded : bool
-            Whether the cost is evaluated.
+            Whether the cost is evaluated and its change rewarded.
         result : CoverageResult, optional
-            The present cost, if it is known.
+            The current cost, if it has been computed already.
         """
         self.trail.append(self.positions)
         shares = self._share_cost_change(is_rewarded, result) / self.reference
@@ -325,15 +328,17 @@ class Episode:
         return ActionOutcome(np.asarray(shares - penalties), contact_time)
 
     def _share_cost_change(self, is_rewarded: bool, result: CoverageResult | None) -> Array:
-        """Update the cost, and return the share of each robot in its change, (n,) m.
+        """Evaluate the cost, and split its change since the last reward among the robots, (n,) m.
 
-        A failure is not the result of any action. If robots fail or join, only those that were available all
-        the time share the change of their own cost.
+        Robots must not be rewarded or punished because others join or fail. If that happens, the cost is
+        evaluated as soon as it does, and the change is computed for only those robots that were available
+        before and after. The other robots get 0.
         """
         shares = np.zeros(len(self.team))
         time = self.time
         positions = self.trail[-1]
         previous_positions = self.trail[self._rewarded_cycle]
+        # Robots that were available both at the last reward and now.
         remaining = self._available
         has_changed = False
         if not self._always_counts_all:
@@ -352,6 +357,7 @@ class Episode:
         if not remaining.any():
             return shares
         if has_changed:
+            # Both costs are computed again for the same robots, so that they can be compared.
             previous_time = time - cycles * self.task.period
             before = self._cost_over_time.get_cost(previous_time)(previous_positions[remaining])
             after = self._cost_over_time.get_cost(time)(positions[remaining])
@@ -360,12 +366,12 @@ class Episode:
         return shares
 
     def record(self) -> Record:
-        """Return the episode so far as a record, without forces at its end.
+        """Build a record of the episode so far; the forces of its last step are zero.
 
         Raises
         ------
         ParameterError
-            If the task has no `recording`.
+            If the task does not have ``recording=True``.
         """
         if not self.task.recording or isinstance(self.simulation, SimulationBatch):
             raise ParameterError("record: expected a task with recording=True")

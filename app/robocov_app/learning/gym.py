@@ -1,8 +1,8 @@
-"""One learner for the whole team: an environment of gymnasium, registered as ``robocov/Coverage-v0``.
+"""Environments for gymnasium, with one learner for the whole team, registered as ``robocov/Coverage-v0``.
 
-Importing this module registers it; ``gymnasium.make("robocov_app.learning.gym:robocov/Coverage-v0")`` does
-both, because gymnasium no longer supports entry points of packages. ``gymnasium.make_vec`` makes a
-`CoverageVectorEnv` with ``vectorization_mode="vector_entry_point"``.
+Importing this module registers the environment. ``gymnasium.make`` does both if the name contains the module,
+``"robocov_app.learning.gym:robocov/Coverage-v0"``; gymnasium no longer supports entry points of packages.
+``gymnasium.make_vec`` builds a `CoverageVectorEnv` with ``vectorization_mode="vector_entry_point"``.
 """
 
 from functools import partial
@@ -27,28 +27,28 @@ ID = "robocov/Coverage-v0"
 
 
 class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A team that one learner drives with the knowledge of all robots: gymnasium's ``Env``.
+    """Environment in which one learner with the knowledge of all robots drives the team: gymnasium's ``Env``.
 
-    Observations are the robots' rows of the task's `ObservationLayout`, (n, size) float32 from -1 to 1, zero
-    for a robot that has failed or not yet joined. Actions have one row for each robot, (n, 2), forces in N or
-    velocities in m/s, held for `CoverageTask.repeat` control periods. The reward is the mean of the robots'
-    rewards in `CoverageParallelEnv`.
+    An observation has one row for each robot, (n, size) float32 from -1 to 1, in the task's
+    `ObservationLayout`. The row of a robot that has failed or not yet joined is zero. An action has one row
+    for each robot, (n, 2), with a force in N or a velocity in m/s that is held for `CoverageTask.repeat`
+    control periods. The reward is the mean of the robots' rewards in `CoverageParallelEnv`.
 
-    An episode is truncated after `CoverageTask.duration`, and ends when no robot works. The same seed and
-    actions give the same episode, bit for bit.
+    An episode is truncated after `CoverageTask.duration`, and terminates when no robot works. The same seed
+    and actions give the same episode, bit for bit.
 
     Parameters
     ----------
     task : CoverageTask, optional
-        By default the task with all defaults.
+        By default, a task with default values.
     **options
-        Options of `robocov_app.learning.environment.EpisodeEnv`, with attributes of the task that differ, as
-        in ``gymnasium.make(..., maps="museum", robots=4)``.
+        Options of `robocov_app.learning.environment.EpisodeEnv`, and attributes of the task to change, as in
+        ``gymnasium.make(..., maps="museum", robots=4)``.
 
     Attributes
     ----------
     shared_run : SharedRun or None
-        A simulation that is shared with other environments.
+        Place of this environment in a simulation that is shared with others.
     next_outcome : ActionOutcome or None
         Outcome of the next action, if the shared simulation has already executed it.
 
@@ -99,9 +99,9 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         Parameters
         ----------
         seed : int, optional
-            Without a seed, the sequence of random numbers continues.
+            Seed of the random numbers. Without a seed, their sequence continues.
         options : dict, optional
-            As in `robocov_app.learning.environment.draw_episode`.
+            Values to use instead of random ones; see `robocov_app.learning.environment.draw_episode`.
 
         Returns
         -------
@@ -156,24 +156,24 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
 
 
 class CoverageVectorEnv(SyncVectorEnv):
-    """Many environments `CoverageEnv` in one process, several times as fast: gymnasium's ``VectorEnv``.
+    """Many `CoverageEnv` environments in one process, several times as fast: gymnasium's ``VectorEnv``.
 
-    Each environment behaves exactly as it would alone, bit for bit: with ``reset(seed=s)`` environment k as
-    with the seed s + k. Environments on one map without conditions and moving obstacles are advanced
-    together, others one by one.
+    Each environment behaves exactly as it would alone, bit for bit: after ``reset(seed=s)``, environment k
+    behaves as one with the seed s + k. The environments are advanced together if they are all on the same
+    map, without conditions or moving obstacles, and otherwise one by one.
 
     Parameters
     ----------
     num_envs : int
         Number of environments.
     task : CoverageTask, optional
-        By default the task with all defaults.
+        By default, a task with default values.
     autoreset_mode : str or gymnasium.vector.AutoresetMode
         When the next episode starts after one has ended.
     render_mode : str, optional
         Render mode of each environment.
     **changes
-        Attributes of the task that differ.
+        Attributes of the task to change.
 
     Raises
     ------
@@ -216,7 +216,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         self._shared = self._share_simulation(sampler)
 
     def _share_simulation(self, sampler: MapSampler) -> SharedSimulation | None:
-        """Let all environments share a simulation, if the task allows it."""
+        """Let all environments share one simulation if the task allows it; return it, or None."""
         only_map = sampler.only_map
         is_ideal = self.task.conditions is None or self.task.conditions.is_ideal
         if only_map is None or only_map.has_moving_obstacles or not is_ideal or self.task.recording:
@@ -227,7 +227,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         return simulation
 
     def step(self, actions: Any) -> Any:
-        """Execute the actions of all teams, and return the results as gymnasium does.
+        """Execute the actions of all teams, with results in the format of gymnasium.
 
         Parameters
         ----------
@@ -244,8 +244,9 @@ class CoverageVectorEnv(SyncVectorEnv):
         Raises
         ------
         ParameterError
-            If the actions of an environment have another shape, or are not finite.
+            If the actions of an environment have the wrong shape, or are not finite.
         """
+        # These environments ignore their actions, because the step only resets them.
         is_restarted = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         checked = np.zeros((self.num_envs, self.task.robots, 2))
         shared_episodes = {}
@@ -258,6 +259,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         if self._shared is not None and shared_episodes:
             for run, outcome in self._shared.advance(checked, shared_episodes).items():
                 self._environments[run].next_outcome = outcome
+        # Each environment returns the outcome that was stored above, or advances by itself.
         return super().step(checked)
 
 

@@ -1,4 +1,4 @@
-"""Training maps: given ones, and generated ones that are drawn for each episode."""
+"""Maps for training: given maps, or maps that are generated for each episode."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,23 +13,23 @@ from robocov.errors import ParameterError, quote
 from robocov.mapfile import load_map
 
 MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
-"""A map, its name or path, or a function that builds one from a seed."""
+"""A map, its name or path, or a function that builds a map from a seed."""
 SEED_LIMIT = 2**31
-"""Upper bound of the seeds that are drawn, exclusive."""
+"""Exclusive upper bound of random seeds."""
 _MAX_STORED_COSTS = 64
 
 
 @dataclass(frozen=True)
 class GeneratedMaps:
-    """Function that generates a map from a seed, to learn on many.
+    """Function that generates a map from a seed, for training on many maps.
 
     Parameters
     ----------
     kind : str
         Kind of the maps, as in `robocov.generate_map`.
     seeds : sequence of int, optional
-        Seeds of the maps, for example ``range(1000)``. Others can then be used for testing. Without them, any
-        seed is used.
+        Allowed seeds, for example ``range(1000)``, so that maps with other seeds can be used for testing. By
+        default, all seeds are allowed.
     parameters : Mapping
         Further parameters of `robocov.generate_map`: ``obstacles``, ``area``, ``gap``, ...
 
@@ -41,7 +41,7 @@ class GeneratedMaps:
     See Also
     --------
     robocov.generate_map : Generate one map.
-    CoverageTask : Its `maps` may be such a function.
+    CoverageTask : Accepts such a function as `maps`.
 
     Examples
     --------
@@ -59,12 +59,12 @@ class GeneratedMaps:
             raise ParameterError("maps: seeds: expected at least one, got none")
 
     def __call__(self, seed: int) -> Environment:
-        """Generate the map of a seed, or of ``seeds[seed % len(seeds)]`` if there are any `seeds`.
+        """Generate the map of a seed; if `seeds` is given, that of ``seeds[seed % len(seeds)]``.
 
         Raises
         ------
         ParameterError
-            As `robocov.generate_map`.
+            If `robocov.generate_map` raises it.
         """
         from robocov.generator import generate_map
 
@@ -73,19 +73,19 @@ class GeneratedMaps:
 
 
 class MapSampler:
-    """Draws maps, and stores the coverage costs of the latest ones.
+    """Draws random maps, and caches the coverage costs of the most recent ones.
 
     Parameters
     ----------
     maps : MapSource or sequence of MapSource
-        Sources, which are equally likely.
+        Sources of maps, all equally likely.
     lattice : int
-        Sites along a side of the lattice of the costs.
+        Number of sites along each side of the lattice of the costs.
 
     Raises
     ------
     ParameterError
-        If there is no source, or one of an invalid type.
+        If there is no source, or a source has an invalid type.
     InputError
         If a map cannot be read.
     """
@@ -102,21 +102,21 @@ class MapSampler:
 
     @property
     def only_map(self) -> Environment | None:
-        """The map, if there is a single one."""
+        """The map if all episodes are on the same one; otherwise None."""
         source = self._sources[0]
         if len(self._sources) == 1 and isinstance(source, Environment):
             return source
         return None
 
     def draw(self, rng: np.random.Generator) -> Environment:
-        """Draw a map."""
+        """Draw a source at random, and return or generate its map."""
         source = self._sources[int(rng.integers(len(self._sources)))]
         return build_map(source, int(rng.integers(SEED_LIMIT)))
 
     def get_cost(self, environment: Environment) -> CoverageCost:
-        """Return the coverage cost of a map, a stored one if possible."""
+        """Return the coverage cost of a map, from the cache if possible."""
         cost = self._costs.pop(environment, None) or CoverageCost(environment, self._lattice)
-        # The dictionary is in the order of use, so that the first is the one that was used least recently.
+        # The dictionary is in order of use, so the first entry is the least recently used one.
         self._costs[environment] = cost
         if len(self._costs) > _MAX_STORED_COSTS:
             del self._costs[next(iter(self._costs))]
@@ -124,12 +124,12 @@ class MapSampler:
 
 
 def build_map(source: object, seed: int) -> Environment:
-    """Return a map: itself, the one of a name or path, or the one that a function builds from the seed.
+    """Return a map from its source: a map, its name or path, or a function that builds it from the seed.
 
     Raises
     ------
     ParameterError
-        If the source is of an invalid type, or the function returns something else.
+        If the source has an invalid type, or the function does not return a map.
     InputError
         If the map cannot be read.
     """
@@ -141,7 +141,7 @@ def build_map(source: object, seed: int) -> Environment:
 
 
 def _resolve_source(source: object, name: str) -> Environment | Callable[[int], Environment]:
-    """Return a source after loading the map of a name or path."""
+    """Return the source itself if it is a map or a function; load the map if it is a name or path."""
     if isinstance(source, (str, Path)):
         return load_map(source)
     if isinstance(source, Environment) or callable(source):

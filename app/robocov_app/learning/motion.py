@@ -1,4 +1,4 @@
-"""Driving robots by actions, and measuring their contacts."""
+"""Execution of actions in a simulation, with measurement of the time in contact."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from robocov_app.learning.actions import compute_driving_forces
 from robocov_app.learning.task import CoverageTask
 
 _REACH_MARGIN = 1.001
-"""Factor of the radius in which pairs in contact are searched for."""
+"""Factor by which the search radius for contacts is enlarged, as a margin for rounding errors."""
 
 
 def hold_actions(
@@ -22,7 +22,7 @@ def hold_actions(
     actions: Array,
     snapshots: list[Snapshot] | None = None,
 ) -> Array:
-    """Hold actions for the time of one decision.
+    """Advance a simulation by one action period while its robots execute the same actions.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ def hold_actions(
     simulation : Simulation or SimulationBatch
     actions : (n, 2) or (runs, n, 2) array, N or m/s
     snapshots : list of Snapshot, optional
-        The snapshots of the steps of a single simulation are appended.
+        List to which a snapshot of each step is appended; only for a single simulation.
 
     Returns
     -------
     (n,) or (runs, n) array, s
-        Time in contact.
+        Time in contact with a wall or another robot.
     """
     contact_time = np.zeros(actions.shape[:-1])
     for _ in range(task.repeat):
@@ -58,12 +58,13 @@ def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
     nearest = simulation.sensor.find_nearest_points(positions, radius + MAX_CONTACT_GAP_M)
     has_contact = working & ~np.isnan(nearest[:, 0])
     reach = 2.0 * float(radius.max()) + MAX_CONTACT_GAP_M
-    # Robots of different runs are moved far apart, so that only pairs of one run are close.
+    # Each run is shifted far away from the others, so that only robots of the same run are close.
     run = np.arange(len(positions)) // robots
     separated = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
     first, second, _ = find_close_pairs(separated, _REACH_MARGIN * reach)
     if len(first) > 0:
         x, y = (positions[first] - positions[second]).T
+        # Both robots of a pair have contact, because each pair is listed in both orders.
         is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + MAX_CONTACT_GAP_M
         has_contact[first[is_contact & working[first] & working[second]]] = True
     return has_contact.reshape(shape)

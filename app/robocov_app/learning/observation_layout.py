@@ -1,4 +1,4 @@
-"""Layout of observations as rows of numbers."""
+"""Layout of observations as rows of numbers for learners."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,19 +21,19 @@ Rows: TypeAlias = NDArray[np.float32]
 MAX_NEIGHBORS = 1000
 """Maximum number of neighbors in a row."""
 _MAX_NEIGHBOR_DIAMETERS = 4.0
-"""Distance up to which neighbors are searched for, in diameters of the map."""
+"""Search radius for neighbors, in diameters of the map."""
 _MIN_SENSING_RANGE_M = 1e-9
 _FIXED_SIZE = 7
-"""Numbers of a row without neighbors, rays and centroid."""
+"""Length of a row without neighbors, rays and centroid."""
 
 
 @dataclass(frozen=True)
 class ObservationLayout:
     """Layout of an observation: its numbers and their order.
 
-    Row i contains only what robot i knows (see `robocov.observation`). All numbers are from -1 to 1. The unit
-    of ``D`` is the diagonal of the known region's bounding box, that of ``S`` the robot's sensing range, or
-    ``D`` if that is shorter.
+    Row i contains only what robot i knows (see `robocov.observation`). All numbers are between -1 and 1. The
+    table gives the units of lengths: ``D`` is the diagonal of the known region's bounding box, and ``S`` is
+    the robot's sensing range or ``D``, whichever is shorter.
 
     =============  ==================  =====================================================================
     block          numbers             content
@@ -47,13 +47,13 @@ class ObservationLayout:
     ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
     =============  ==================  =====================================================================
 
-    Each ray costs a query of the physics. The centroid is the only number that a robot has to compute from
-    the others: Lloyd's algorithm moves towards it.
+    Each ray takes one query of the physics engine. The centroid, towards which Lloyd's algorithm moves, is
+    the only block that a robot has to compute from its other knowledge.
 
     Parameters
     ----------
     neighbors : int
-        Number of the nearest robots.
+        Number of neighbors, the nearest ones.
     rays : int
         Number of rays of the range sensor; 0 for none.
     centroid : bool
@@ -88,7 +88,7 @@ class ObservationLayout:
 
     @cached_property
     def blocks(self) -> dict[str, slice]:
-        """Slices of the blocks of a row in their order, only of those that it has."""
+        """Slice of each block in a row, in order; blocks without numbers are left out."""
         sizes = {
             "position": 2,
             "velocity": 2,
@@ -111,22 +111,22 @@ class ObservationLayout:
 
     @property
     def bounds(self) -> tuple[Rows, Rows]:
-        """Lowest and highest values of a row, (size,) each."""
+        """Lowest and highest possible values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
         first_ray = _FIXED_SIZE + 3 * self.neighbors
-        low[_FIXED_SIZE - 1 : first_ray : 3] = 0.0  # Whether there is a point or neighbor.
+        low[_FIXED_SIZE - 1 : first_ray : 3] = 0.0  # Flags of the obstacle and of each neighbor.
         low[first_ray : first_ray + self.rays] = 0.0
         return low, np.ones(self.size, dtype=np.float32)
 
     def build_rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
-        """Build the observations of all robots.
+        """Build the observation rows of all robots.
 
         Parameters
         ----------
         seen : Observations
         team : Team
         scans : Scans, optional
-            The latest scans, by default those of `seen`.
+            Latest scans; by default, those of `seen`.
 
         Returns
         -------
@@ -135,7 +135,7 @@ class ObservationLayout:
         Raises
         ------
         ParameterError
-            If the layout has rays, and there is no scan with the same number of rays.
+            If the layout has rays, but there is no scan with the same number of rays.
         """
         n = len(seen.positions)
         unit = seen.region.diameter
@@ -156,18 +156,18 @@ class ObservationLayout:
         if self.centroid:
             centroid = compute_known_cells(seen, "distance", None).centroid
             rows[:, blocks["centroid"]] = (centroid - seen.positions) / unit
-        # Believed positions may be outside the region.
+        # With localization errors, believed positions may be outside the region.
         return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
 
     def _find_neighbors(self, seen: Observations) -> Array:
-        """Return offset and presence of the nearest neighbors, (n, neighbors, 3)."""
+        """Return the offset of each of the nearest neighbors, and 1 if there is one, (n, neighbors, 3)."""
         n = len(seen.positions)
         unit = seen.region.diameter
         # Noisy positions may be farther apart than the diameter, but not by much.
         robot, _, offset, distance = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
         nearest = np.zeros((n, self.neighbors, 3))
         distances = np.full((n, self.neighbors), np.inf)
-        # These offsets point from the neighbor to the robot, those of the layout in the opposite direction.
+        # `offset` points from the neighbor to the robot; the layout needs the opposite direction.
         _insert_nearest(robot, -offset / unit, distance, distances, nearest)
         return nearest
 
@@ -179,7 +179,7 @@ class ObservationLayout:
 
 
 def normalize_positions(positions: Array, region: Region) -> Array:
-    """Return positions from the center of a region's bounding box, relative to its diagonal, (n, 2)."""
+    """Return positions from the center of a region's bounding box, in units of its diagonal, (n, 2)."""
     min_x, min_y, max_x, max_y = region.bounds
     center = np.array([(min_x + max_x) / 2.0, (min_y + max_y) / 2.0])
     return np.asarray((positions - center) / region.diameter)
@@ -189,27 +189,29 @@ def normalize_positions(positions: Array, region: Region) -> Array:
 def _insert_nearest(
     robot: IntArray, offset: Array, distance: Array, distances: Array, nearest: Array
 ) -> None:
-    """Insert pairs of robots into lists of the nearest neighbors, which stay sorted.
+    """Insert pairs of robots into the lists of nearest neighbors, which stay sorted by distance.
 
     Parameters
     ----------
     robot : (k,) array of int
         Robot of each pair.
     offset : (k, 2) array
-        Offset of its neighbor.
+        Offset of the neighbor in each pair.
     distance : (k,) array
+        Distance of the neighbor in each pair.
     distances : (n, count) array
-        Distances of the nearest neighbors, modified.
+        Distances of the nearest neighbors of each robot, modified in place.
     nearest : (n, count, 3) array
-        Their offsets and presence, modified.
+        Offset of each of these neighbors, and 1 if there is one, modified in place.
     """
     count = distances.shape[1]
     for k in range(len(robot)):
         i = robot[k]
         place = count
-        # Neighbors at equal distances stay in the order of their numbers.
+        # Neighbors at equal distances stay in the order of the pairs.
         while place > 0 and distance[k] < distances[i, place - 1]:
             place -= 1
+        # Farther neighbors move back by one place, and the last one is dropped.
         for later in range(count - 1, place, -1):
             distances[i, later] = distances[i, later - 1]
             for c in range(3):

@@ -1,4 +1,4 @@
-"""One learner for each robot: a parallel environment of PettingZoo."""
+"""Environment with one learner for each robot: a PettingZoo parallel environment."""
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -19,13 +19,13 @@ from robocov_app.learning.task import CoverageTask
 
 _Value = TypeVar("_Value")
 Flags: TypeAlias = dict[str, bool]
-"""A flag for each agent."""
+"""One flag for each agent."""
 Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
 """Observations, rewards, terminations, truncations and infos by agent."""
 
 
 class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
-    """A team of learners, each with the knowledge of one robot: PettingZoo's ``ParallelEnv``.
+    """Environment with one learner for each robot, with its knowledge only: PettingZoo's ``ParallelEnv``.
 
     The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's `ObservationLayout`:
     float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
@@ -35,12 +35,12 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     Parameters
     ----------
     task : CoverageTask, optional
-        By default the task with all defaults.
+        By default, a task with default values.
     max_cycles : int, optional
-        Maximum number of actions, by default as many as fit into the duration.
+        Maximum number of actions; by default, as many as fit into the duration.
     **options
-        Options of `robocov_app.learning.environment.EpisodeEnv`, with attributes of the task that differ, as
-        in ``CoverageParallelEnv(maps="museum", robots=4)``.
+        Options of `robocov_app.learning.environment.EpisodeEnv`, and attributes of the task to change, as in
+        ``CoverageParallelEnv(maps="museum", robots=4)``.
 
     Raises
     ------
@@ -91,12 +91,12 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self.state_space = Box(-1.0, 1.0, (4 * self.task.robots,), np.float32)
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a robot's observations, the same object every time.
+        """Return the space of a robot's observations, always the same object.
 
         Parameters
         ----------
         agent : str
-            Such as ``robot_1``.
+            Name of the robot, such as ``robot_1``.
 
         Returns
         -------
@@ -105,17 +105,17 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Box:
-        """Return the space of a robot's actions, the same object every time.
+        """Return the space of a robot's actions, always the same object.
 
         Parameters
         ----------
         agent : str
-            Such as ``robot_1``.
+            Name of the robot, such as ``robot_1``.
 
         Returns
         -------
         Box
-            In N or m/s, up to the largest useful action.
+            Forces in N or velocities in m/s, up to the largest useful ones.
         """
         return self.action_spaces[agent]
 
@@ -127,9 +127,9 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         Parameters
         ----------
         seed : int, optional
-            Without a seed, the sequence of random numbers continues.
+            Seed of the random numbers. Without a seed, their sequence continues.
         options : Mapping, optional
-            As in `robocov_app.learning.environment.draw_episode`.
+            Values to use instead of random ones; see `robocov_app.learning.environment.draw_episode`.
 
         Returns
         -------
@@ -156,7 +156,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         Returns
         -------
         observations, rewards, terminations, truncations, infos : dict
-            By agent, of all robots that worked before or work after the actions.
+            Results by agent, for each robot that worked before or works after the actions.
         """
         episode = self._get_episode()
         checked = self._check_actions(actions)
@@ -165,7 +165,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         outcome = episode.advance(checked, is_last=is_over)
         self.agents = list(compress(self.possible_agents, episode.working))
         reported = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
-        # A robot that has failed does not work again: its episode has ended.
+        # A robot that has failed never works again, so its episode has terminated.
         terminations = {agent: agent not in self.agents for agent in reported}
         truncations = {agent: is_over and not terminations[agent] for agent in reported}
         observations = self._select(reported, episode.build_rows())
@@ -179,7 +179,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         return observations, rewards, terminations, truncations, infos
 
     def _check_actions(self, actions: Mapping[str, Any]) -> Array:
-        """Return the actions of all robots, (n, 2), zero for those that do not act."""
+        """Check the actions, and return them as an array, (n, 2), with zeros for robots that do not work."""
         checked = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):
             if agent not in self.agents:
@@ -197,10 +197,10 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         return checked
 
     def state(self) -> Rows:
-        """Return positions and velocities of all robots, for critics: see `Episode.build_state`."""
+        """Return positions and velocities of all robots, for a central critic; see `Episode.build_state`."""
         return self._get_episode().build_state()
 
     def _select(self, agents: list[str], values: Iterable[_Value]) -> dict[str, _Value]:
-        """Return the values of some agents from those of all robots."""
+        """Return the values of some agents by name, given one value for each robot."""
         by_agent = dict(zip(self.possible_agents, values, strict=True))
         return {agent: by_agent[agent] for agent in agents}

@@ -21,22 +21,22 @@ from robocov_app.learning.observation_layout import ObservationLayout
 from robocov_app.learning.task import check_kind
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
-"""Returns the action of a robot, (2,), for its observation, (size,)."""
+"""Function that takes the observation of a robot, (size,), and returns its action, (2,)."""
 _TIME_TOLERANCE_S = 5e-7
-"""Tolerance for sums of control periods."""
+"""Tolerance for rounding errors in sums of control periods."""
 
 
 @dataclass(frozen=True, eq=False)
 class PolicyMemory:
-    """Memory of a policy.
+    """Memory of a `PolicyController` between control steps.
 
     Parameters
     ----------
     team : Team
     actions : (n, 2) array, N or m/s, optional
-        The last actions; None before the first ones.
+        Current actions; None before the first decision.
     next_time : float
-        Time of the next decision, s.
+        Time at which the next actions are decided, s.
     """
 
     team: Team
@@ -46,23 +46,23 @@ class PolicyMemory:
 
 @dataclass(frozen=True)
 class PolicyController:
-    """A controller that executes a policy, with the decisions and observations of the training.
+    """A controller that executes a policy, with the same observations and action period as in training.
 
-    The policy is called for each robot alone, with its own row of the observations, so that it cannot use
+    The policy is called separately for each robot, with the observation of that robot, so that it cannot use
     the knowledge of other robots. To use a policy on the command line, write a subclass with a method `act`
     in a file, and run ``robocov run rooms --controller mine.py:MyPolicy``.
 
     Parameters
     ----------
     policy : callable, optional
-        Returns an action, (2,) in N or m/s, for an observation, (size,) float32. A subclass with a method
-        `act` needs none.
+        Takes an observation, (size,) float32, and returns an action, (2,) in N or m/s. Not needed by a
+        subclass with a method `act`.
     layout : ObservationLayout
         Layout of the observations in training.
     action : str
         Kind of the actions.
     period : float
-        Time for which an action is held, s, as `CoverageTask.period` in training.
+        Time for which an action is held, s. Should be the `CoverageTask.period` of the training.
 
     Raises
     ------
@@ -71,8 +71,8 @@ class PolicyController:
 
     See Also
     --------
-    ControllerPolicy : The reverse: a controller acts in a learning environment.
-    CoverageTask : The task of the training, with the same layout, action and period.
+    ControllerPolicy : The opposite: lets a controller act in a learning environment.
+    CoverageTask : The training task, which has the same layout, action and period.
 
     Examples
     --------
@@ -82,7 +82,7 @@ class PolicyController:
     >>> still.name, still.period
     ('policy', 0.1)
 
-    A policy in a class, which returns to the middle of the map:
+    A policy as a subclass, whose robots return to the middle of the map:
 
     >>> import robocov as rc
     >>> @dataclass(frozen=True)
@@ -120,12 +120,12 @@ class PolicyController:
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
     def act(self, observation: NDArray[np.float32]) -> Any:
-        """Return the action of one robot, (2,), for its observation, (size,).
+        """Return the action of one robot for its observation.
 
         Parameters
         ----------
         observation : (size,) float32 array
-            The robot's own row of the observations; see `ObservationLayout`.
+            Observation of the robot; see `ObservationLayout`.
 
         Returns
         -------
@@ -134,7 +134,7 @@ class PolicyController:
         Raises
         ------
         ParameterError
-            If there is no policy, and no subclass has this method.
+            If there is no policy, and the subclass does not define this method.
         """
         if self.policy is None:
             raise ParameterError(f"{self.name}: expected a policy or a method act(observation)")
@@ -155,7 +155,7 @@ class PolicyController:
         return PolicyMemory(team)
 
     def decide(self, seen: Observations, memory: PolicyMemory) -> Decision:
-        """Return the forces of the actions, which are decided again in each period.
+        """Compute the forces of the current actions; ask the policy for new actions once per period.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class PolicyController:
         return Decision(forces, memory=memory)
 
     def _is_due(self, seen: Observations, memory: PolicyMemory) -> bool:
-        """Return whether new actions are due: with rays, when there are new scans."""
+        """Return whether new actions are due: with each new scan or, without rays, after each period."""
         if self.layout.rays:
             return seen.scans is not None
         return seen.time >= memory.next_time - _TIME_TOLERANCE_S
@@ -189,19 +189,19 @@ class PolicyController:
 
 
 class ControllerPolicy:
-    """A policy that returns the actions of a controller in the present state of a learning environment.
+    """A policy that returns the actions of a controller in the current state of a learning environment.
 
-    It has the knowledge of the controller, not the observations of learners. With ``repeat=1`` an episode
-    is the same as a run, bit for bit. Its scans are without the noise of any conditions.
+    The controller receives its usual observations, not those of learners. With ``repeat=1``, an episode is
+    the same as a run with this controller, bit for bit. Scans have no noise, even if the conditions do.
 
     Parameters
     ----------
     controller : Controller
-        Decides instead of a policy.
+        Controller that decides about the actions.
 
     See Also
     --------
-    PolicyController : The reverse: a policy as a controller.
+    PolicyController : The opposite: turns a policy into a controller.
 
     Examples
     --------
@@ -228,18 +228,18 @@ class ControllerPolicy:
     def __call__(self, env: Any) -> Any:
         """Return the actions of the team.
 
-        The controller starts without memory in each episode. Several calls at the same time return the same
-        actions.
+        The memory of the controller is reset in each episode. Repeated calls between two steps of the
+        environment return the same actions.
 
         Parameters
         ----------
         env : CoverageParallelEnv or CoverageEnv
-            It may be wrapped.
+            The environment, which may have wrappers.
 
         Returns
         -------
         dict or (n, 2) array, N or m/s
-            Actions by agent for a parallel environment, an array for others.
+            Actions by agent for a parallel environment; otherwise an array.
         """
         bare = env.unwrapped
         actions = self._update_actions(bare.episode).copy()
@@ -249,6 +249,7 @@ class ControllerPolicy:
         return {agent: by_agent[agent] for agent in bare.agents}
 
     def _update_actions(self, episode: Episode) -> Array:
+        """Return the actions of the current decision; ask the controller if it has not decided yet."""
         if self._episode is not episode:
             self._start(episode)
         if self._decision_cycle != episode.cycle:
@@ -269,8 +270,11 @@ class ControllerPolicy:
         self._memory = self._informed.begin(episode.environment.region, episode.team)
 
     def _scan(self, episode: Episode) -> Scans | None:
-        """Return a scan if the controller needs one, as often as in a run or at each decision."""
-        # Controllers in files of users may have no such attribute.
+        """Return new scans if they are due; otherwise None.
+
+        They are due as often as in a run, but at most once per decision.
+        """
+        # Controllers in a user's file may lack this attribute.
         scanning: Scanning | None = getattr(self._informed, "scanning", None)
         if scanning is None:
             return None

@@ -1,4 +1,4 @@
-"""Rewards: how a change of the coverage cost is shared among robots."""
+"""Rewards: how a change in the coverage cost is shared among the robots."""
 
 from typing import Literal, TypeAlias, get_args
 
@@ -8,14 +8,14 @@ from robocov.arrays import Array
 from robocov.cost import CoverageResult
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
-"""Scheme by which a reward is shared among robots; see `share_reward`."""
+"""Scheme by which a reward is shared among the robots; see `share_reward`."""
 REWARDS: tuple[Reward, ...] = get_args(Reward)
 
 
 def compute_reference_distance(area: float, robots: int) -> float:
-    """Compute a lower bound of the mean distance of any placement.
+    """Compute a lower bound of the mean distance for a given area and number of robots.
 
-    It makes the costs of maps and teams of different sizes comparable.
+    Divided by this bound, the costs of maps and teams of different sizes are comparable.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def compute_reference_distance(area: float, robots: int) -> float:
     Returns
     -------
     float
-        m
+        Lower bound, m.
 
     Notes
     -----
-    The mean distance to the center of a disc, 2/3 of its radius, is the lowest among all shapes of its area.
-    With n equal parts of the area A it is ``2/3 sqrt(A / (π n))``.
+    Among all shapes of equal area, a disc has the smallest mean distance to its center: 2/3 of its radius.
+    For n discs that together have the area A, that is ``2/3 sqrt(A / (π n))``.
 
     Examples
     --------
@@ -44,18 +44,18 @@ def compute_reference_distance(area: float, robots: int) -> float:
 def share_reward(
     reward: Reward, before: CoverageResult, after: CoverageResult, elapsed_fraction: float
 ) -> Array:
-    """Share the change of the mean distance among robots.
+    """Compute the reward of each robot for a change in the mean distance.
 
     Parameters
     ----------
     reward : str
-        "shared": each robot gets the decrease, whose sum over a run is the whole decrease. "own": each robot
-        gets the part that its own motion caused, and an equal share of the rest. "level": each robot gets
-        the negative mean distance times `elapsed_fraction`.
+        "shared": each robot gets the whole decrease of the mean distance. "own": each robot gets the decrease
+        that its own motion caused, and an equal share of the rest. "level": each robot gets the negative mean
+        distance times `elapsed_fraction`.
     before, after : CoverageResult
-        Costs of n robots.
+        Costs of the same n robots at the last reward and now.
     elapsed_fraction : float
-        Time between both, relative to the duration of the episode.
+        Time between the two costs, relative to the duration of the episode.
 
     Returns
     -------
@@ -63,7 +63,8 @@ def share_reward(
 
     Notes
     -----
-    The part of a robot's own motion follows from the gradients before and after it by the trapezoidal rule.
+    The decrease that a robot's own motion caused is the negative scalar product of its displacement and the
+    gradient of the mean distance, which is averaged over both costs (trapezoidal rule).
     """
     n = len(after.positions)
     if reward == "level":
@@ -74,6 +75,7 @@ def share_reward(
     gradient_sum = np.zeros_like(after.positions)
     for result in (before, after):
         if result.value:
+            # The gradient belongs to the cost `value`; the factor converts it to one of the mean distance.
             gradient_sum += result.gradient * (result.mean_distance / result.value)
     own = -0.5 * (gradient_sum * (after.positions - before.positions)).sum(axis=1)
     return np.asarray(own + (decrease - own.sum()) / n)

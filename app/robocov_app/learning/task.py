@@ -1,4 +1,4 @@
-"""The task that is to be learned: maps, team, time, observations, actions and reward."""
+"""The task to learn: maps, team, duration, observations, actions and reward."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -26,16 +26,16 @@ from robocov_app.learning.rewards import REWARDS, Reward
 MAX_ROBOTS = 10_000
 _MAX_REPEAT = 100_000
 _TIME_TOLERANCE_S = 5e-7
-"""Tolerance for sums of control periods."""
+"""Tolerance for rounding errors in sums of control periods."""
 
 
 def check_kind(name: str, kind: str, known: Sequence[str]) -> None:
-    """Check the kind of an action or reward.
+    """Check the name of a kind of action or reward.
 
     Raises
     ------
     ParameterError
-        If it is unknown.
+        If the kind is unknown.
     """
     if kind not in known:
         raise ParameterError(f"{name}: {describe_unknown_name(f'kind of {name}', str(kind), known)}")
@@ -43,19 +43,19 @@ def check_kind(name: str, kind: str, known: Sequence[str]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class CoverageTask:
-    """Everything that defines a learning environment, for one learner or many. All values are in SI units.
+    """Everything that defines a learning environment, for one learner or many, in SI units.
 
     Parameters
     ----------
     maps : MapSource or sequence of MapSource
-        A map is drawn for each episode, all with the same probability. A function, for example
+        Sources of maps. One is drawn for each episode, all with equal probability. A function, for example
         `GeneratedMaps`, is called with a new seed each time.
     start : str, optional
-        Name of the start, by default the first one of each map. "*": any of its starts.
+        Name of the start; by default, the first start of each map. "*" draws one of the map's starts.
     robots : int
-        Number of robots, if there is no `team`.
+        Number of robots; ignored if there is a `team`.
     team : Team, optional
-        By default equal robots.
+        By default, identical robots.
     duration : float
         Time after which an episode is truncated, s.
     dt : float
@@ -63,23 +63,23 @@ class CoverageTask:
     repeat : int
         Number of control periods for which an action is held.
     action : str
-        Kind of actions: "force" in N, or "velocity" in m/s.
+        Kind of the actions: "force" (N) or "velocity" (m/s).
     reward : str
-        How rewards are shared, see `robocov_app.learning.rewards.share_reward`. Their unit is the reference
-        distance of the whole team.
+        How rewards are shared; see `robocov_app.learning.rewards.share_reward`. They are divided by the
+        reference distance of the whole team.
     contact_penalty : float
         Penalty for each second in contact with a wall or another robot.
     lattice : int
-        Sites along a side of the lattice of the coverage cost, whose distances are exact.
+        Number of sites along each side of the lattice of the coverage cost. Distances are exact.
     reward_every : int
         Number of actions after which the cost is evaluated and rewarded. The last action is always rewarded.
-        The exact cost takes about as long as ten control periods of six robots.
+        An evaluation takes about as long as ten control periods of six robots.
     observation : ObservationLayout
-        Numbers of each observation.
+        Layout of the observations.
     conditions : Conditions, optional
-        Their seed is drawn for each episode.
+        Conditions of the episodes. A new seed is drawn for each episode.
     recording : bool
-        Store what `Episode.record` needs: about 2 MB per minute for six robots.
+        Whether the data for `Episode.record` are stored: about 2 MB per minute for six robots.
 
     Raises
     ------
@@ -118,10 +118,12 @@ class CoverageTask:
     def __post_init__(self) -> None:
         self._check_times()
         self._check_kinds()
+        # The class is frozen. `team` and `robots` must agree, whichever was given.
         object.__setattr__(self, "team", self.whole_team)
         object.__setattr__(self, "robots", len(self.whole_team))
 
     def _check_times(self) -> None:
+        """Check the number of robots, the durations and the numbers of control periods, and the penalty."""
         check_dt(self.dt)
         require_number("robots", self.robots, 1, MAX_ROBOTS, whole=True)
         require_number("repeat", self.repeat, 1, _MAX_REPEAT, whole=True)
@@ -137,6 +139,7 @@ class CoverageTask:
             )
 
     def _check_kinds(self) -> None:
+        """Check the kinds of action and reward, and the types of team, observation and conditions."""
         check_kind("reward", self.reward, REWARDS)
         check_kind("action", self.action, ACTIONS)
         if self.action == "velocity" and self.dt > VELOCITY_TIME_CONSTANT_S:
@@ -153,7 +156,7 @@ class CoverageTask:
 
     @property
     def whole_team(self) -> Team:
-        """The team, by default one of equal robots."""
+        """The given team, or by default one of identical robots."""
         return Team.homogeneous(self.robots) if self.team is None else self.team
 
     @property
@@ -168,7 +171,7 @@ class CoverageTask:
 
     @property
     def agents(self) -> list[str]:
-        """Names of the robots, from "robot_1"."""
+        """Names of the robots, starting with "robot_1"."""
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:
@@ -183,10 +186,10 @@ def change_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Covera
     Parameters
     ----------
     task : CoverageTask or None
-        By default the task with all defaults.
+        By default, a task with default values.
     changes : Mapping
-        New values by attribute. If the number of robots changes, the team is replaced by equal robots, unless
-        it changes as well.
+        New values by attribute. If the number of robots changes, the team is replaced by identical robots,
+        unless a new team is given, too.
 
     Returns
     -------
@@ -195,7 +198,7 @@ def change_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Covera
     Raises
     ------
     ParameterError
-        If an attribute is unknown, or a value out of range.
+        If an attribute is unknown, or a value is out of range.
     """
     known = [attribute.name for attribute in fields(CoverageTask)]
     for name in changes:

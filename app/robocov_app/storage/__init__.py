@@ -1,4 +1,4 @@
-"""Files of the user that the windows write by themselves.
+"""User files that the windows write automatically.
 
 - `autosave`: drafts of unsaved work, which survive a crash
 - `settings`: appearance of the windows

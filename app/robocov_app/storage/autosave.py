@@ -1,4 +1,4 @@
-"""Drafts: unsaved work that survives a crash. Each open document has a folder, locked while it is open."""
+"""Drafts: unsaved work that survives a crash. Each open document has its own folder, locked while open."""
 
 import json
 import os
@@ -21,31 +21,31 @@ from robocov.files.writing import replace_file
 from robocov_app.storage.regular_files import require_regular_file
 
 FOLDER_VARIABLE = "ROBOCOV_DRAFTS"
-"""Environment variable that selects another folder for drafts; if it is empty, none are kept."""
+"""Environment variable that selects another folder for drafts; if it is empty, no drafts are saved."""
 SERVED_FOLDER = ".drafts"
 """Folder for drafts below the folder of a window that is shown in browsers."""
 _FILE_NAME = "draft.json"
 _MIN_PAUSE_S = 0.25
 """Minimum time between two drafts."""
 _PAUSE_FACTOR = 10.0
-"""Pause divided by the time that the last draft took, so that large documents do not slow the window down."""
+"""Pause after a draft, relative to the time it took to write: large drafts must not slow down the window."""
 _RETRY_S = 2.0
-"""Time after which a draft that could not be written is tried again."""
+"""Time until a draft that could not be written is written again."""
 _MAX_FOLDER_ATTEMPTS = 3
 _MIN_ABANDONED_AGE_S = 60.0
-"""Younger folders without a draft may be those of programs that are just starting."""
+"""Minimum age of a folder without a draft to be removed; a younger one may belong to a starting program."""
 _open_savers: list["Autosaver"] = []
 _open_savers_lock = threading.Lock()
 _Work = TypeVar("_Work")
 _Content: TypeAlias = Callable[[], Mapping[str, Any]]
 """Returns the content of a draft."""
 _Job: TypeAlias = tuple[Path | None, _Content | None]
-"""File of a document, and the content of its draft; None if everything is saved."""
+"""A draft to be written: file of the document (None if it has none), content (None if all is saved)."""
 
 
 @dataclass(frozen=True)
 class Draft:
-    """Content of the draft folder of a document.
+    """A draft that was read from the draft folder of a document.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ class Draft:
     path : Path or None
         File of the document; None if it never had one.
     when : datetime
-        Local time of the draft.
+        Local time at which the draft was written.
     content : mapping
-        The work that was passed to `Autosaver.save_draft`; empty if everything was saved.
+        Unsaved work, as returned by the callable passed to `Autosaver.save_draft`; empty if all was saved.
     """
 
     folder: Path
@@ -70,18 +70,18 @@ class Autosaver:
     Parameters
     ----------
     folder : Path or None
-        Folder for drafts; None if none are kept.
+        Folder for drafts; None to save no drafts.
     kind : str
-        Kind of document, in files.
+        Kind of document, stored in each draft.
     path : Path or None
-        File of the document.
+        File of the document; None if it has none yet.
     resumed : Path or None
-        Folder of the draft from which the document was recovered.
+        Draft folder from which the document was recovered; the autosaver continues to use it.
 
     Attributes
     ----------
     problem : str
-        Why the draft cannot be written; empty if it can.
+        Reason why the draft cannot be written; empty if there is no problem.
     """
 
     def __init__(
@@ -113,12 +113,12 @@ class Autosaver:
             self.save_draft(None)
 
     def save_draft(self, content: _Content | None) -> None:
-        """Write a draft soon. Only the newest one is written.
+        """Write a draft soon, in the background. A newer draft replaces one that is still pending.
 
         Parameters
         ----------
         content : callable or None
-            Called in the thread; returns the work. None if everything is saved.
+            Returns the unsaved work; called in the background thread. None if everything is saved.
         """
         with self._changed:
             if self._folder is not None and not self._is_closed:
@@ -126,21 +126,22 @@ class Autosaver:
                 self._changed.notify_all()
 
     def mark_saved(self, path: Path | None) -> None:
-        """Record that everything is saved in a file, so that there is nothing to recover."""
+        """Record that the document was saved in a file, so that there is nothing to recover."""
         self._path = path
         self.save_draft(None)
 
     def flush(self, timeout: float = 5.0) -> bool:
-        """Wait until the draft is on the disk.
+        """Write the pending draft now, and wait until it is on disk.
 
         Parameters
         ----------
-        timeout : float, s
+        timeout : float
+            Maximum time to wait, s.
 
         Returns
         -------
         bool
-            Whether it is on the disk.
+            Whether the draft is on disk.
         """
         with self._changed:
             self._is_hurried = True
@@ -151,12 +152,12 @@ class Autosaver:
             return self._pending is None and not self._is_writing and not self.problem
 
     def close(self, *, discard: bool) -> None:
-        """Stop, and unlock the draft.
+        """Stop saving drafts, and unlock the draft folder.
 
         Parameters
         ----------
         discard : bool
-            Whether the draft is removed; otherwise the next start offers it.
+            True to remove the draft. False to keep it, so that it is offered at the next start.
         """
         if self._folder is None:
             return
@@ -171,14 +172,14 @@ class Autosaver:
         if discard or not self._has_draft:
             with suppress(OSError):
                 (self._folder / _FILE_NAME).unlink()
-            # Some systems cannot remove open files, so the lock is released first.
+            # Some systems cannot remove open files, so the lock file is closed first.
             self._lock.close()
             remove_draft(self._folder)
         self._lock.close()
         self._folder = None
 
     def _create_folder(self, parent: Path) -> Path | None:
-        """Create and lock a folder for the draft; None if that is not possible."""
+        """Create and lock a draft folder; return None and set `problem` if that fails."""
         for _ in range(_MAX_FOLDER_ATTEMPTS):
             try:
                 parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -188,12 +189,12 @@ class Autosaver:
                 self.problem = ""
                 return folder
             except (OSError, OutputError) as error:
-                # Another program may be looking for abandoned folders at this moment.
+                # Another program that looks for abandoned drafts may have locked the folder for a moment.
                 self.problem = f"drafts cannot be saved: {error}"
         return None
 
     def _write_drafts(self) -> None:
-        """Write each pending draft; the target of the thread."""
+        """Write pending drafts until the saver is closed; the target of the background thread."""
         pause = 0.0
         while True:
             job = self._wait_for_job(pause)
@@ -211,14 +212,15 @@ class Autosaver:
                 self._is_writing = False
                 self.problem = problem
                 if problem and self._pending is None and not self._is_closed:
+                    # There is no newer draft, so the same one is tried again.
                     self._pending = job
                     pause = _RETRY_S
                 self._changed.notify_all()
 
     def _wait_for_job(self, pause: float) -> _Job | None:
-        """Wait for a pause, s, and then for a pending draft; return None if the saver is closed without one.
+        """Wait for `pause` seconds, then for a pending draft; return None if the saver is closed without one.
 
-        `flush` and `close` end the pause.
+        `flush` and `close` cut the pause short.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._is_closed or self._is_hurried, pause)
@@ -231,7 +233,7 @@ class Autosaver:
         return job
 
     def _write(self, path: Path | None, content: _Content | None) -> None:
-        """Write a draft of a document in a file."""
+        """Write the draft of the document `path` to the draft folder."""
         assert self._folder is not None
         encoded_path = None
         if path is not None:
@@ -250,12 +252,12 @@ class Autosaver:
 
 
 def flush_all(timeout: float) -> None:
-    """Write the drafts of all open documents.
+    """Write the drafts of all open documents to disk.
 
     Parameters
     ----------
-    timeout : float, s
-        Maximum time to wait for them.
+    timeout : float
+        Maximum time to wait for all of them together, s.
     """
     with _open_savers_lock:
         savers = list(_open_savers)
@@ -270,13 +272,13 @@ def find_draft_folder(served_from: Path | None = None) -> Path | None:
     Parameters
     ----------
     served_from : Path or None
-        Folder of a window that is shown in browsers. Such a window writes nowhere else, so its drafts are
-        in the hidden folder `SERVED_FOLDER` below it.
+        Working folder of a window that is shown in a browser. Such a window may not write anywhere else, so
+        its drafts are in the hidden subfolder `SERVED_FOLDER`.
 
     Returns
     -------
     Path or None
-        None if the environment variable `FOLDER_VARIABLE` is set and empty, so that no drafts are kept.
+        None if no drafts are saved, because the environment variable `FOLDER_VARIABLE` is set but empty.
     """
     named_folder = os.environ.get(FOLDER_VARIABLE)
     if named_folder == "":
@@ -289,7 +291,7 @@ def find_draft_folder(served_from: Path | None = None) -> Path | None:
 
 
 def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | None]) -> tuple[_Work, ...]:
-    """Find the drafts that programs left when they ended, and remove empty folders.
+    """Find the drafts of programs that are no longer running, and remove abandoned folders without a draft.
 
     Parameters
     ----------
@@ -298,17 +300,17 @@ def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | 
     kind : str
         Kind of document.
     read : callable
-        Returns the work of a draft that is offered to the user, or None if there is nothing to offer. If it
-        raises anything, the draft is left where it is: one bad file must not keep windows from opening.
+        Returns the recovered work of a draft, or None if there is nothing to recover. If it raises any error,
+        the draft is skipped but kept: one bad file must not prevent a window from opening.
 
     Returns
     -------
     tuple
-        The newest first.
+        Recovered works, the newest first.
     """
     dated_works = []
     for draft_folder in _list_folders(folder):
-        # A draft that is in use, or cannot be read, is left alone.
+        # A draft that is locked by a running program, or cannot be read, is left alone.
         with suppress(Exception):
             with lock_folder(draft_folder):
                 draft: Draft | None = None
@@ -325,7 +327,7 @@ def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | 
 
 
 def remove_draft(folder: Path) -> None:
-    """Remove the folder of one draft, as far as possible.
+    """Remove the folder of one draft; errors are ignored.
 
     `shutil.rmtree` uses paths relative to an open folder, which `robocov_app.web.confined` does not allow.
     Therefore each file is removed by its full path.
@@ -346,7 +348,7 @@ def is_open_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     kind : str
         Kind of document.
     path : Path
-        The file. The program must not have an `Autosaver` for it itself.
+        File of a document. This program must not have an `Autosaver` for it.
 
     Returns
     -------
@@ -358,6 +360,7 @@ def is_open_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
         with suppress(MapError, OSError):
             draft_path = read_draft(draft_folder, kind).path
             if draft_path is not None and os.path.realpath(draft_path) == real_path:
+                # The folder is locked if, and only if, a program has the document open.
                 try:
                     with lock_folder(draft_folder):
                         pass
@@ -367,7 +370,7 @@ def is_open_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
 
 
 def read_draft(folder: Path, kind: str) -> Draft:
-    """Read a draft.
+    """Read the draft in a draft folder.
 
     Parameters
     ----------
@@ -383,7 +386,7 @@ def read_draft(folder: Path, kind: str) -> Draft:
     Raises
     ------
     MapError
-        If it cannot be read, or is of another kind.
+        If the draft cannot be read, or is of another kind.
     """
     file = folder / _FILE_NAME
     require_regular_file(file)
@@ -402,7 +405,7 @@ def read_draft(folder: Path, kind: str) -> Draft:
 
 
 def _encode_path(path: Path) -> str | dict[str, str]:
-    """Return a path as JSON content: a string, or its bytes if they are not UTF-8."""
+    """Encode a path for JSON: as a string, or as hexadecimal bytes if it is not valid Unicode."""
     text = str(path)
     try:
         text.encode()
@@ -412,14 +415,14 @@ def _encode_path(path: Path) -> str | dict[str, str]:
 
 
 def _decode_path(encoded: Any) -> Path:
-    """Return a path from JSON content; raise TypeError, ValueError or KeyError if it is none."""
+    """Decode a path from JSON; raise TypeError, ValueError or KeyError if the value is invalid."""
     if isinstance(encoded, dict):
         return Path(os.fsdecode(bytes.fromhex(encoded["bytes"])))
     return Path(encoded)
 
 
 def _list_folders(folder: Path | None) -> list[Path]:
-    """Return the folders in a folder; none if it cannot be read."""
+    """Return the sorted subfolders of a folder; an empty list if it is None or cannot be read."""
     if folder is None:
         return []
     try:

@@ -6,9 +6,9 @@ from robocov.errors import MapError, describe_error, to_one_line
 
 
 def require_regular_file(path: Path) -> None:
-    """Raise MapError for a pipe or a device, which would block the window, and for a broken link.
+    """Raise MapError if a path is a broken link, or a pipe or device, which would block the window.
 
-    A path that does not exist passes; reading it raises its own error.
+    A path that does not exist passes, because reading it raises an error anyway. So does a folder.
     """
     try:
         exists = path.exists()

@@ -1,4 +1,4 @@
-"""Persistent settings of a window, in a JSON file in the user's configuration folder."""
+"""Persistent settings of a window, stored as a JSON file in the user's configuration folder."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -13,12 +13,12 @@ from robocov.errors import OutputError
 from robocov.files.writing import replace_file
 
 FOLDER_VARIABLE = "ROBOCOV_SETTINGS"
-"""Environment variable that selects another folder for settings; if it is empty, there are none."""
+"""Environment variable that selects another folder for settings; if it is empty, none are stored."""
 SettingsType = TypeVar("SettingsType", bound=BaseModel)
 
 
 def find_settings_file(name: str = "window.json") -> Path | None:
-    """Return the file of settings; None if there are none."""
+    """Return the path of a settings file; None if no settings are stored."""
     default_folder = str(user_config_path("robocov", appauthor=False))
     folder = os.environ.get(FOLDER_VARIABLE, default_folder)
     if not folder:
@@ -27,20 +27,20 @@ def find_settings_file(name: str = "window.json") -> Path | None:
 
 
 def load_settings(kind: type[SettingsType], file: Path | None) -> tuple[SettingsType, str]:
-    """Load settings.
+    """Load settings from a file.
 
     Parameters
     ----------
     kind : type
-        Model of the settings.
+        Pydantic model of the settings.
     file : Path or None
 
     Returns
     -------
     settings : BaseModel
-        The defaults if there is no file, or it cannot be read.
+        The default settings if there is no file or it cannot be read.
     message : str
-        Message if the file cannot be read; otherwise empty.
+        Message for the user if the file cannot be read; otherwise empty.
     """
     try:
         if file is not None and file.exists():
@@ -53,14 +53,15 @@ def load_settings(kind: type[SettingsType], file: Path | None) -> tuple[Settings
 def merge_changed_settings(
     saved: SettingsType, at_opening: SettingsType, at_closing: SettingsType
 ) -> SettingsType:
-    """Return the saved settings with the changes that were made in the window.
+    """Apply the changes that were made in the window to the saved settings.
 
     Parameters
     ----------
     saved : BaseModel
         Settings as they were loaded.
     at_opening, at_closing : BaseModel
-        Settings of the window. Those selected on the command line are the same in both.
+        Settings of the window when it opened and when it closed. Options from the command line are in both,
+        so they do not count as changes and are not saved.
 
     Returns
     -------
@@ -71,7 +72,7 @@ def merge_changed_settings(
 
 
 def save_settings(settings: BaseModel, file: Path | None) -> str:
-    """Save settings.
+    """Save settings to a file.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
     Returns
     -------
     str
-        Message if they cannot be saved; otherwise empty.
+        Message for the user if the settings cannot be saved; otherwise empty.
     """
     if file is None:
         return ""
@@ -99,7 +100,7 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
 def keep_changes(
     settings: SettingsType, file: Path | None, read: Callable[[SettingsType], SettingsType]
 ) -> Iterator[None]:
-    """Save the settings that are changed while the block runs; nothing if it raises.
+    """Save the settings that change while the block runs; save nothing if it raises.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def keep_changes(
     file : Path or None
         None to save nothing.
     read : callable
-        Returns the present settings of the window, given those that were loaded.
+        Takes the loaded settings, and returns the current settings of the window.
     """
     at_opening = read(settings)
     yield

@@ -1,1 +1,1 @@
-"""The sheet and all that is drawn on it."""
+"""The drawing sheet and everything that is drawn on it."""

@@ -1,4 +1,4 @@
-"""The canvas: the sheet under a camera, the layers on top of it, and the strips above and below."""
+"""The canvas: the sheet seen by a camera, the layers on top of it, the legend above and the status below."""
 
 from dataclasses import replace
 
@@ -35,18 +35,18 @@ from robocov_app.toolkit.window.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
 MARGIN_PX = 26.0  # around the map when all of it is shown
-SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved into the middle
+SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved to the center of the view
 BADGE_REACH_PX = 10
 SCALE_BAR_LABEL_PX = 90
 
-MAX_PAN_FRACTION = 0.45  # of the view, by which the map can be moved out of its middle
-EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # part of an empty sheet that is shown
-MIN_VIEW_M = 0.2  # minimum width and height that are shown
+MAX_PAN_FRACTION = 0.45  # of the view: how far the map can be moved from its center
+EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # visible part of an empty sheet
+MIN_VIEW_M = 0.2  # minimum width and height of a fitted view
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
 
 
 def describe_map(editor: Editor) -> str:
-    """Return the facts about the map in the strip at the foot."""
+    """Return the status line for a map: title, number of obstacles, free area and number of problems."""
     title = editor.document.title
     if editor.document.history.has_unsaved_changes:
         title = f"● {title}"
@@ -61,7 +61,7 @@ def describe_map(editor: Editor) -> str:
 
 
 class EditorCanvas:
-    """Draws the map of an editor, and finds problems and positions at pixels.
+    """Draws the map of an editor, and converts between pixels and positions.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class EditorCanvas:
     entries : list of LegendEntry
         Entries of the legend.
     team : Team or None
-        The team at a start.
+        The team that is shown at a start.
     hovered : Problem or None
         Problem under the cursor.
     at : Point or None
@@ -97,10 +97,10 @@ class EditorCanvas:
         self._legend_key: object = None
         self._legend: LatestValue[Surface] = LatestValue()
         self._has_hull_excess: LatestValue[bool] = LatestValue()
-        self._fitted: tuple[Point, float] | None = None  # center and zoom of the camera that shows all
+        self._fitted: tuple[Point, float] | None = None  # center and zoom of the last view fitted to the map
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adapt to another size or theme of the window."""
+        """Adapt to a new size or theme of the window; a view that shows the whole map still does."""
         self.layout = layout
         self.theme = theme
         self._set_camera(self.camera.with_view(self._compute_view_box()))
@@ -109,7 +109,7 @@ class EditorCanvas:
             self.fit()
 
     def _compute_view_box(self) -> tuple[float, float, float, float]:
-        """Return the space between the legend and the strip at the foot: left, top, width, height, px."""
+        """Return the box between the legend and the status strip: left, top, width, height, px."""
         left, top, width, height = self.layout.arena
         scale = self.layout.scale
         legend_height = 0
@@ -119,6 +119,7 @@ class EditorCanvas:
         return float(left), float(top + legend_height), float(width), float(view_height)
 
     def _update_legend(self, canvas: Canvas) -> None:
+        """Update the entries of the legend and the number of their rows."""
         is_shown = "legend" in self.editor.shown
         self.entries = []
         if is_shown:
@@ -126,12 +127,13 @@ class EditorCanvas:
         rows = max(len(legend_strip.arrange_legend_rows(canvas, self.entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, self.editor.document, is_shown)
         if key == self._legend_key:
-            # While entries come and go the legend does not shrink again, so that the map does not jump.
+            # The legend never shrinks in the same view, so that the map does not jump as entries come and go.
             rows = max(rows, self._legend_rows)
         self._legend_rows = rows
         self._legend_key = key
 
     def _build_legend_entries(self) -> list[LegendEntry]:
+        """Build the entries for what the sheet currently shows, including the range of the density."""
         editor = self.editor
         sketch = editor.sketch
         has_excess = self._has_hull_excess.get(
@@ -152,7 +154,7 @@ class EditorCanvas:
         return entries
 
     def fit(self, selection: Selection | None = None) -> None:
-        """Show the whole map, or a selection."""
+        """Fit the view to a selection, by default to the whole map."""
         bounds = None
         if selection:
             bounds = transform.compute_bounds(self.editor.sketch, selection)
@@ -166,7 +168,7 @@ class EditorCanvas:
             self._fitted = (self.camera.center, self.camera.zoom)
 
     def show_problem(self, problem: Problem | None) -> None:
-        """Move the view so that a problem is visible."""
+        """Center the view on a problem unless it is well inside the view."""
         if problem is None or problem.geometry is None or problem.geometry.is_empty:
             return
         point = problem.geometry.representative_point()
@@ -176,7 +178,7 @@ class EditorCanvas:
             self._set_camera(replace(self.camera, center=(point.x, point.y)))
 
     def zoom(self, factor: float, at: Point | None = None) -> None:
-        """Magnify about a pixel of the window: by default the cursor, or the middle."""
+        """Zoom about a pixel of the window, by default the cursor or else the center of the view."""
         if at is None and self.at is not None and self.contains(self.at):
             at = self.at
         if at is None:
@@ -186,7 +188,7 @@ class EditorCanvas:
         self._set_camera(zoom_about(self.camera, factor, at, extent))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the view by pixels; the map stays in it."""
+        """Move the view by a number of pixels, but not so far that the map leaves it."""
         camera = self.camera.pan(dx, dy)
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         _, _, width, height = camera.view
@@ -202,21 +204,21 @@ class EditorCanvas:
         self.editor.pixel = self.layout.scale / camera.zoom
 
     def contains(self, pixel: Point) -> bool:
-        """Return whether a pixel of the window belongs to the map."""
+        """Return whether a pixel of the window is in the map view."""
         return is_inside(self.camera.view, pixel)
 
     def to_world(self, pixel: Point) -> Point:
-        """Return the position under a pixel of the window, m."""
+        """Return the position of the map at a pixel of the window, m."""
         x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
         return x, y
 
     def to_pixel(self, point: Point) -> Point:
-        """Return the pixel of the window at a position, m."""
+        """Return the pixel of the window at a position of the map, m."""
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
 
     def find_problem(self, pixel: Point) -> Problem | None:
-        """Return the problem whose badge is at a pixel of the window."""
+        """Return the problem whose badge is at a pixel of the window, if any."""
         if "problems" not in self.editor.shown:
             return None
         reach = BADGE_REACH_PX * self.layout.scale
@@ -226,6 +228,7 @@ class EditorCanvas:
         return None
 
     def _build_view(self) -> View:
+        """Build the description of the current view: camera, theme, size, layers and grid."""
         editor = self.editor
         return View(
             camera=self.camera,
@@ -238,7 +241,7 @@ class EditorCanvas:
         )
 
     def draw(self, screen: Surface) -> None:
-        """Draw the map and the strips."""
+        """Draw the map, the legend and the status strip."""
         box = Rect(self.layout.arena)
         self._update_legend(self._build_view().build_canvas(Surface((box.width, 1))))
         self._set_camera(self.camera.with_view(self._compute_view_box()))
@@ -255,6 +258,7 @@ class EditorCanvas:
         self._draw_foot(scene)
 
     def _build_scene(self, screen: Surface) -> EditorScene:
+        """Build the scene of one frame, with the state of the active tool and of a drag."""
         editor = self.editor
         view = self._build_view()
         state = editor.tool.build_draw_state(editor)
@@ -275,6 +279,7 @@ class EditorCanvas:
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
+        """Draw the sheet of the saved map, with a boundary, picture or density that a tool is changing."""
         sketch = scene.saved
         is_boundary_changed = scene.sketch.boundary is not scene.saved.boundary
         if is_boundary_changed:
@@ -302,7 +307,7 @@ class EditorCanvas:
         scene.screen.blit(legend, box)
 
     def _draw_foot(self, scene: EditorScene) -> None:
-        """Draw the strip at the foot: scale bar, and facts about the map."""
+        """Draw the status strip at the bottom: scale bar and status line."""
         box = Rect(self.layout.arena)
         scale = scene.canvas.scale
         height = round(scale_bar.STRIP_HEIGHT_PX * scale)
@@ -317,10 +322,11 @@ class EditorCanvas:
 
 
 def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
-    """Return the keys of obstacles that are not drawn on the sheet: they are dragged, changed or removed."""
+    """Return the keys of obstacles to leave out of the sheet: those that are dragged, changed or removed."""
     carried = state.carried
     if carried is not None and not carried.are_copies:
         return carried.selection.items
+    # Copies are carried: the originals stay on the sheet.
     if carried is not None or displayed is saved:
         return frozenset()
     items = {item.key: item for item in displayed.obstacles}

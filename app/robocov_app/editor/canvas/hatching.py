@@ -1,4 +1,4 @@
-"""Hatching of areas where robots do not pass, and of areas that are cut off."""
+"""Hatching of areas that are too narrow for robots, and of areas that are cut off from the rest."""
 
 import numpy as np
 import pygame
@@ -10,8 +10,8 @@ from robocov_app.editor.canvas.view import View, compute_pixel_box
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color
 
-HATCH_STEP_PX = 7  # between slanted lines, at scale 1
-CUT_OFF_FORCE = "repulsion_robots"  # areas that are cut off have the color of this force
+HATCH_STEP_PX = 7  # distance between hatch lines, at scale 1
+CUT_OFF_FORCE = "repulsion_robots"  # cut-off areas have the color of this force
 CUT_OFF_STRENGTH = 0.5
 _WHITE = (255, 255, 255)
 _TRANSPARENT = (0, 0, 0, 0)
@@ -20,14 +20,14 @@ _LINE_OPACITY = 235
 
 
 def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
-    """Draw the areas where robots do not pass, and the areas that are cut off.
+    """Hatch the areas that are too narrow for robots, and the areas that are cut off from the rest.
 
     Parameters
     ----------
     view : View
         The view of the sheet.
     measurement : Measurement
-        The areas.
+        Its `impassable` area is too narrow, and its `sealed` area is cut off.
 
     Returns
     -------
@@ -53,7 +53,21 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
 
 
 def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tuple[Color, float]) -> None:
-    """Hatch one area on a patch that lies at a box of the window; `ink` is its color and strength."""
+    """Hatch one area.
+
+    Parameters
+    ----------
+    view : View
+        The view of the sheet.
+    patch : Surface
+        Premultiplied image to draw on.
+    box : Rect
+        Position of the patch in the window, px.
+    outline : Outline
+        Outline of the area.
+    ink : (tuple of int, float)
+        Color, and opacity from 0 to 1.
+    """
     color, strength = ink
     mask = view.build_canvas(Surface(box.size, pygame.SRCALPHA, 32))
     edges = view.build_canvas(patch)
@@ -61,7 +75,7 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
             mask.fill_polygon(ring, (*_WHITE, 255))
-            # Areas thinner than a pixel become a line.
+            # Areas thinner than a pixel stay visible as a line.
             mask.draw_outline(ring, _WHITE, 1)
         else:
             mask.fill_polygon(ring, _TRANSPARENT)
@@ -74,24 +88,30 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
 
 
 def draw_hatch_page(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
-    """Draw slanted lines over a tint; the lines keep their position when the sheet is moved.
+    """Draw an image of diagonal lines over a tint.
 
     Parameters
     ----------
     box : Rect
-        Box of the window that the page covers, px.
+        Box of the window that the image covers, px.
     color : tuple of int
-        Color of lines and tint.
+        Color of the lines and the tint.
     scale : float
         Scale of the window.
     strength : float
         Opacity, from 0 to 1.
+
+    Returns
+    -------
+    Surface
+        Image of the size of the box.
     """
     page = Surface(box.size, pygame.SRCALPHA, 32)
     page.fill((*color, round(_TINT_OPACITY * strength)))
     step = max(4, round(HATCH_STEP_PX * scale))
     thickness = max(1, round(1.2 * scale))
     line_color = (*color, round(_LINE_OPACITY * strength))
+    # The lines have fixed positions in the window, whatever the position of the box.
     first = -((box.left + box.top) % step)
     for x in range(first, box.width + box.height, step):
         pygame.draw.line(page, line_color, (x, 0), (x - box.height, box.height), thickness)

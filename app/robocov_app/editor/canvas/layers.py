@@ -1,4 +1,4 @@
-"""Layers over the sheet, in the order in which they are drawn."""
+"""Layers on top of the sheet, in drawing order."""
 
 from functools import partial
 from typing import Protocol
@@ -24,22 +24,22 @@ from robocov_app.render.crowding import fit_radii
 from robocov_app.render.layers.robots import READABLE_RADIUS_PX
 from robocov_app.render.surface_cache import LatestValue
 
-MANY_OBJECTS = 200  # the outlines of more selected objects are drawn once, and kept as an image
+MANY_OBJECTS = 200  # the outlines of more selected objects are cached as an image
 DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged
-MAX_RADIUS_PX = 400.0  # of a robot that is drawn as a sprite
-MIN_NUMBER_PX = 7.5  # at scale 1: smaller numbers are not written on robots
+MAX_RADIUS_PX = 400.0  # maximum radius of a robot that is drawn as a sprite
+MIN_NUMBER_PX = 7.5  # at scale 1; robots too small for this text size have no number
 _PREMULTIPLIED = pygame.BLEND_PREMULTIPLIED
 
 
 class OverlayLayer(Protocol):
-    """A layer over the sheet."""
+    """A layer on top of the sheet."""
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the layer."""
 
 
 class DraggedObstacles:
-    """Obstacles that are dragged, changed or copied by the tool."""
+    """Obstacles that the active tool drags, changes or copies."""
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
@@ -51,6 +51,7 @@ class DraggedObstacles:
             self._draw_carried_items(scene, scene.state.carried)
         elif scene.sketch is not scene.saved:
             theme = scene.canvas.theme
+            # The sheet shows all obstacles of the saved map except for the lifted ones.
             keys = scene.saved.index_by_key.keys() - scene.lifted
             items = [item for item in scene.sketch.obstacles if item.key not in keys]
             self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.final, DRAGGED_TINT))
@@ -78,13 +79,13 @@ class DraggedObstacles:
 
 
 class Passages:
-    """Areas that robots cannot reach, and the narrowest gap."""
+    """Hatching of areas that robots cannot reach, and the narrowest gap."""
 
     def __init__(self) -> None:
         self._hatching: LatestValue[tuple[Surface, Rect] | None] = LatestValue()
 
     def draw(self, scene: EditorScene) -> None:
-        """Draw hatching and gap."""
+        """Draw the hatching and the gap."""
         measurement = scene.measurement
         if measurement is None:
             return
@@ -99,10 +100,10 @@ class Passages:
 
 
 class Paths:
-    """Paths of moving obstacles, and where the obstacles are while they are shown moving."""
+    """Paths of moving obstacles, and the obstacles along them while their motion is shown."""
 
     def draw(self, scene: EditorScene) -> None:
-        """Draw the paths."""
+        """Draw the paths and, while motion is shown, each obstacle at its current position."""
         sketch = scene.state.pending or scene.sketch
         theme = scene.canvas.theme
         for key in paths.list_moving_obstacles(sketch):
@@ -123,7 +124,7 @@ class StartMarkers:
     """The starts of the map."""
 
     def draw(self, scene: EditorScene) -> None:
-        """Draw the starts with their names."""
+        """Draw the starts with their names; the first one is the default."""
         for number, (name, start) in enumerate(scene.sketch.starts):
             label = name
             if name and number == 0:
@@ -133,10 +134,10 @@ class StartMarkers:
 
 
 class TeamAtStart:
-    """The robots of the team at a start."""
+    """The robots of the team, placed at a start."""
 
     def draw(self, scene: EditorScene) -> None:
-        """Draw the robots."""
+        """Draw the robots as discs with their numbers."""
         team = scene.team
         if team is None or not team.positions or "robots" not in scene.view.shown:
             return
@@ -149,6 +150,7 @@ class TeamAtStart:
         radii = np.minimum(fit_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
+            # Half pixels, so that sprites can be reused.
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
             sprite = partial(
                 sprites.render_disc,
@@ -163,7 +165,7 @@ class TeamAtStart:
 
 
 def _choose_number(number: int, radius: float, scale: float) -> str:
-    """Return the number of a robot as a text; empty if its disc, of a radius in px, is too small for it."""
+    """Return the number of a robot as text; empty if its disc, with a radius in px, is too small."""
     text = str(number)
     text_size = sprites.choose_number_size(radius, min(len(text), 4))
     if text_size > MIN_NUMBER_PX * scale:
@@ -172,14 +174,14 @@ def _choose_number(number: int, radius: float, scale: float) -> str:
 
 
 class SelectedObjects:
-    """Outlines of the selected and the hovered objects, frame and handles."""
+    """Outlines of the selected objects and the hovered one, with the frame and handles of the selection."""
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
         self._outlines: LatestValue[Surface] = LatestValue()
 
     def draw(self, scene: EditorScene) -> None:
-        """Draw outlines and handles."""
+        """Draw outlines, frame and handles. Objects that are dragged have outlines already."""
         if scene.state.carried is not None:
             return
         selection = scene.selection.restrict_to(scene.sketch)
@@ -199,6 +201,7 @@ class SelectedObjects:
             draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color=color, width=1.5)
 
     def _draw_outlines(self, scene: EditorScene, selection: Selection, owners: set[Owner]) -> None:
+        """Draw the outlines of the selected objects; those of many are cached as an image."""
         if len(owners) <= MANY_OBJECTS:
             self._draw_all(scene.canvas, scene.sketch, owners)
             return
@@ -217,6 +220,7 @@ class SelectedObjects:
             draw_object_outline(canvas, self._sheet, sketch, owner, color=canvas.theme.final, width=2.0)
 
     def _draw_handles(self, scene: EditorScene, selection: Selection) -> None:
+        """Draw the dashed frame of a selection, and its handles."""
         canvas = scene.canvas
         editor = scene.editor
         frame = compute_frame(scene.sketch, selection, editor.pixel)
@@ -231,10 +235,10 @@ class SelectedObjects:
 
 
 class GapLabel:
-    """The width of the narrowest gap, next to it."""
+    """Label of the narrowest gap with its width."""
 
     def draw(self, scene: EditorScene) -> None:
-        """Write the width."""
+        """Draw the label; it avoids the label of a tool at the cursor."""
         measurement = scene.measurement
         if measurement is not None and measurement.gap is not None:
             cursor = None
@@ -244,7 +248,7 @@ class GapLabel:
 
 
 class Problems:
-    """Badges of the problems, with the message of the chosen one."""
+    """Badges of the problems, with the messages of the chosen and the hovered one."""
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the problems."""
@@ -254,7 +258,7 @@ class Problems:
 
 
 class Guides:
-    """Guides of the latest snap."""
+    """Guides that show what the cursor has snapped to."""
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the guides."""
@@ -262,7 +266,7 @@ class Guides:
 
 
 class ToolPreview:
-    """Preview of the active tool's next edit."""
+    """Preview of the edit that the active tool would make."""
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the preview."""
@@ -280,7 +284,7 @@ class TypedText:
 
 
 def build_layers(sheet: Sheet) -> tuple[OverlayLayer, ...]:
-    """Return the layers over a sheet, from the bottom to the top."""
+    """Build the layers on top of a sheet, from bottom to top."""
     return (
         DraggedObstacles(sheet),
         Passages(),

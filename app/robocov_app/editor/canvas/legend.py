@@ -15,23 +15,23 @@ from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 def build_legend_entries(
     measurement: Measurement | None, *, has_starts: bool, has_team: bool, has_hull_excess: bool
 ) -> list[LegendEntry]:
-    """Return the legend entries of the sheet.
+    """Build the legend entries of the sheet.
 
     Parameters
     ----------
     measurement : Measurement or None
-        The measurement, if passages that are too narrow are shown.
+        Measurement of the map; None if passages that are too narrow are not shown.
     has_starts : bool
         Whether the map has starts.
     has_team : bool
         Whether a team is shown.
     has_hull_excess : bool
-        Whether the convex hull of the boundary is larger than the boundary.
+        Whether the convex hull of the boundary is larger than the area inside the boundary.
 
     Returns
     -------
     list of LegendEntry
-        The entries, in their order.
+        Entries in the order in which they are shown.
     """
     rows: list[tuple[bool, str, Glyph]] = [
         (True, "obstacle", _draw_obstacle),

@@ -1,4 +1,4 @@
-"""Outlines of obstacles as they are drawn, built once for each obstacle."""
+"""Outlines of obstacles for drawing, cached for each obstacle."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.surface_cache import LatestValue
 
-MAX_OUTLINES_PER_OBSTACLE = 4  # kept outlines; undoing may bring their obstacles back
-SPARE_OUTLINES = 1000
-MIN_NAME_GAIN = 1.2  # minimum ratio of the width of another position for a name to the best one so far
+MAX_OUTLINES_PER_OBSTACLE = 4  # cached outlines; more than one, because undo may restore earlier obstacles
+SPARE_OUTLINES = 1000  # cached outlines in addition, whatever the number of obstacles
+MIN_NAME_GAIN = 1.2  # a position for a name replaces an earlier one only if it is wider by this factor
 
 
 class NameSpace(NamedTuple):
@@ -29,18 +29,18 @@ class NameSpace(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Outline of a geometry.
+    """Outline of a geometry as rings and lines.
 
     Attributes
     ----------
     rings : list of (k, 2) array
-        Outer ring and holes of each part, m.
+        Outer ring and holes of each part, m, without the repeated last point.
     outer : list of bool
-        Whether each ring is an outer one.
+        Whether each ring is an outer ring.
     lines : list of (k, 2) array
-        Lines and points that cover no area, m.
+        Lines and points, which have no area, m.
     bounds : (4,) array
-        Low x, low y, high x, high y, m; nan for an empty geometry.
+        Minimum x and y, maximum x and y, m; nan for an empty geometry.
     geometry : shapely.Geometry
         The geometry.
     """
@@ -58,7 +58,10 @@ class Outline:
 
     @cached_property
     def name_space(self) -> NameSpace:
-        """The widest space for a name among two heights."""
+        """Space for the name of the obstacle; all 0 for an empty geometry.
+
+        The widest free interval at two heights is chosen: that of the centroid, and that of a point inside.
+        """
         best = NameSpace()
         if self.geometry.is_empty:
             return best
@@ -76,11 +79,13 @@ class Outline:
 
 
 def _cut_horizontally(geometry: shapely.Geometry, y: float) -> list[shapely.Geometry]:
+    """Return the parts of a geometry on the horizontal line at height y, m, as lines."""
     low_x, _, high_x, _ = geometry.bounds
     return _intersect_line(geometry, [(low_x - 1.0, y), (high_x + 1.0, y)])
 
 
 def _cut_vertically(geometry: shapely.Geometry, x: float) -> list[shapely.Geometry]:
+    """Return the parts of a geometry on the vertical line at x, m, as lines."""
     _, low_y, _, high_y = geometry.bounds
     return _intersect_line(geometry, [(x, low_y - 1.0), (x, high_y + 1.0)])
 
@@ -93,7 +98,7 @@ def _intersect_line(
 
 
 def build_outline(geometry: shapely.Geometry) -> Outline:
-    """Build the outline of a geometry."""
+    """Build the outline of a geometry: rings of its polygons, and coordinates of all other parts."""
     rings: list[Array] = []
     outer: list[bool] = []
     lines: list[Array] = []
@@ -107,14 +112,15 @@ def build_outline(geometry: shapely.Geometry) -> Outline:
 
 
 class Outlines:
-    """Outlines of obstacles, built once for each."""
+    """Cache of the outlines of obstacles."""
 
     def __init__(self) -> None:
-        self._outlines: dict[int, tuple[Item, Outline]] = {}  # by the identity of the item
+        # By the id of the item. The item is stored as well, because Python reuses ids.
+        self._outlines: dict[int, tuple[Item, Outline]] = {}
         self._bounds: LatestValue[Array] = LatestValue()
 
     def get(self, item: Item) -> Outline:
-        """Return the outline of an obstacle."""
+        """Return the outline of an obstacle, from the cache if possible."""
         entry = self._outlines.get(id(item))
         if entry is None or entry[0] is not item:
             entry = (item, build_outline(item.geometry))
@@ -122,7 +128,7 @@ class Outlines:
         return entry[1]
 
     def find_items(self, sketch: Sketch, box: Box) -> list[Item]:
-        """Return the visible obstacles whose bounding boxes meet a box, m, from the bottom to the top."""
+        """Return the obstacles that are not hidden and whose bounds meet a box, m, from bottom to top."""
         bounds = self._bounds.get(sketch, None, lambda: self._list_bounds(sketch))
         low_x, low_y, high_x, high_y = bounds.T
         is_near = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
@@ -131,6 +137,7 @@ class Outlines:
 
     def _list_bounds(self, sketch: Sketch) -> Array:
         """Return the (n, 4) bounds of all obstacles, m."""
+        # Old outlines are dropped once there are far more of them than obstacles.
         if len(self._outlines) > MAX_OUTLINES_PER_OBSTACLE * len(sketch.obstacles) + SPARE_OUTLINES:
             self._outlines = {}
         return np.array([self.get(item).bounds for item in sketch.obstacles]).reshape(-1, 4)

@@ -1,4 +1,4 @@
-"""Drawing of single elements over the sheet: handles, guides, starts, paths, previews, gaps, problems."""
+"""Functions that draw single elements on the sheet: handles, guides, starts, paths, previews, problems."""
 
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -30,18 +30,18 @@ from robocov_app.toolkit.tools.snapping import Guide
 # Lengths in pixels at scale 1.
 HANDLE_HALF_PX = 3.5  # half the side of a handle
 LARGE_HANDLE_FACTOR = 1.4
-BADGE_RADIUS_PX = 8.0  # of a problem
+BADGE_RADIUS_PX = 8.0  # badge of a problem
 SMALL_BADGE_RADIUS_PX = 6.5
 STEM_PX = 17.0  # between a problem and its badge
 ARROW_MIN_LEG_PX = 24  # shorter legs of a path have no arrow
 LABEL_OFFSET_PX = (18, -22)  # from the cursor to a tool's label
 
-MAX_SPRITE_RADIUS_PX = 300.0  # smaller circles are sprites, which are smoother than many short lines
+MAX_SPRITE_RADIUS_PX = 300.0  # larger circles are polygons; sprites are smoother, but large images
 MAX_CIRCLE_SIDES = 720
-MAX_EDGE_LABELS = 40  # lengths written along a line that is drawn
+MAX_EDGE_LABELS = 40  # edges of a line that is being drawn whose lengths are shown
 MAX_BADGES = 200
-MAX_POLYGON_PX = 30_000  # coordinates that pygame fills polygons with
-MIN_LENGTH_PX = 1e-9
+MAX_POLYGON_PX = 30_000  # maximum coordinates with which pygame fills polygons
+MIN_LENGTH_PX = 1e-9  # avoids division by zero
 
 
 class DiscColors(NamedTuple):
@@ -50,7 +50,7 @@ class DiscColors(NamedTuple):
     Attributes
     ----------
     fill, ring, edge : tuple of int
-        Inside, the ring around it, and the thin line around the ring.
+        Colors of the inside, of the ring around it, and of the thin line around the ring.
     """
 
     fill: Color
@@ -59,33 +59,33 @@ class DiscColors(NamedTuple):
 
 
 def choose_problem_color(theme: Theme, *, is_error: bool) -> Color:
-    """Return the color of an error or of a warning."""
+    """Return the color of errors or of warnings."""
     if is_error:
         return theme.trajectory
     return theme.others[1]
 
 
 def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
-    """Return the pixels of points.
+    """Convert positions of the map to pixels.
 
     Parameters
     ----------
     canvas : Canvas
         The canvas.
     points : iterable of Point
-        Positions, m. Drafts may contain any numbers.
+        Positions, m. Those of an unfinished map may be infinite or nan.
 
     Returns
     -------
     (k, 2) array
-        Positions, px. Points without a position, such as the center of an infinite box, are far away.
+        Positions, px. A nan, such as the center of an infinite box, becomes a pixel far outside the window.
     """
     coordinates = np.array(list(points), dtype=float).reshape(-1, 2)
     return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-MAX_PIXEL)
 
 
 def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: float) -> None:
-    """Draw a ring at a pixel; radius and width in px at scale 1."""
+    """Draw a ring centered at a pixel; radius and line width in px at scale 1."""
     sprite = partial(sprites.render_ring, radius * canvas.scale, color, width * canvas.scale)
     canvas.draw_sprite(sprite, at)
 
@@ -93,7 +93,7 @@ def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: flo
 def draw_disc(
     canvas: Canvas, at: Point, radius: float, colors: DiscColors, *, rim: float, text: str = ""
 ) -> None:
-    """Draw a disc with a text at a pixel; radius and width of the rim in px at scale 1."""
+    """Draw a disc with a text, centered at a pixel; radius and rim width in px at scale 1."""
     scale = canvas.scale
     sprite = partial(
         sprites.render_disc,
@@ -108,7 +108,7 @@ def draw_disc(
 
 
 def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], color: Color, dash: float = 4.0) -> None:
-    """Draw a dashed line through pixels."""
+    """Draw a dashed line through a sequence of pixels."""
     for start, end in pairwise(points):
         canvas.draw_dashed_line(start, end, color, canvas.scale_width(1.0), dash=dash)
 
@@ -125,9 +125,9 @@ def draw_handles(
     handles : sequence of Handle
         The handles.
     selected : frozenset of Vertex
-        Selected vertices, whose handles are filled.
+        Selected vertices. Their handles are filled.
     hovered : Handle or None
-        Handle under the cursor, which is drawn larger.
+        Handle under the cursor. It is drawn larger.
     """
     floor = canvas.theme.background
     accent = canvas.theme.final
@@ -150,6 +150,7 @@ def draw_handles(
 def _draw_square(
     canvas: Canvas, at: Point, fill: Color, *, is_large: bool = False, is_rounded: bool = False
 ) -> None:
+    """Draw the square of a handle, centered at a pixel; that of a vertex has rounded corners."""
     half = HANDLE_HALF_PX * canvas.scale
     if is_large:
         half *= LARGE_HANDLE_FACTOR
@@ -163,7 +164,7 @@ def _draw_square(
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
-    """Draw the guides of a snap with their labels."""
+    """Draw the guides of a snap as dashed lines, and write what the cursor has snapped to next to it."""
     color = canvas.theme.forces["repulsion_obstacle"]
     labels: list[str] = []
     end: Point | None = None
@@ -184,7 +185,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
 def draw_start(
     canvas: Canvas, start: StartSpec, label: str, *, is_selected: bool, dot_scale: float = 1.0
 ) -> None:
-    """Draw a start with a label; starts anywhere in the free space are not drawn.
+    """Draw a start with a label; nothing for a start that is uniform over the free space.
 
     Parameters
     ----------
@@ -193,11 +194,11 @@ def draw_start(
     start : StartSpec
         The start.
     label : str
-        Text next to it; may be empty.
+        Text next to the start; may be empty.
     is_selected : bool
-        Whether its lines are thicker.
+        Whether the start is selected, which makes its lines thicker.
     dot_scale : float
-        Factor of the radius of positions.
+        Factor by which the rings at the positions are enlarged.
     """
     theme = canvas.theme
     scale = canvas.scale
@@ -235,12 +236,13 @@ def _draw_circle(canvas: Canvas, center: Point, radius: float, width: float) -> 
 
 
 def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
-    """Draw the path of a moving obstacle with an arrow on each leg."""
+    """Draw the path of a moving obstacle, with an arrow on each leg and a dot at each waypoint."""
     points = to_pixels(canvas, path.points)
     legs = list(pairwise(points))
     if path.repeat == "loop" and len(points) > 2:
         legs.append((points[-1], points[0]))
     for number, (start, end) in enumerate(legs):
+        # The leg of a loop from the last waypoint back to the first one.
         is_closing = number == len(points) - 1
         width = canvas.scale_width(1.0 if is_closing else 1.6)
         canvas.draw_dashed_line(start.tolist(), end.tolist(), color, width, dash=4.0)
@@ -250,7 +252,7 @@ def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
 
 
 def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
-    """Draw an arrow in the middle of a leg, unless it is too short."""
+    """Draw an arrow in the middle of a leg from start to end, px, unless the leg is too short."""
     scale = canvas.scale
     length = float(np.hypot(*(end - start)))
     if length < ARROW_MIN_LEG_PX * scale:
@@ -264,7 +266,7 @@ def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
 
 
 def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
-    """Draw a translucent obstacle: one that is being drawn, or is shown moving."""
+    """Draw a translucent obstacle: one that is being drawn, or one that is shown in motion."""
     accent = canvas.theme.final
     fill = (*mix(canvas.theme.obstacle, accent, 0.35), 130)
     for ring in build_outline(geometry).rings:
@@ -280,7 +282,7 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
 
 
 def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -> None:
-    """Draw the state of a tool; `cursor` is the position of the cursor, px."""
+    """Draw the preview of a tool; its label is next to the cursor, px."""
     floor = canvas.theme.background
     accent = canvas.theme.final
     for shape in state.shapes:
@@ -306,6 +308,7 @@ def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
 
 
 def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
+    """Draw the line that is being drawn, with its vertices, closing edge and lengths."""
     accent = canvas.theme.final
     line = to_pixels(canvas, state.line)
     if len(line) > 1:
@@ -319,7 +322,7 @@ def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
-    """Write the length of each edge next to it, except for the last edge, which follows the cursor."""
+    """Write its length above each edge of a line, except for the last edge, which follows the cursor."""
     color = mix(canvas.theme.background, canvas.theme.ink, 0.85)
     size = canvas.theme.small_text
     for start, end in list(pairwise(line[:-1]))[-MAX_EDGE_LABELS:]:
@@ -340,6 +343,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
 
 
 def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects_touched: bool) -> None:
+    """Draw the selection box between two corners, m; dashed if it selects what it touches."""
     ends = to_pixels(canvas, corners)
     low = ends.min(axis=0)
     high = ends.max(axis=0)
@@ -360,7 +364,7 @@ def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects
 
 
 def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
-    """Write a value that is being typed next to a pixel."""
+    """Draw a box next to a pixel with the value that is being typed, and the hint to press Enter."""
     theme = canvas.theme
     scale = canvas.scale
     surface = canvas.surface
@@ -381,7 +385,7 @@ def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap: in the color of errors if robots of a radius, m, do not pass."""
+    """Draw the narrowest gap, in the color of errors if robots with a radius, m, do not fit through it."""
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.start
     if gap.width < 2 * radius:
@@ -402,9 +406,10 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     gap : Gap
         The gap.
     radius : float
-        Radius of a robot, with whose diameter the width is compared, m.
+        Radius of a robot, m. The label compares the width with the diameter.
     cursor : Point, optional
-        Position of the cursor, px, if a tool writes next to it; the label is moved above that.
+        Position of the cursor, px, if a tool has a label next to it. The label of the gap is moved above that
+        label if they would overlap.
     """
     start, end, across = _locate_gap(canvas, gap)
     scale = canvas.scale
@@ -426,7 +431,7 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
 
 
 def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
-    """Return both ends of a gap, px, and a vector of 5 px at scale 1 across it."""
+    """Return the ends of a gap, px, and a vector perpendicular to it with a length of 5 px at scale 1."""
     start, end = canvas.camera.to_pixels(np.array(gap.between))
     length = max(float(np.hypot(*(end - start))), MIN_LENGTH_PX)
     normal = np.array([end[1] - start[1], start[0] - end[0]]) / length
@@ -434,7 +439,7 @@ def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
 
 
 def place_badges(problems: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
-    """Return the problems that have a position, with the centers of their badges, px."""
+    """Return each problem that has a position, with the center of its badge, px; at most `MAX_BADGES`."""
     badges = []
     for problem in problems[:MAX_BADGES]:
         if problem.geometry is not None and not problem.geometry.is_empty:
@@ -451,12 +456,16 @@ def draw_problems(
     chosen: Problem | None,
     hovered: Problem | None,
 ) -> None:
-    """Draw problems: their outlines and badges, and the messages of the chosen and the hovered one."""
+    """Draw the outlines and badges of problems, and the messages of the chosen and the hovered one.
+
+    Warnings have outlines only if chosen or hovered. A single error always has its message.
+    """
     noted = (chosen, hovered)
     for problem in problems[:MAX_BADGES]:
         if problem.geometry is not None and (problem.is_error or problem in noted):
             _draw_problem_outline(canvas, problem)
     badges = place_badges(problems, view)
+    # Earlier problems are drawn on top of later ones.
     for problem, (x, y) in reversed(badges):
         color = choose_problem_color(canvas.theme, is_error=problem.is_error)
         foot = y + STEM_PX * canvas.scale
@@ -484,7 +493,7 @@ def _draw_problem_outline(canvas: Canvas, problem: Problem) -> None:
 
 
 def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> None:
-    """Write a message next to its badge, or above it where the canvas is too narrow."""
+    """Write the message of a problem to the right of its badge, or above it if there is too little space."""
     x, y = badge
     scale = canvas.scale
     text_x = x + (BADGE_RADIUS_PX + 10) * scale
@@ -496,7 +505,7 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
 
 
 def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: bool = False) -> None:
-    """Draw the badge of a problem at a pixel."""
+    """Draw the badge of a problem, a disc with an exclamation mark, at a pixel."""
     theme = canvas.theme
     fill = choose_problem_color(theme, is_error=is_error)
     colors = DiscColors(fill, theme.background, mix(fill, theme.ink, 0.3))

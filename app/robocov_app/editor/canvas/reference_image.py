@@ -1,4 +1,4 @@
-"""The picture under the map."""
+"""The reference picture under the map."""
 
 from pathlib import Path
 
@@ -11,37 +11,37 @@ from robocov_app.editor.model.background import Background
 from robocov_app.render.camera import Camera
 from robocov_app.storage.regular_files import require_regular_file
 
-MAX_IMAGE_PX = 4096  # side to which larger pictures are reduced
-MAX_SHOWN_PX = 8192  # side of the magnified part that is drawn
-MIN_PIXELATED_FACTOR = 4.0  # magnification above which pixels are not smoothed
+MAX_IMAGE_PX = 4096  # larger pictures are reduced to this side length
+MAX_SHOWN_PX = 8192  # maximum side length of the scaled picture
+MIN_PIXELATED_FACTOR = 4.0  # from this magnification on, pixels are drawn as squares
 
 
 class ReferenceImage:
-    """Loads and draws the picture under a map, and keeps the latest one.
+    """Loads and draws the picture under a map; the latest picture is cached.
 
     Attributes
     ----------
     error : str
-        Why the picture cannot be shown; cleared when it has been reported.
+        Reason why the picture cannot be shown. The caller clears it after reporting it.
     """
 
     def __init__(self) -> None:
         self.error = ""
         self._path: Path | None = None
         self._picture: Surface | None = None
-        self._reduction = 1.0  # pixels of the file per pixel of the kept picture
+        self._reduction = 1.0  # pixels of the file per pixel of the cached picture
 
     def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
-        """Draw a picture.
+        """Draw a picture; nothing if it is hidden or cannot be loaded.
 
         Parameters
         ----------
         page : Surface
-            The page.
+            Surface to draw on.
         background : Background
             Position and opacity of the picture.
         folder : Path
-            Folder to which its path is relative.
+            Folder to which the path of the picture is relative.
         camera : Camera
             The view.
         clip : Rect
@@ -61,6 +61,7 @@ class ReferenceImage:
             page.blit(picture, position)
 
     def _load(self, path: Path) -> None:
+        """Load a picture unless it is the cached one; set `error` if that fails."""
         if path == self._path:
             return
         self._path = path
@@ -74,12 +75,13 @@ class ReferenceImage:
             picture.thumbnail((MAX_IMAGE_PX, MAX_IMAGE_PX))
             self._reduction = full.size[0] / picture.size[0]
             self._picture = pygame.image.frombytes(picture.tobytes(), picture.size, "RGB").convert()
-        except Exception as error:  # Decoders raise anything for broken pictures.
+        except Exception as error:  # Decoders raise all kinds of errors for broken pictures.
             self.error = f"the picture {path.name} cannot be shown: {error}"
 
     def _rotate(
         self, picture: Surface, background: Background, camera: Camera, factor: float
     ) -> tuple[Surface, Rect] | None:
+        """Rotate and scale the picture; return it with its box in the window, or None if it is too large."""
         if factor * max(picture.get_size()) > MAX_SHOWN_PX:
             return None
         rotated = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
@@ -90,7 +92,11 @@ class ReferenceImage:
     def _magnify(
         self, picture: Surface, background: Background, camera: Camera, factor: float, clip: Rect
     ) -> tuple[Surface, Rect] | None:
-        """Magnify the visible part only, because the whole picture may become huge."""
+        """Scale the visible part of the picture; return it with its position, or None if nothing is visible.
+
+        The whole picture could be too large after scaling.
+        """
+        # Corner 3 is the upper left one.
         left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
         width, height = picture.get_size()
         first_x = max(int((clip.left - left) / factor) - 1, 0)
@@ -111,7 +117,7 @@ class ReferenceImage:
 
 
 def _convert_to_rgb(picture: Image.Image) -> Image.Image:
-    """Return a picture in RGB, with transparent parts on white and gray values stretched to full range."""
+    """Convert a picture to RGB: transparency becomes white; 16-bit and float values fill the whole range."""
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         transparent = picture.convert("RGBA")
         white = Image.new("RGBA", transparent.size, "white")

@@ -1,4 +1,4 @@
-"""The state of the editor that is drawn in one frame."""
+"""Everything about the editor that is drawn in one frame."""
 
 from dataclasses import dataclass
 
@@ -33,15 +33,15 @@ class EditorScene:
     state : EditorDrawState
         Draw state of the tool.
     saved : Sketch
-        The map without the present drag.
+        The map without the changes of the current drag.
     sketch : Sketch
         The map as it is displayed.
     selection : Selection
         The selection as it is displayed.
     lifted : frozenset of int
-        Keys of obstacles that are dragged, and not drawn on the sheet.
+        Keys of obstacles that are dragged or changed, and therefore not drawn on the sheet.
     team : Team or None
-        The team at a start.
+        The team that is shown at a start.
     hovered : Problem or None
         Problem under the cursor.
     cursor : Point or None
@@ -63,5 +63,5 @@ class EditorScene:
 
     @property
     def measurement(self) -> Measurement | None:
-        """The measurement, if passages that are too narrow are shown."""
+        """Measurement of the map; None if passages that are too narrow are not shown."""
         return self.editor.shown_measurement

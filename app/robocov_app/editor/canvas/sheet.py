@@ -1,4 +1,4 @@
-"""The sheet: floor, picture, grid, obstacles and boundary on one page; only changes are redrawn."""
+"""The sheet: floor, picture, grid, obstacles and boundary on one cached page; only changes are redrawn."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -26,30 +26,30 @@ from robocov_app.render.surface_cache import LatestValue
 
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
-MIN_COARSE_GRID_PX = 55.0  # between the strong lines
+MIN_COARSE_GRID_PX = 55.0  # between the coarse lines
 REDRAW_MARGIN_PX = 6  # around changed objects
-NAME_MARGIN_PX = 8.0  # that a name leaves free on both sides together
+NAME_MARGIN_PX = 8.0  # free space to the left and right of a name, both together
 
-PIXEL_BIAS = 1e-4  # shift of the camera: round coordinates would otherwise lie between two pixels
-MAX_SCROLL_ERROR_PX = 0.02  # of a camera that has moved by whole pixels
-MAX_REDRAWN_FRACTION = 0.5  # of the page; if more has changed, the whole page is redrawn
-MAX_BOXES = 40  # more boxes are redrawn as one
-MIN_LABEL_CHARACTERS = 6  # of a shortened name
-OBSTACLE_OPACITY = 0.62  # over a picture
+PIXEL_BIAS = 1e-4  # small shift of the camera, because round coordinates would lie exactly between two pixels
+MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pixels for scrolling
+MAX_REDRAWN_FRACTION = 0.5  # of the page; if more has changed, all of it is redrawn
+MAX_BOXES = 40  # more boxes are merged into one
+MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
+OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
 _TRANSPARENT = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class _PageState:
-    """Content of the page that was drawn last."""
+    """What the cached page shows."""
 
-    look: tuple[object, ...]  # everything but the position of the camera and the obstacles
+    look: tuple[object, ...]  # everything except for the obstacles and the position of the camera
     camera: Camera
     items: dict[int, Item]
 
 
 class Sheet:
-    """Draws the sheet on a page, and keeps the page.
+    """Draws the sheet on a page, which is cached and updated.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Sheet:
         self._hull_excess: LatestValue[shapely.Geometry] = LatestValue()
 
     def draw(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
-        """Draw the sheet.
+        """Draw the sheet; redraw only what has changed since the last call.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Sheet:
         Returns
         -------
         Surface
-            The page, as large as the window; it is drawn on again by the next call.
+            The cached page, as large as the window. The next call draws on it again.
         """
         left, top, width, height = view.camera.view
         camera = view.camera.with_view((left + PIXEL_BIAS, top + PIXEL_BIAS, width, height))
@@ -97,7 +97,7 @@ class Sheet:
         return self._page
 
     def _find_changes(self, view: View, before: _PageState | None, after: _PageState) -> list[Rect]:
-        """Return the boxes to redraw, px, after moving the page with the camera."""
+        """Scroll the page if the camera has moved, and return the boxes that must be redrawn, px."""
         whole = view.clip
         if before is None or before.look != after.look:
             return [whole]
@@ -120,12 +120,13 @@ class Sheet:
         return _merge_boxes(visible)
 
     def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
-        """Move the page with the camera.
+        """Scroll the page from the view of a previous camera to the current view.
 
         Returns
         -------
         list of Rect or None
-            Parts that have come into sight, px; None if the page cannot be moved by whole pixels.
+            Parts of the page that have become visible, px; None if the page cannot be scrolled, because the
+            camera has moved too far or by a fraction of a pixel.
         """
         shift = np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))
         dx, dy = shift.tolist()
@@ -151,7 +152,7 @@ class Sheet:
         return boxes
 
     def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
-        """Paint a box of the page, px."""
+        """Paint everything inside a box of the page, px, from bottom to top."""
         page.set_clip(box)
         theme = view.theme
         canvas = view.build_canvas(page)
@@ -184,7 +185,7 @@ class Sheet:
         page.set_clip(None)
 
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw areas outside the boundary that count as free for the robots, as they lie in its hull."""
+        """Draw the areas between the boundary and its convex hull, which robots consider to be free."""
         theme = canvas.theme
         excess = self._hull_excess.get(sketch.boundary, None, lambda: compute_hull_excess(sketch))
         fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
@@ -195,7 +196,7 @@ class Sheet:
                 canvas.draw_outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
 
     def _draw_translucent_items(self, canvas: Canvas, items: list[Item], box: Rect) -> None:
-        """Draw obstacles so that the picture under them stays visible."""
+        """Draw translucent obstacles, so that the picture under them stays visible."""
         layer = Surface(box.size, pygame.SRCALPHA, 32)
         left, top, width, height = canvas.camera.view
         camera = canvas.camera.with_view((left - box.x, top - box.y, width, height))
@@ -206,18 +207,20 @@ class Sheet:
     def draw_items(
         self, canvas: Canvas, items: list[Item], fill: Color | None = None, edge: Color | None = None
     ) -> None:
-        """Draw obstacles, by default in the colors of the theme."""
+        """Draw obstacles, by default in the colors of the theme; parts without area have the error color."""
         fill = fill or canvas.theme.obstacle
         edge = edge or canvas.theme.obstacle_edge
         outlines = [self.outlines.get(item) for item in items]
         rings = [ring for outline in outlines for ring in outline.rings]
         if rings:
+            # All rings are drawn together, which is much faster; `ends` divides their corners.
             ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
             corners = canvas.camera.to_pixels(np.concatenate(rings))
             fills: list[Color | None] = []
             for outline in outlines:
                 ring_fill: Color | None = fill
                 if outline.has_holes:
+                    # These are filled one by one below.
                     ring_fill = None
                 fills += [ring_fill] * len(outline.rings)
             canvas.draw_polygons(corners, ends, fills)
@@ -234,7 +237,7 @@ class Sheet:
                     )
 
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
-        """Write the names of obstacles that are large enough."""
+        """Write the names of obstacles, shortened if necessary; none on obstacles that are too small."""
         size = canvas.scale_text_size(canvas.theme.small_text)
         color = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
         zoom = canvas.camera.zoom
@@ -254,7 +257,7 @@ class Sheet:
 
 
 def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
-    """Return everything on which the page depends, apart from obstacles and the position of the camera."""
+    """Return all that the page depends on, except for obstacles and camera position; for comparison."""
     return (
         view.camera.zoom,
         view.camera.view,
@@ -271,14 +274,14 @@ def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
 
 
 def _list_changed_items(before: dict[int, Item], after: dict[int, Item]) -> list[Item]:
-    """Return obstacles that have gone or changed, as they were, and those that are new, as they are."""
+    """Return the old version of removed and changed obstacles, and the new one of added and changed ones."""
     changed = [item for key, item in before.items() if after.get(key) is not item]
     changed += [item for key, item in after.items() if before.get(key) is not item]
     return changed
 
 
 def _compute_visible_box(view: View, box: Rect) -> Box:
-    """Return the part of the map, m, that a box of the page shows, with a margin."""
+    """Return the part of the map that is visible in a box of the page, px, with a margin, m."""
     ends = np.array([box.bottomleft, box.topright], dtype=float)
     (low_x, low_y), (high_x, high_y) = view.camera.to_world(ends).tolist()
     margin = REDRAW_MARGIN_PX * view.scale / view.camera.zoom
@@ -286,7 +289,7 @@ def _compute_visible_box(view: View, box: Rect) -> Box:
 
 
 def compute_hull_excess(sketch: Sketch) -> shapely.Geometry:
-    """Return the part of the boundary's convex hull that lies outside the boundary."""
+    """Return the convex hull of the boundary without its inside; empty if the boundary is invalid."""
     if not sketch.boundary or len(sketch.boundary) <= 2:
         return shapely.Polygon()
     polygon = shapely.Polygon(sketch.boundary)
@@ -313,6 +316,7 @@ def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) ->
 
 
 def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: Color) -> None:
+    """Draw the grid lines with a spacing, m, that cross a box of the page."""
     low_x, low_y, high_x, high_y = view.camera.compute_visible_bounds()
     width = max(1, round(view.scale))
     xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
@@ -326,7 +330,7 @@ def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: C
 
 
 def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
-    """Compute the spacings of the grid's fine and strong lines.
+    """Compute the spacings of the fine and coarse grid lines.
 
     Parameters
     ----------
@@ -340,11 +344,12 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
     Returns
     -------
     fine, coarse : float
-        Multiples of the grid, m, that are far enough apart on the screen.
+        Spacings, m: multiples of the grid spacing that are far enough apart on the screen.
     """
     fine = grid
     min_fine = MIN_FINE_GRID_PX * scale / zoom
     if fine < min_fine:
+        # Steps are 1, 2, 5, 10, ...; 2.5001 times a step, rounded down, is the next larger one.
         factor = round_down(min_fine / grid)
         if factor < min_fine / grid:
             factor = round_down(2.5001 * factor)
@@ -358,7 +363,7 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
 
 
 def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
-    """Fill an obstacle on a page of its own, so that what lies below is visible through the holes."""
+    """Fill an obstacle on a separate surface, so that whatever is below is visible through its holes."""
     clip = canvas.surface.get_clip()
     page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
     for ring, is_outer in zip(outline.rings, outline.outer, strict=True):
@@ -371,17 +376,30 @@ def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
 
 
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -> None:
-    """Draw closed lines; the (k, 2) corners, px, of all lines follow each other, and `ends` divides them."""
+    """Draw several closed rings.
+
+    Parameters
+    ----------
+    canvas : Canvas
+        The canvas.
+    corners : (k, 2) array, px
+        Corners of all rings, one ring after the other.
+    ends : list of int
+        Index after the last corner of each ring.
+    color : tuple of int
+        Color of the lines.
+    """
     width = canvas.scale_width(canvas.theme.line)
     if width == 1 and is_within_limit(corners):
         for start, end in pairwise((0, *ends)):
             if end - start > 1:
                 canvas.draw_thin_path(corners[start:end].tolist(), color, is_closed=True)
         return
+    # Index of the next corner in the ring: after the last corner, the first one.
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
     edges = np.hstack([corners, corners[following]])
-    # Edges outside the page would only take time.
+    # Skipping edges outside the page saves time.
     clip = canvas.surface.get_clip()
     low = np.minimum(edges[:, :2], edges[:, 2:])
     high = np.maximum(edges[:, :2], edges[:, 2:])
@@ -391,7 +409,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
 
 
 def _merge_boxes(boxes: list[Rect]) -> list[Rect]:
-    """Return boxes that cover the same area without overlaps; of many boxes only the one around all."""
+    """Merge boxes that overlap; if there are too many boxes, merge all of them."""
     if len(boxes) > MAX_BOXES:
         boxes = [boxes[0].unionall(boxes[1:])]
     merged: list[Rect] = []

@@ -19,7 +19,7 @@ MAX_RECT_PX = 30_000  # coordinates of rectangles are limited to this
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """View of the sheet.
+    """View of the sheet: everything that determines how a map is drawn.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class View:
     size : tuple of int
         Width and height of the window, px.
     shown : frozenset of str
-        Layers that are shown.
+        Names of the visible layers.
     grid : float
         Spacing of the grid, m.
     folder : Path
@@ -53,11 +53,11 @@ class View:
         return Rect([round(value) for value in self.camera.view])
 
     def build_canvas(self, surface: Surface) -> Canvas:
-        """Return a canvas that draws on a surface."""
+        """Build a canvas that draws on a surface in this view."""
         return Canvas(surface, self.camera, self.theme, self.scale, choose_robot_hues(0))
 
     def build_page(self) -> Canvas:
-        """Return a transparent canvas as large as the window."""
+        """Build a canvas with a transparent surface as large as the window."""
         return self.build_canvas(Surface(self.size, pygame.SRCALPHA, 32))
 
 
@@ -69,7 +69,7 @@ def choose_outside_color(theme: Theme) -> Color:
 
 
 def compute_pixel_box(camera: Camera, bounds: Iterable[float]) -> Rect:
-    """Return the pixels covered by a box, m, with a margin of one or two pixels."""
+    """Return the box of pixels that covers bounds, m, with a margin of one or two pixels."""
     low_x, low_y, high_x, high_y = bounds
     ends = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     (left, top), (right, bottom) = np.clip(ends, -MAX_RECT_PX, MAX_RECT_PX).tolist()

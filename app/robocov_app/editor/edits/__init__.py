@@ -1,1 +1,1 @@
-"""Edits: pure functions from a sketch to a `Change`; a MapError, one sentence, where it cannot be done."""
+"""Edits: pure functions that take a sketch and return a `Change`, or raise a MapError if impossible."""

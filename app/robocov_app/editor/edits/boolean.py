@@ -1,4 +1,4 @@
-"""Edits that combine obstacles; results keep the position, name and note of the lowest obstacle."""
+"""Edits that combine obstacles. The result keeps the stacking position, name and note of the lowest one."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from robocov_app.editor.model.geometry import extract_polygons, round_length
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
-MITRE_LIMIT = 1.5  # sharper corners than right angles are cut off when obstacles grow
+MITRE_LIMIT = 1.5  # when obstacles grow, corners sharper than right angles are cut off
 _difference = partial(shapely.difference, grid_size=GRID_M)
 _intersection = partial(shapely.intersection, grid_size=GRID_M)
 
@@ -27,7 +27,7 @@ def unite(sketch: Sketch, selection: Selection) -> Change:
 
 
 def subtract(sketch: Sketch, selection: Selection) -> Change:
-    """Cut the upper ones of the selected obstacles out of the lowest."""
+    """Subtract the other selected obstacles from the lowest one."""
     items = _require_solid_items(sketch, selection, "subtract")
     lowest = items[0]
     uppers = items[1:]
@@ -38,7 +38,7 @@ def subtract(sketch: Sketch, selection: Selection) -> Change:
 
 
 def intersect(sketch: Sketch, selection: Selection) -> Change:
-    """Keep the common area of the selected obstacles."""
+    """Replace the selected obstacles by their common area."""
     items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
     description = f"{format_count(len(items), 'obstacle')} intersected"
@@ -46,7 +46,7 @@ def intersect(sketch: Sketch, selection: Selection) -> Change:
 
 
 def divide(sketch: Sketch, selection: Selection) -> Change:
-    """Divide the lowest of the selected obstacles into the parts outside and inside the upper ones."""
+    """Divide the lowest selected obstacle into its parts outside and inside the others, which are removed."""
     items = _require_solid_items(sketch, selection, "divide")
     lowest = items[0].geometry
     uppers = _unite_geometries(items[1:])
@@ -55,7 +55,7 @@ def divide(sketch: Sketch, selection: Selection) -> Change:
 
 
 def offset(sketch: Sketch, selection: Selection, distance: float) -> Change:
-    """Grow the selected obstacles on every side by a distance, m; a negative one shrinks them."""
+    """Grow the selected obstacles on all sides by a distance, m; a negative distance shrinks them."""
     is_possible = MIN_SIZE_M <= abs(distance) <= MAX_SIZE_M
     require(is_possible, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
     require(selection.items, "select obstacles first")
@@ -70,7 +70,7 @@ def offset(sketch: Sketch, selection: Selection, distance: float) -> Change:
 
 
 def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
-    """Return an obstacle grown by a distance, m; a circle stays one."""
+    """Return an obstacle grown by a distance, m, as any number of parts; a circle remains a circle."""
     if isinstance(item.shape, CircleObstacle):
         radius = round_length(item.shape.radius + distance)
         if radius < MIN_SIZE_M:
@@ -81,7 +81,7 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
 
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Cut off what sticks out of the boundary: of the selected obstacles, or of all."""
+    """Cut off the parts of the selected obstacles outside the boundary, or of all if none is selected."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be valid first")
     inside = shapely.Polygon(sketch.boundary)
@@ -99,7 +99,10 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
-    """Make crossing outlines valid: the selected ones, or all; the boundary keeps its largest part."""
+    """Repair self-intersecting outlines: the selected ones or, without a selection, all.
+
+    An obstacle may become several obstacles. Only the largest part of a boundary is kept.
+    """
     is_all = not selection.items and not selection.boundary
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:
@@ -124,7 +127,7 @@ def _is_broken(shape: Obstacle) -> bool:
 
 
 def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
-    """Return the largest part of a broken boundary; the same boundary unless it is broken."""
+    """Return the largest part of a self-intersecting boundary, or the boundary itself if it is valid."""
     boundary = sketch.boundary
     if boundary is None or len(boundary) < 3 or shapely.Polygon(boundary).is_valid:
         return boundary
@@ -139,7 +142,10 @@ def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:
 
 
 def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
-    """Return the selected obstacles, the lowest first; raise MapError unless they can be combined."""
+    """Return the selected obstacles, the lowest first.
+
+    Raise MapError if there are fewer than two, or if one has no area.
+    """
     items = selection.list_items(sketch)
     require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
@@ -155,7 +161,7 @@ def _replace_items(
     description: str,
     error: str = "nothing is left",
 ) -> Change:
-    """Put the polygons of geometries in place of obstacles; raise MapError if there are none."""
+    """Replace obstacles by the polygons of geometries; raise MapError if there are no polygons."""
     lowest = items[0]
     polygons: list[Obstacle] = []
     for part in parts:

@@ -1,4 +1,4 @@
-"""Copy and paste as JSON text: parts of maps, whole maps, obstacles, and lists of obstacles or points."""
+"""Copy and paste as JSON text: parts of maps, whole maps, single obstacles, lists of obstacles or points."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,8 +15,8 @@ from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document
 
-FORMAT = "robocov-clipboard"  # of copied text
-SOURCE = "clipboard"  # in error messages
+FORMAT = "robocov-clipboard"  # "format" of copied text
+SOURCE = "clipboard"  # name of the text in error messages
 
 
 def copy_selection(sketch: Sketch, selection: Selection) -> str:
@@ -45,19 +45,19 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
     text : str
         The copied text.
     position : Point, optional
-        New center of the pasted objects, m; by default they keep their positions.
+        New center of the pasted objects, m; by default, they keep their positions.
     grid : float, optional
-        The displacement is a multiple of this, m.
+        Grid spacing, m: the objects are moved by multiples of it.
 
     Returns
     -------
     Change
-        The pasted objects are selected. A boundary is pasted if the map has none.
+        The map with the pasted objects, which are selected. A boundary is pasted only if the map has none.
 
     Raises
     ------
     MapError
-        If the text contains no part of a map.
+        If the text is not a map, a part of a map, or a list of obstacles or points.
     """
     part = _parse(text)
     shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]
@@ -65,7 +65,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
     sets_boundary = has_boundary and sketch.boundary is None
     is_boundary_alone = has_boundary and not shapes and not part.starts
     if part.boundary is not None and is_boundary_alone and not sets_boundary:
-        # A second boundary becomes an obstacle.
+        # If the map has a boundary already, a copied boundary becomes an obstacle.
         shapes.append((PolygonObstacle(part.boundary), ""))
     pasted, added = create.add_objects(sketch, shapes, part.starts)
     selection = replace(added, boundary=sets_boundary)
@@ -73,7 +73,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
     if sets_boundary:
         pasted = replace(pasted, boundary=part.boundary)
     dx, dy = _compute_displacement(pasted, selection, position, grid)
-    # Even without a displacement, moving rounds coordinates and checks that they are within reach.
+    # Even if the displacement is 0, this rounds the coordinates and checks that they are in range.
     moved = transform.move(pasted, selection, dx, dy).sketch
     return Change(moved, selection, f"{selection.describe(moved)} pasted")
 
@@ -81,7 +81,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
 def _compute_displacement(
     sketch: Sketch, selection: Selection, position: Point | None, grid: float | None
 ) -> tuple[float, float]:
-    """Return the displacement, m, that brings the center of a selection to a position."""
+    """Return the displacement, m, that moves the center of a selection to a position, rounded to the grid."""
     bounds = transform.compute_bounds(sketch, selection)
     if position is None or bounds is None:
         return 0.0, 0.0
@@ -103,7 +103,10 @@ def _parse(text: str) -> Sketch:
 
 
 def _build_document(value: Any) -> Any:
-    """Return the document of a map: as copied, or around an obstacle, a list of obstacles, or of points."""
+    """Return a map document for parsed JSON.
+
+    The JSON is a copied part of a map, a map, an obstacle, a list of obstacles, or the corners of a polygon.
+    """
     if isinstance(value, dict) and "format" in value:
         if value["format"] == FORMAT:
             return {**value, "format": HEADER["format"]}

@@ -1,4 +1,4 @@
-"""Edits that add obstacles, starts and the boundary, and open doors in walls."""
+"""Edits that add obstacles, starts or a boundary, and that open doors in walls."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -26,18 +26,18 @@ from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch
 
-MIN_DRAWN_LENGTH_M = 0.02  # shorter strokes are drawn by accident
+MIN_DRAWN_LENGTH_M = 0.02  # anything smaller was drawn by accident
 MAX_TEXT_CHARACTERS = 10_000
 
 
 def add_obstacle(sketch: Sketch, shape: Obstacle) -> Change:
-    """Add an obstacle on top, and select it."""
+    """Add an obstacle on top of the others, and select it."""
     added, keys = sketch.with_obstacles([shape])
     return Change(added, Selection.of(*keys), f"{added.display_name(keys[0])} drawn")
 
 
 def add_polygon(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Add a polygon; it may cross itself, which validation reports."""
+    """Add a polygon; if it intersects itself, validation will report that."""
     return add_obstacle(sketch, env.PolygonObstacle(_build_outline(points, "a polygon")))
 
 
@@ -56,7 +56,7 @@ def add_circle(sketch: Sketch, center: Point, radius: float) -> Change:
 
 
 def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
-    """Add a wall along a line, with a width, m."""
+    """Add a wall along a line of points, with a width, m."""
     line = drop_repeated_points(round_ring(points), closed=False)
     if len(line) < 2 or shapely.LineString(line).length < MIN_DRAWN_LENGTH_M:
         raise MapError("a wall needs two points that are apart")
@@ -66,7 +66,7 @@ def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
 
 
 def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Replace the boundary, and select it."""
+    """Set or replace the boundary, and select it."""
     description = "boundary drawn again"
     if sketch.boundary is None:
         description = "boundary drawn"
@@ -75,19 +75,19 @@ def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 
 def add_disc_start(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Add a start that is a disc with a center and radius, m."""
+    """Add a disc-shaped start with a center and radius, m."""
     return _add_start(sketch, env.DiscStart(check_point(center), _check_radius(radius, "a start")))
 
 
 def add_points_start(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Add a start with a position, m, for each robot; repeated positions are dropped."""
+    """Add a start with one position for each robot, m; repeated positions are dropped."""
     positions = tuple(dict.fromkeys(round_ring(points)))
     require(positions, "a start needs at least one position")
     return _add_start(sketch, env.PointsStart(positions))
 
 
 def add_uniform_start(sketch: Sketch) -> Change:
-    """Add a start anywhere in the free space."""
+    """Add a start with random positions in the free space."""
     return _add_start(sketch, env.UniformStart())
 
 
@@ -108,12 +108,12 @@ def add_objects(
     shapes : iterable of Obstacle and str
         Obstacles with their notes.
     starts : iterable of str and StartSpec
-        Starts with their names; names that are taken get a number.
+        Names and starts; a number is added to names that are taken.
 
     Returns
     -------
     sketch : Sketch
-        The map with the objects.
+        The map with the added objects.
     selection : Selection
         The added objects.
     """
@@ -127,7 +127,7 @@ def add_objects(
 
 
 def find_free_name(sketch: Sketch, name: str) -> str:
-    """Return a name that no start has: the given one, or with a number after it, such as "start 2"."""
+    """Return a name that no start has: the given name, or the name with a number, such as "start 2"."""
     taken = dict(sketch.starts)
     if name not in taken:
         return name
@@ -136,7 +136,7 @@ def find_free_name(sketch: Sketch, name: str) -> str:
 
 
 def clean_label(name: str) -> str:
-    """Return a name with single blanks; raise MapError if it is too long or has control characters."""
+    """Return a name with each run of blanks replaced by one; raise MapError if the name is invalid."""
     name = clean_text(" ".join(name.split()), "a name", MAX_LABEL_CHARACTERS)
     is_printable = all(ord(char) >= 32 and ord(char) != 127 for char in name)
     require(is_printable, "a name is text on one line")
@@ -144,12 +144,12 @@ def clean_label(name: str) -> str:
 
 
 def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str:
-    """Return a text without surrounding blanks; raise MapError if it is too long.
+    """Return a text without leading and trailing blanks; raise MapError if it is too long.
 
     Parameters
     ----------
     text : str
-        The text. Surrogates, which no file can contain, are dropped.
+        The text. Surrogates are dropped, because they cannot be written to files.
     label : str
         Name of the text for the error message.
     maximum : int
@@ -182,7 +182,7 @@ def find_wall(sketch: Sketch, point: Point, reach: float) -> int | None:
 
 
 def compute_door_ends(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
-    """Return both ends of a door.
+    """Compute both ends of a door in a wall, m.
 
     Parameters
     ----------
@@ -191,9 +191,9 @@ def compute_door_ends(sketch: Sketch, key: int, point: Point, width: float) -> t
     key : int
         Key of the wall.
     point : Point
-        The center of the door is as near to this as the wall allows, m.
+        Desired position of the door, m. Its center is as close to this point as the wall allows.
     width : float
-        Width of the door, m.
+        Width of the door, m; limited by the length of the wall.
     """
     line = _build_wall_line(sketch, key)
     start, end = _compute_door_span(line, point, min(width, line.length))
@@ -201,20 +201,20 @@ def compute_door_ends(sketch: Sketch, key: int, point: Point, width: float) -> t
 
 
 def project_on_wall(sketch: Sketch, key: int, point: Point) -> Point:
-    """Return the point of a wall's line that is nearest to a point, m."""
+    """Return the point on the center line of a wall that is nearest to a given point, m."""
     line = _build_wall_line(sketch, key)
     return _interpolate(line, line.project(shapely.Point(point)))
 
 
 def check_door_width(width: float) -> float:
-    """Return a width, m; raise MapError if no door can have it."""
+    """Return the width of a door, m, unchanged; raise MapError if it is out of range."""
     is_possible = MIN_DRAWN_LENGTH_M <= width <= MAX_SIZE_M
     require(is_possible, f"a door's width is at least {100 * MIN_DRAWN_LENGTH_M:g} cm")
     return width
 
 
 def open_door(sketch: Sketch, key: int, point: Point, width: float) -> Change:
-    """Open a door of a width, m, in a wall near a point."""
+    """Cut a door with a width, m, into a wall near a point."""
     line = _build_wall_line(sketch, key)
     if check_door_width(width) > line.length - MIN_SIZE_M:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
@@ -223,7 +223,7 @@ def open_door(sketch: Sketch, key: int, point: Point, width: float) -> Change:
 
 
 def open_wall(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
-    """Open a wall between the points of its line that are nearest to two points, m."""
+    """Cut an opening into a wall between two points, m, which are projected on its center line."""
     line = _build_wall_line(sketch, key)
     start, end = sorted(line.project(shapely.Point(point)) for point in (a, b))
     check_door_width(end - start)
@@ -231,7 +231,7 @@ def open_wall(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
 
 
 def _open_wall_between(sketch: Sketch, key: int, start: float, end: float) -> Change:
-    """Remove a wall between two lengths along its line, m; the pieces keep its name and note."""
+    """Remove the part of a wall between two distances along its line, m; the rest keeps name and note."""
     line = _build_wall_line(sketch, key)
     wall = sketch.get_item(key).shape
     assert isinstance(wall, env.WallObstacle)
@@ -253,7 +253,7 @@ def _build_wall_line(sketch: Sketch, key: int) -> shapely.LineString:
 
 
 def _compute_door_span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
-    """Return the lengths along a line, m, between which a door lies."""
+    """Return the distances along a line, m, at which a door near a point starts and ends."""
     nearest = line.project(shapely.Point(point))
     center = min(max(nearest, width / 2), line.length - width / 2)
     return center - width / 2, center + width / 2

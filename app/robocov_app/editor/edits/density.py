@@ -1,4 +1,4 @@
-"""Edits of the density: hot spots on a floor, or weighted areas on a background."""
+"""Edits of the density: hot spots on top of a floor value, or weighted areas on top of a background value."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,11 +22,11 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
-MIN_PEAK_WEIGHT = 1e-6  # of a hot spot, and of a density without features
+MIN_PEAK_WEIGHT = 1e-6  # minimum weight of a hot spot, and of a density without features
 
 
 def list_features(sketch: Sketch) -> tuple[Feature, ...]:
-    """Return the hot spots or areas; none if the density is of another kind."""
+    """Return the hot spots or areas of the density; empty if the density is of another kind."""
     if isinstance(sketch.density, Gaussians):
         return sketch.density.peaks
     if isinstance(sketch.density, WeightedPolygons):
@@ -35,15 +35,16 @@ def list_features(sketch: Sketch) -> tuple[Feature, ...]:
 
 
 def compute_spread(peak: Gaussian) -> float:
-    """Return the standard deviation of a hot spot, m; of an elliptic one, the geometric mean."""
+    """Return the standard deviation of a hot spot, m; if it is elliptic, the geometric mean of both axes."""
     if peak.sigma is not None:
         return peak.sigma
     (a, b), (c, d) = peak.matrix
+    # The determinant is the product of both variances.
     return float((a * d - b * c) ** 0.25)
 
 
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
-    """Add a hot spot with a center and standard deviation, m; without a density, to one of 1 everywhere."""
+    """Add a hot spot with a center and standard deviation, m; a map without density gets a floor of 1."""
     if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
         raise _build_kind_error(sketch.density, ", hot spots are not")
     peak = Gaussian(check_point(center), _check_weight(weight, MIN_PEAK_WEIGHT), _check_sigma(sigma))
@@ -51,7 +52,7 @@ def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Chan
 
 
 def add_area(sketch: Sketch, area: WeightedArea) -> Change:
-    """Add an area of constant weight on top; without a density, to one of 1 everywhere."""
+    """Add an area of constant weight on top of others; a map without density gets a background of 1."""
     if isinstance(sketch.density, Gaussians | Raster):
         raise _build_kind_error(sketch.density, ", areas are not")
     area = _check_area(replace(area, vertices=drop_repeated_points(round_ring(area.vertices))))
@@ -59,7 +60,7 @@ def add_area(sketch: Sketch, area: WeightedArea) -> Change:
 
 
 def convert_polygons(sketch: Sketch, selection: Selection, weight: float) -> Change:
-    """Turn the selected polygons into areas of a weight."""
+    """Turn the selected polygons into areas of the density with a given weight."""
     shapes = [item.shape for item in selection.list_items(sketch)]
     polygons = [shape for shape in shapes if isinstance(shape, PolygonObstacle)]
     are_polygons = len(polygons) == len(shapes) > 0
@@ -73,7 +74,7 @@ def convert_polygons(sketch: Sketch, selection: Selection, weight: float) -> Cha
 
 
 def remove_feature(sketch: Sketch, number: int) -> Change:
-    """Remove a feature; with the last one, the density."""
+    """Remove a feature by its number; removing the last one removes the density."""
     description = f"{_name_feature(_get_feature(sketch, number))} removed"
     remaining = [feature for k, feature in enumerate(list_features(sketch)) if k != number]
     if remaining:
@@ -88,7 +89,7 @@ def move_feature(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
 
 
 def resize_peak(sketch: Sketch, number: int, sigma: float) -> Change:
-    """Give a hot spot another standard deviation, m; an elliptic one keeps its shape."""
+    """Set the standard deviation of a hot spot, m; an elliptic one keeps its proportions."""
     peak = _get_feature(sketch, number)
     rounded = _check_sigma(sigma)
     if not isinstance(peak, Gaussian):
@@ -121,7 +122,7 @@ def set_weight(sketch: Sketch, number: int, weight: float) -> Change:
 
 
 def set_floor(sketch: Sketch, floor: float) -> Change:
-    """Set the density away from hot spots, or outside the areas."""
+    """Set the floor (the density far from hot spots) or the background (the density outside all areas)."""
     features = list_features(sketch)
     minimum = MIN_PEAK_WEIGHT
     if features:
@@ -137,7 +138,7 @@ def remove_density(sketch: Sketch) -> Change:
 
 
 def parse_weight(text: str) -> float:
-    """Return a typed weight; raise MapError if it is none."""
+    """Parse a weight that the user typed; raise MapError if it is invalid."""
     try:
         weight = float(text)
     except ValueError:
@@ -146,7 +147,7 @@ def parse_weight(text: str) -> float:
 
 
 def describe_density(density: Density | None) -> str:
-    """Describe a density in a few words: "2 hot spots, floor 0.5"."""
+    """Describe a density in a few words, for example "2 hot spots, floor 0.5"."""
     if density is None:
         return "none: all positions have the same weight"
     if isinstance(density, Gaussians):
@@ -167,8 +168,8 @@ def _build_kind_error(density: Density, reason: str = "") -> MapError:
 def _set_features(
     sketch: Sketch, features: Sequence[Feature], description: str, base: float | None = None
 ) -> Change:
-    """Return the change to other features, and to another value `base` where there are none."""
-    # Raises for densities of other kinds, even if their value is replaced.
+    """Return the change that replaces the features and, unless `base` is None, the floor or background."""
+    # This raises an error for other kinds of densities, even if the value is replaced below.
     present_base = _get_base(sketch.density)
     if base is None:
         base = present_base
@@ -185,7 +186,7 @@ def _set_features(
 
 
 def _get_base(density: Density | None) -> float:
-    """Return the value of a density where it has no features."""
+    """Return the floor or background of a density; raise MapError if the density is of another kind."""
     if density is None:
         return 1.0
     if isinstance(density, Gaussians):
@@ -218,7 +219,10 @@ def _name_feature(feature: Feature) -> str:
 
 
 def _check_area(area: WeightedArea) -> WeightedArea:
-    """Return an area; raise MapError if it covers nothing, crosses itself, or has no possible weight."""
+    """Return an area if it is valid.
+
+    Raise MapError if it is too small, intersects itself, or has an invalid weight.
+    """
     polygon = shapely.Polygon()
     if len(area.vertices) >= 3:
         polygon = shapely.Polygon(area.vertices, area.holes)

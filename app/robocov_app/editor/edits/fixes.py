@@ -1,4 +1,4 @@
-"""Fixes: for most kinds of problems, the change that solves them."""
+"""Automatic fixes: changes that solve most kinds of problems."""
 
 import math
 from collections.abc import Callable
@@ -32,18 +32,18 @@ from robocov_app.editor.model.selection import (
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, ProblemKind, find_problems
 
-BOUNDARY_MARGIN_M = 0.5  # between everything and a boundary drawn around it
+BOUNDARY_MARGIN_M = 0.5  # between a new boundary and the objects that it encloses
 DEFAULT_BOUNDS_M = (0.0, 0.0, 10.0, 10.0)
-FILL_OVERLAP_M = 0.002  # by which a filling overlaps the objects around it
+FILL_OVERLAP_M = 0.002  # by which a filled area overlaps the objects around it
 FILL_MITRE_LIMIT = 2.0
-SPARE_M = 1e-3  # by which a widened gap is wider than a robot
-START_DISTANCE_RADII = 2.01  # between the positions of two robots
+SPARE_M = 1e-3  # by which a widened gap exceeds the diameter of a robot
+START_DISTANCE_RADII = 2.01  # minimum distance between two robots at a start, in radii
 
-FindFix: TypeAlias = Callable[[Sketch, Any, float], Change]  # map, problem and radius of a robot in m
+FindFix: TypeAlias = Callable[[Sketch, Any, float], Change]  # takes map, problem and robot radius, m
 
 
 class _GapSide(NamedTuple):
-    """An obstacle at an end of a gap: the end, and the opposite end."""
+    """An obstacle at one end of a gap, with that end and the opposite one."""
 
     item: Item
     end: Point
@@ -57,9 +57,9 @@ class Fix:
     Attributes
     ----------
     title : str
-        Label of its button.
+        Label of the button.
     find : callable
-        Returns the change; raises MapError if there is none.
+        Returns the change; raises MapError if the problem cannot be solved.
     """
 
     title: str
@@ -81,7 +81,7 @@ def find_fix(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
     Returns
     -------
     Change or None
-        The change; None if there is none.
+        None if there is no fix for the problem.
     """
     fix = FIXES.get(problem.kind)
     if fix is None:
@@ -92,7 +92,7 @@ def find_fix(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
 
 
 def fill_unreachable(sketch: Sketch, radius: float) -> Change:
-    """Fill all of the free space that robots of a radius, m, cannot reach from its largest part."""
+    """Fill all free space that robots with a radius, m, cannot reach from the largest reachable part."""
     _, free = find_problems(sketch, radius)
     swept, untouched = compute_reach(free, radius)
     require(swept, f"no robot of radius {radius:g} m fits anywhere")
@@ -101,6 +101,7 @@ def fill_unreachable(sketch: Sketch, radius: float) -> Change:
 
 
 def _draw_boundary(sketch: Sketch, problem: Any, radius: float) -> Change:
+    """Draw a rectangular boundary around all objects, with a margin, or of a default size."""
     margin = BOUNDARY_MARGIN_M
     bounds = sketch.bounds
     if bounds is None:
@@ -125,7 +126,10 @@ def _fill_cut_off_area(sketch: Sketch, problem: Any, radius: float) -> Change:
 
 
 def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
-    """Make a gap wide enough: shorten a wall that ends at it, or move the smaller obstacle next to it."""
+    """Make a gap wide enough for a robot.
+
+    Shorten a wall that ends at the gap; if there is none, move the smallest obstacle next to it.
+    """
     gap: LineString = problem.geometry
     missing = 2.0 * radius + SPARE_M - gap.length
     sides = _list_gap_sides(sketch, gap)
@@ -145,7 +149,7 @@ def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
 
 
 def _list_gap_sides(sketch: Sketch, gap: LineString) -> list[_GapSide]:
-    """Return the obstacles at both ends of a gap that are not locked."""
+    """Return the obstacles at both ends of a gap, except for locked ones."""
     first = gap.coords[0]
     last = gap.coords[-1]
     sides: list[_GapSide] = []
@@ -157,7 +161,7 @@ def _list_gap_sides(sketch: Sketch, gap: LineString) -> list[_GapSide]:
 
 
 def _drop_obstacles_at_both_ends(sides: list[_GapSide]) -> list[_GapSide]:
-    """Return the sides whose obstacle is at one end of the gap only."""
+    """Return the sides whose obstacle touches only one end of the gap."""
     ends_by_key: dict[int, set[Point]] = {}
     for side in sides:
         ends_by_key.setdefault(side.item.key, set()).add(side.end)
@@ -165,10 +169,11 @@ def _drop_obstacles_at_both_ends(sides: list[_GapSide]) -> list[_GapSide]:
 
 
 def _shorten_wall(wall: Obstacle, end: Point, length: float) -> WallObstacle | None:
-    """Return a wall shortened by a length, m, at the end that is near a point; None if no end is."""
+    """Shorten a wall by a length, m, at the end close to a point; return None if that is impossible."""
     if not isinstance(wall, WallObstacle) or len(wall.points) < 2:
         return None
     line = LineString(wall.points)
+    # For each end: its position, and the part of the line that remains after shortening it there.
     spans = (
         (wall.points[0], length, line.length),
         (wall.points[-1], 0.0, line.length - length),
@@ -198,7 +203,10 @@ def _merge_vertices(sketch: Sketch, problem: Any, radius: float) -> Change:
 
 
 def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
-    """Move a disc, or the position at the last point of the problem, to the nearest free point."""
+    """Move a disc start, or one position of a start, to the nearest point with space for a robot.
+
+    The last point of the problem's geometry is the position to move.
+    """
     name = problem.owner
     start = sketch.get_start(name)
     _, free = find_problems(sketch, radius)
@@ -219,7 +227,7 @@ def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
 
 
 def _fill(sketch: Sketch, area: Geometry) -> Change:
-    """Add obstacles that cover an area."""
+    """Add obstacles that cover an area and slightly overlap the objects around it."""
     grown = area.buffer(FILL_OVERLAP_M, join_style="mitre", mitre_limit=FILL_MITRE_LIMIT)
     polygons = extract_polygons(grown)
     require(polygons, "there is nothing to fill")
@@ -228,7 +236,7 @@ def _fill(sketch: Sketch, area: Geometry) -> Change:
 
 
 def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry]) -> Geometry:
-    """Return the parts of the free space without its largest part that meet any of some areas."""
+    """Return the parts of the free space outside its largest part that intersect any of the given areas."""
     parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
     inside = shapely.union_all(areas).buffer(-MAX_SAGITTA_M)
     return shapely.union_all(parts[shapely.intersects(parts, inside)])

@@ -1,4 +1,4 @@
-"""Edits of the paths of moving obstacles: waypoints, speed, and what happens at the end."""
+"""Edits of the paths of moving obstacles: waypoints, speed, and whether they go back or in a loop."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,7 +26,7 @@ def list_moving_obstacles(sketch: Sketch) -> tuple[int, ...]:
 
 
 def leads_somewhere(path: ObstaclePath) -> bool:
-    """Return whether an obstacle moves along a path; that of a draft may lead nowhere."""
+    """Return whether a path results in motion; in an unfinished map, it may not."""
     return len(set(path.points)) > 1 and path.speed > 0.0
 
 
@@ -40,11 +40,11 @@ def add_waypoint(
     sketch : Sketch
         The map.
     key : int
-        Key of the obstacle. Without a path, it gets one from its center to the point.
+        Key of the obstacle. If it has no path, it gets one from its center to the point.
     point : Point
         The waypoint, m.
     index : int, optional
-        Index of the waypoint before which it is inserted; by default it is the last.
+        Index of the new waypoint; by default, it is appended.
     speed : float
         Speed along a new path, m/s.
     """
@@ -61,14 +61,14 @@ def add_waypoint(
 
 
 def move_waypoint(sketch: Sketch, key: int, number: int, point: Point) -> Change:
-    """Move a waypoint; when the first one moves, the obstacle stays where it is at time zero."""
+    """Move a waypoint; moving the first one does not change the position of the obstacle at time zero."""
     path = _require_path(sketch, key, number)
     points = (*path.points[:number], check_point(point), *path.points[number + 1 :])
     return _set_path(sketch, key, replace(path, points=points), "waypoint moved")
 
 
 def remove_waypoint(sketch: Sketch, key: int, number: int) -> Change:
-    """Remove a waypoint; with one of two, the path."""
+    """Remove a waypoint; if only one would remain, remove the path."""
     path = _require_path(sketch, key, number)
     if len(path.points) <= 2:
         return remove_path(sketch, Selection.of(key))
@@ -82,7 +82,7 @@ def remove_path(sketch: Sketch, selection: Selection) -> Change:
 
 
 def toggle_repeat(sketch: Sketch, selection: Selection) -> Change:
-    """Let the selected obstacles go back and forth, or in a loop if they do."""
+    """Toggle the selected obstacles between moving back and forth and moving in a loop."""
     shape_paths = [item.shape.path for item in selection.list_items(sketch)]
     has_loop = any(path is not None and path.repeat == "loop" for path in shape_paths)
     repeat: Repeat = "loop"
@@ -100,7 +100,7 @@ def set_speed(sketch: Sketch, selection: Selection, speed: float) -> Change:
 
 
 def parse_speed(text: str) -> float:
-    """Return a typed speed, m/s; raise MapError if it is none."""
+    """Parse a speed that the user typed, m/s; raise MapError if it is invalid."""
     try:
         return _check_speed(float(text.strip().removesuffix("m/s")))
     except ValueError:
@@ -108,14 +108,14 @@ def parse_speed(text: str) -> float:
 
 
 def find_waypoint(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return the index of the waypoint within `reach` meters of a point."""
+    """Return the index of the nearest waypoint within `reach` meters of a point; None if there is none."""
     points = to_array(path.points)
     _, gaps = find_nearest_on_edges(points, points, point)
     return _find_nearest(gaps, reach)
 
 
 def find_leg(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return the index at which a waypoint is inserted into the leg within `reach` meters of a point."""
+    """Return the index that a new waypoint at a point would have; None if no leg is within `reach` meters."""
     points = to_array(path.points)
     if path.repeat == "loop":
         points = to_array([*path.points, *path.points[:1]])
@@ -127,7 +127,7 @@ def find_leg(path: ObstaclePath, point: Point, reach: float) -> int | None:
 
 
 def _find_nearest(gaps: Array, reach: float) -> int | None:
-    """Return the index of the smallest of (k,) distances, m, None if it is beyond `reach`."""
+    """Return the index of the smallest of (k,) distances, m; None if it exceeds `reach`."""
     if not len(gaps):
         return None
     nearest = int(gaps.argmin())
@@ -137,7 +137,7 @@ def _find_nearest(gaps: Array, reach: float) -> int | None:
 
 
 def describe_path(path: ObstaclePath | None) -> str:
-    """Describe a path in a few words: "0.5 m/s, loop of 6 m in 12 s"."""
+    """Describe a path in a few words, for example "0.5 m/s, loop of 6 m in 12 s"."""
     if path is None:
         return "stands still"
     if not leads_somewhere(path):
@@ -150,7 +150,7 @@ def describe_path(path: ObstaclePath | None) -> str:
 
 
 def _require_path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
-    """Return the path of an obstacle; raise MapError unless it has a waypoint of a number."""
+    """Return the path of an obstacle; raise MapError if it has no waypoint with the given number."""
     path = sketch.get_item(key).shape.path
     if path is None or not 0 <= number < len(path.points):
         raise MapError("this waypoint no longer exists")

@@ -1,4 +1,4 @@
-"""Edits of properties: delete, name, note, size, order, group, lock and hide objects; describe the map."""
+"""Edits of properties: delete, rename, annotate, resize, restack, group, lock, hide or convert objects."""
 
 from dataclasses import replace
 from itertools import count
@@ -28,7 +28,7 @@ def delete(sketch: Sketch, selection: Selection) -> Change:
 
 
 def rename(sketch: Sketch, owner: Owner, name: str) -> Change:
-    """Rename an obstacle or a start; an empty name removes that of an obstacle."""
+    """Rename an obstacle or a start; an empty name removes the name of an obstacle."""
     name = create.clean_label(name)
     require(owner != BOUNDARY, "the boundary has no name; the map has one")
     if isinstance(owner, str):
@@ -52,7 +52,7 @@ def _rename_start(sketch: Sketch, previous: str, name: str) -> Change:
 
 
 def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
-    """Write a note on the selected obstacles; an empty one removes it."""
+    """Set the note of the selected obstacles; an empty note removes it."""
     require(selection.items, "select obstacles first: notes are written to them")
     note = create.clean_text(note, "a note")
     obstacles = Selection(items=selection.items).describe(sketch)
@@ -63,7 +63,7 @@ def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
 
 
 def group(sketch: Sketch, selection: Selection, name: str = "") -> Change:
-    """Put the selected obstacles into a group with a name, by default a new one."""
+    """Put the selected obstacles into a group with the given name, by default a new name."""
     require(len(selection.items) >= 2, "select two or more obstacles to group")
     name = create.clean_label(name) or _find_free_group(sketch)
     return _mark(sketch, selection, f"grouped as “{name}”", group=name)
@@ -82,7 +82,7 @@ def ungroup(sketch: Sketch, selection: Selection) -> Change:
 
 
 def lock(sketch: Sketch, selection: Selection) -> Change:
-    """Lock the selected obstacles, so that the mouse does not select them."""
+    """Lock the selected obstacles, so that they cannot be selected with the mouse."""
     change = _mark(sketch, selection, "locked", locked=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
@@ -94,14 +94,14 @@ def hide(sketch: Sketch, selection: Selection) -> Change:
 
 
 def release(sketch: Sketch) -> Change:
-    """Unlock and show all obstacles, and select those that were locked or hidden."""
+    """Unlock and show all obstacles; those that were locked or hidden are selected."""
     keys = [item.key for item in sketch.obstacles if not item.is_selectable]
     require(keys, "nothing is locked or hidden")
     return _mark(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
 def _mark(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
-    """Change fields of the selected obstacles."""
+    """Set fields of the selected obstacles, given as keyword arguments."""
     require(selection.items, "select obstacles first")
     items = [replace(item, **marks) for item in selection.list_items(sketch)]
     description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
@@ -116,7 +116,7 @@ def set_title(sketch: Sketch, name: str) -> Change:
 
 
 def set_description(sketch: Sketch, description: str) -> Change:
-    """Describe the map."""
+    """Set the description of the map."""
     description = create.clean_text(description, "a description")
     return Change(replace(sketch, description=description), Selection(), "map described")
 
@@ -135,7 +135,7 @@ def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
 
 
 def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Set the radius of the selected circles and starts, m."""
+    """Set the radius of the selected circles and disc-shaped starts, m."""
     radius = _check_size("radius", radius)
     circles: dict[Owner, Any] = {}
     for owner in selection.owners:
@@ -148,7 +148,7 @@ def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
 
 
 def _check_size(name: str, size: float) -> float:
-    """Return a size to the tenth of a millimeter, m; raise MapError if it is not possible."""
+    """Return a size rounded to tenths of a millimeter, m; raise MapError if it is out of range."""
     is_possible = MIN_SIZE_M <= size <= MAX_SIZE_M
     require(is_possible, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
     return round_length(size)
@@ -170,8 +170,9 @@ def restack(sketch: Sketch, selection: Selection, end: Literal["top", "bottom"])
 
 
 def make_default_start(sketch: Sketch, name: str) -> Change:
-    """Make a start the default, which is the first."""
+    """Make a start the default by moving it to the first place."""
     require(name in dict(sketch.starts), f"there is no start “{to_one_line(name)}”")
+    # False sorts before True, and the others keep their order.
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
     description = f"start “{to_one_line(name)}” made the default"
     return Change(replace(sketch, starts=starts), Selection.of(name), description)
@@ -194,7 +195,7 @@ def convert_to_polygons(sketch: Sketch, selection: Selection) -> Change:
 
 
 def convert_to_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Make the selected polygon the boundary."""
+    """Make the outline of the selected polygon the boundary; the polygon is removed."""
     shapes = [sketch.get_item(key).shape for key in selection.items]
     if len(shapes) != 1 or not isinstance(shapes[0], PolygonObstacle):
         raise MapError("select one polygon: its outline becomes the boundary")
@@ -203,7 +204,7 @@ def convert_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def set_background(sketch: Sketch, background: Background | None) -> Change:
-    """Set or remove the picture under the map."""
+    """Set the picture under the map, or remove it if None is given."""
     if background is None:
         description = "picture removed"
     elif sketch.background is None:

@@ -1,4 +1,4 @@
-"""Edits of positions: move, turn, scale, mirror, copy, align and distribute objects."""
+"""Edits of positions: move, rotate, scale, mirror, copy, align and distribute objects."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -25,12 +25,12 @@ from robocov_app.toolkit.tools.geometry import compute_cos_sin
 Side: TypeAlias = Literal["left", "center", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
 SIDES: Final = ("left", "center", "right", "top", "middle", "bottom")
-"""Left, center and right move along x; top, middle and bottom along y."""
+"""Sides for alignment: the first three move objects along x, the others along y."""
 
 ALONG_X = SIDES[:3]
 MAX_COPIES = 10_000
-MANY_OBJECTS = 100  # bounds of more objects are computed together
-RELATIVE_TOLERANCE = 1e-12  # of scale factors that differ by rounding only
+MANY_OBJECTS = 100  # the bounds of more objects are computed together, which is faster
+RELATIVE_TOLERANCE = 1e-12  # of scale factors that differ only by rounding errors
 MAX_RESIZE_STEPS = 20
 RESIZE_TOLERANCE_M = 2e-4
 MIN_RESIZE_FACTOR = 1e-9
@@ -38,7 +38,9 @@ MIN_RESIZE_FACTOR = 1e-9
 
 @dataclass(frozen=True)
 class Affine:
-    """The map from (x, y) to (xx x + xy y + x0, yx x + yy y + y0), rounded to tenths of a millimeter.
+    """Affine transformation from (x, y) to (xx x + xy y + x0, yx x + yy y + y0).
+
+    Results are rounded to tenths of a millimeter.
 
     Attributes
     ----------
@@ -57,17 +59,17 @@ class Affine:
 
     @classmethod
     def turn(cls, degrees: float, about: Point) -> Self:
-        """Return the counter-clockwise rotation about a point, exact at quarters of a turn."""
+        """Return a counter-clockwise rotation about a point; multiples of 90° are exact."""
         cos, sin = compute_cos_sin(degrees)
         return cls(cos, -sin, sin, cos)._fix(about)
 
     @classmethod
     def stretch(cls, factor_x: float, factor_y: float, about: Point) -> Self:
-        """Return the map that stretches along both axes about a point."""
+        """Return a scaling by a factor along each axis about a point."""
         return cls(factor_x, 0.0, 0.0, factor_y)._fix(about)
 
     def _fix(self, point: Point) -> Self:
-        """Return the map with the same linear part that keeps a point."""
+        """Return the transformation with the same linear part that leaves a point in place."""
         x, y = point
         x0 = x - self.xx * x - self.xy * y
         y0 = y - self.yx * x - self.yy * y
@@ -75,9 +77,10 @@ class Affine:
 
     @property
     def factor(self) -> float | None:
-        """Factor by which it scales all lengths; None if it stretches some more than others."""
+        """Factor by which all lengths are scaled; None if it depends on the direction."""
         factor_x = math.hypot(self.xx, self.yx)
         factor_y = math.hypot(self.xy, self.yy)
+        # The scale is uniform if the columns are equally long and perpendicular to each other.
         skew = abs(self.xx * self.xy + self.yx * self.yy)
         if abs(factor_x - factor_y) > RELATIVE_TOLERANCE * max(factor_x, factor_y):
             return None
@@ -88,21 +91,21 @@ class Affine:
         return factor_x
 
     def ring(self, ring: Sequence[Point]) -> Ring:
-        """Return where points go, m."""
+        """Transform a sequence of points, m."""
         x, y = geometry.to_array(ring).T
         new_x = self.xx * x + self.xy * y + self.x0
         new_y = self.yx * x + self.yy * y + self.y0
         return geometry.round_ring(np.column_stack([new_x, new_y]))
 
     def apply(self, shape: Any) -> Any:
-        """Return an obstacle, a start, a path or a density where it goes.
+        """Transform an obstacle, a start, a path, or a density or part of it.
 
-        Stretched circles become polygons. Walls keep their width unless all lengths are scaled alike.
+        Circles that are scaled unequally become polygons. Walls keep their width unless the scale is uniform.
 
         Raises
         ------
         MapError
-            If a start that is a disc would be stretched.
+            If a disc-shaped start would be scaled unequally.
         """
         if self.factor is None and isinstance(shape, DiscStart):
             raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
@@ -136,7 +139,7 @@ class Affine:
         return round_length(length * factor)
 
 
-# How each field of obstacles, starts, paths and densities is mapped; other fields stay as they are.
+# How to transform each field of obstacles, starts, paths and densities; other fields do not change.
 _FIELD_MAPS: dict[str, Callable[[Affine, Any], Any]] = {
     "vertices": Affine.ring,
     "points": Affine.ring,
@@ -158,7 +161,7 @@ def move(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 
 def rotate(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
-    """Turn the selection counter-clockwise about a point, m, by default the center of its box."""
+    """Rotate the selection counter-clockwise about a point, m, by default the center of its bounding box."""
     require(math.isfinite(degrees), "expected an angle in degrees")
     center = about or _compute_center(sketch, selection)
     return _transform(sketch, selection, Affine.turn(degrees, center), "turned")
@@ -167,7 +170,10 @@ def rotate(sketch: Sketch, selection: Selection, degrees: float, about: Point | 
 def scale(
     sketch: Sketch, selection: Selection, factor_x: float, factor_y: float, about: Point | None = None
 ) -> Change:
-    """Scale the selection about a point, m, by default the center of its box; factors below 0 mirror."""
+    """Scale the selection about a point, m, by default the center of its bounding box.
+
+    Negative factors mirror the selection.
+    """
     for factor in (factor_x, factor_y):
         if not MIN_SIZE_M / MAX_SIZE_M <= abs(factor) <= MAX_SIZE_M / MIN_SIZE_M:
             raise MapError("expected a factor that is not 0")
@@ -176,7 +182,7 @@ def scale(
 
 
 def resize(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
-    """Scale the selection so that its box has a size; the lower left corner stays.
+    """Scale the selection to a given size of its bounding box; the lower left corner stays in place.
 
     Parameters
     ----------
@@ -185,7 +191,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
     selection : Selection
         Objects to scale.
     width, height : float or None
-        Size of the box, m; None for one in proportion to the other.
+        Size of the bounding box, m; None to keep the proportions.
     """
     low_x, low_y, high_x, high_y = _require_bounds(sketch, selection)
     present_width = high_x - low_x
@@ -198,7 +204,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
     if width is None or height is None:
         factor = factor_x or factor_y
         return _transform(sketch, selection, Affine.stretch(factor, factor, (low_x, low_y)), "resized")
-    # Walls keep their width, so that the box does not quite grow by the factors: approach the size in steps.
+    # Walls keep their width, so the box does not scale exactly by the factors, which are found by iteration.
     for _ in range(MAX_RESIZE_STEPS):
         affine = Affine.stretch(factor_x or factor_y, factor_y or factor_x, (low_x, low_y))
         change = _transform(sketch, selection, affine, "resized")
@@ -214,7 +220,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
 
 
 def _check_size(size: float | None, present: float, name: str) -> None:
-    """Raise MapError unless a size is possible, and the present one, m, can be scaled to it."""
+    """Raise MapError if a size, m, is out of range, or if the present size is too small to be scaled."""
     if size is None:
         return
     if not MIN_SIZE_M <= size <= MAX_SIZE_M:
@@ -223,7 +229,7 @@ def _check_size(size: float | None, present: float, name: str) -> None:
 
 
 def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None) -> Change:
-    """Move the lower left corner of the selection's box to (x, y) m; None leaves a coordinate."""
+    """Move the lower left corner of the selection's bounding box to (x, y) m; None keeps a coordinate."""
     low_x, low_y, *_ = _require_bounds(sketch, selection)
     dx = 0.0
     dy = 0.0
@@ -235,7 +241,10 @@ def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None
 
 
 def mirror(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
-    """Mirror the selection about the center of its box: "x" swaps left and right, "y" up and down."""
+    """Mirror the selection about the center of its bounding box.
+
+    "x" swaps left and right, "y" swaps top and bottom.
+    """
     require(axis in ("x", "y"), "expected an axis x or y")
     factor_x = -1.0 if axis == "x" else 1.0
     affine = Affine.stretch(factor_x, -factor_x, _compute_center(sketch, selection))
@@ -253,7 +262,7 @@ def duplicate(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float =
 def copy_to_grid(
     sketch: Sketch, selection: Selection, columns: int, rows: int, spacing: tuple[float, float]
 ) -> Change:
-    """Copy the selected obstacles into columns and rows with a spacing, (x, y) m."""
+    """Copy the selected obstacles to a grid of columns and rows with a spacing, (x, y) m."""
     obstacles = Selection(items=selection.items)
     require(obstacles, "select obstacles to copy")
     require(columns >= 1 and rows >= 1 and columns * rows >= 2, "expected at least two columns or rows")
@@ -261,6 +270,7 @@ def copy_to_grid(
         raise MapError(f"that makes more than {MAX_COPIES} obstacles")
     copied = sketch
     everything = obstacles
+    # The originals are the first cell of the grid.
     for row, column in list(product(range(rows), range(columns)))[1:]:
         shift = Affine(x0=column * spacing[0], y0=row * spacing[1])
         copied, copies = _copy(copied, obstacles, shift)
@@ -269,7 +279,10 @@ def copy_to_grid(
 
 
 def align(sketch: Sketch, selection: Selection, side: Side) -> Change:
-    """Align selected vertices, or else objects, at a side of their box or of a selected boundary."""
+    """Align the selected objects, or vertices if only vertices are selected, at a side.
+
+    Objects are aligned at the boundary if it is selected, otherwise at their common bounding box.
+    """
     require(side in SIDES, f"expected one of {', '.join(SIDES)}")
     if selection.vertices and not selection.owners:
         return _align_vertices(sketch, selection, side)
@@ -288,6 +301,7 @@ def align(sketch: Sketch, selection: Selection, side: Side) -> Change:
 
 
 def _align_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
+    """Align the selected vertices at a side of their common bounding box."""
     positions = {vertex: find_position(sketch, vertex) for vertex in selection.vertices}
     require(len(positions) >= 2, "select two or more vertices to align")
     frame = enclose_boxes((*position, *position) for position in positions.values())
@@ -307,8 +321,12 @@ def _describe_side(side: Side) -> str:
 
 
 def distribute(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
-    """Spread three or more selected objects with equal gaps between their boxes; the first and last stay."""
+    """Move three or more selected objects along an axis, so that the gaps between their boxes are equal.
+
+    The first and the last object stay in place.
+    """
     require(axis in ("x", "y"), "expected an axis x or y")
+    # Indices of the minimum and maximum along the axis in a box.
     low = "xy".index(axis)
     high = low + 2
     boxes = sorted(_list_boxes(sketch, selection).items(), key=lambda pair: (pair[1][low], pair[1][high]))
@@ -325,7 +343,7 @@ def distribute(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
 
 
 def level_map(sketch: Sketch, a: Point, b: Point) -> Change:
-    """Turn map, picture and density about a point so that the line to another, m, is level or upright."""
+    """Rotate map, picture and density about point `a` so that the line to `b` is horizontal or vertical."""
     require(math.dist(a, b) >= MIN_SIZE_M, "expected two points that are apart")
     degrees = geometry.compute_levelling_angle(a, b)
     affine = Affine.turn(degrees, a)
@@ -349,8 +367,8 @@ def _turn_density(density: Density | None, affine: Affine) -> Density | None:
 
 
 def compute_box(sketch: Sketch, owner: Owner) -> Box | None:
-    """Return the bounding box of an object, m, None if it covers nothing."""
-    # The box of a circle follows from its radius, not from the polygon that approximates it.
+    """Return the bounding box of an object, m; None if it is empty."""
+    # The box of a circle is computed from its radius, not from the polygon that approximates it.
     is_obstacle = isinstance(owner, int) and owner != BOUNDARY
     if is_obstacle and not isinstance(sketch.find_object(owner), CircleObstacle):
         assert isinstance(owner, int)
@@ -366,7 +384,7 @@ def compute_box(sketch: Sketch, owner: Owner) -> Box | None:
 
 
 def compute_bounds(sketch: Sketch, selection: Selection) -> Box | None:
-    """Return the bounding box of a selection, m, None if it covers nothing."""
+    """Return the bounding box of all selected objects and vertices, m; None if there are none."""
     owners = selection.owners
     boxes: list[Box] = []
     if len(owners) > MANY_OBJECTS:
@@ -407,7 +425,7 @@ def _list_boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
 
 
 def _compute_level(box: Box, side: Side) -> float:
-    """Return the coordinate of a side of a box, or of its center, m."""
+    """Return the coordinate of a side of a box, or of its center line, m."""
     x, y = compute_center(box)
     levels = {
         "left": box[0],
@@ -427,7 +445,7 @@ def _copy(sketch: Sketch, objects: Selection, affine: Affine) -> tuple[Sketch, S
 
 
 def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bool) -> Sketch:
-    """Move objects by offsets, m, along an axis."""
+    """Move each object by its own offset, m, along x or y."""
     moved = {}
     for owner, offset in offsets.items():
         if offset:
@@ -439,14 +457,14 @@ def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bo
 
 
 def _transform(sketch: Sketch, selection: Selection, affine: Affine, verb: str) -> Change:
-    # Undoing in the middle of a drag may have removed selected objects.
+    # Undo during a drag may have removed selected objects.
     present = selection.restrict_to(sketch)
     require(present, "select something first")
     return Change(_apply_affine(sketch, present, affine), present, f"{present.describe(sketch)} {verb}")
 
 
 def _apply_affine(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
-    """Apply a map to selected objects, and to selected vertices of other objects."""
+    """Transform the selected objects, and the selected vertices of other objects."""
     vertices = [vertex for vertex in selection.vertices if vertex.owner not in selection.owners]
     positions = affine.ring([find_position(sketch, vertex) for vertex in vertices])
     objects = selection.items | selection.starts

@@ -1,4 +1,4 @@
-"""Edits of vertices: move, insert, delete, cut off, simplify and straighten; join and split walls."""
+"""Edits of vertices: move, insert, delete, bevel, round, simplify, straighten; join and split walls."""
 
 import cmath
 import math
@@ -37,12 +37,12 @@ from robocov_app.editor.model.selection import (
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-MIN_CORNER_RAD = math.radians(0.1)  # corners that turn by less cannot be cut off
+MIN_CORNER_RAD = math.radians(0.1)  # corners that turn by less are not cut off
 MAX_ARC_SEGMENTS = 256
-SIMPLIFY_ATTEMPTS = 12  # each with half the tolerance of the one before, until nothing crosses
+SIMPLIFY_ATTEMPTS = 12  # each with half the previous tolerance, until the outline does not intersect itself
 STRAIGHTEN_ANGLE_DEG = 5.0
 MAX_STRAIGHTEN_ANGLE_DEG = 30.0
-JOIN_DISTANCE_M = 1e-4  # ends of walls that are closer are one point
+JOIN_DISTANCE_M = 1e-4  # ends of walls that are closer than this become one vertex
 _EDGE_TOLERANCE_M = 1e-9
 
 
@@ -52,23 +52,23 @@ class CornerCut(NamedTuple):
     Attributes
     ----------
     length : float
-        Length that is cut off both edges, m.
+        Length that is cut off each of the two edges, m.
     segments : int
-        Number of segments of the arc in place of the corner.
+        Number of segments of the arc that replaces the corner; 1 for a bevel.
     """
 
     length: float
     segments: int
 
 
-ComputeCut: TypeAlias = Callable[[float], CornerCut]  # for the angle by which a corner turns, rad
+ComputeCut: TypeAlias = Callable[[float], CornerCut]  # takes the angle by which a corner turns, rad
 RedrawRings: TypeAlias = Callable[
     [tuple[Ring, ...], bool], tuple[Ring, ...]
-]  # rings, whether they are closed
+]  # takes the rings of an object, and whether they are closed
 
 
 def move_vertices(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
-    """Move the selected vertices by a displacement, m; a vertex on the rim of a circle sets the radius."""
+    """Move the selected vertices by a displacement, m; a vertex on the rim of a circle changes its radius."""
     require(selection.vertices, "select vertices first")
     positions = {}
     for vertex in selection.vertices:
@@ -79,10 +79,13 @@ def move_vertices(sketch: Sketch, selection: Selection, dx: float, dy: float) ->
 
 
 def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
-    """Place vertices at positions, m; the center of a circle moves it, its rim sets the radius."""
+    """Set the positions of vertices, m.
+
+    The center vertex of a circle moves the circle; a vertex on the rim changes its radius.
+    """
     positions_by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
     for vertex, position in positions.items():
-        # Raises if the vertex has gone.
+        # This raises an error if the vertex no longer exists.
         find_position(sketch, vertex)
         positions_by_owner[vertex.owner][vertex] = position
     for owner, moved in positions_by_owner.items():
@@ -100,9 +103,10 @@ def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
 def _reshape_circle(
     circle: env.CircleObstacle | env.DiscStart, positions: Mapping[Vertex, Point]
 ) -> env.CircleObstacle | env.DiscStart:
-    """Return a circle with its center at a position, or else with its rim through one."""
+    """Return a circle moved to the position of its center vertex if given, or else with its rim moved."""
     vertex = min(positions, key=lambda vertex: vertex.index)
     position = check_point(positions[vertex])
+    # Vertex 0 is the center; the others are on the rim.
     if vertex.index == 0:
         return replace(circle, center=position)
     radius = round_length(math.dist(circle.center, position))
@@ -111,7 +115,7 @@ def _reshape_circle(
 
 
 def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
-    """Insert a vertex into an edge, and select it."""
+    """Insert a vertex at the point of an edge, and select it."""
     rings = [list(ring) for ring in sketch.list_vertex_rings(edge.owner)]
     edge_counts = {ring.number: ring.edge_count for ring in sketch.list_rings(edge.owner)}
     require(0 <= edge.index < edge_counts.get(edge.ring, 0), "this edge no longer exists")
@@ -125,7 +129,10 @@ def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
 
 
 def delete_vertices(sketch: Sketch, selection: Selection) -> Change:
-    """Delete the selected vertices; holes and obstacles with too few left go, the boundary keeps three."""
+    """Delete the selected vertices.
+
+    Holes and objects with too few remaining vertices are deleted; the boundary must keep at least three.
+    """
     require(selection.vertices, "select vertices first")
     changed = sketch
     for owner, indices_by_ring in _group_by_ring(sketch, selection.vertices).items():
@@ -135,6 +142,7 @@ def delete_vertices(sketch: Sketch, selection: Selection) -> Change:
 
 
 def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[int, set[int]]) -> Sketch:
+    """Delete vertices of one object, given by ring; delete the object if too few vertices remain."""
     shape = sketch.find_object(owner)
     if isinstance(shape, env.DiscStart):
         raise MapError("the points of a disc cannot be deleted: delete the start itself")
@@ -144,7 +152,7 @@ def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[i
     for number, ring in enumerate(sketch.list_vertex_rings(owner)):
         indices = indices_by_ring[number]
         remaining = tuple(point for k, point in enumerate(ring) if k not in indices)
-        # A hole that was broken before stays unless its vertices are deleted.
+        # A hole with too few vertices is kept if none of its vertices are selected.
         if number == 0 or not indices or len(remaining) >= 3:
             rings.append(remaining)
     minimum = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(shape), 3)
@@ -155,7 +163,7 @@ def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[i
 
 
 def _group_by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
-    """Return the indices of vertices by their owner and ring; raise MapError if any has gone."""
+    """Group the indices of vertices by owner and ring; raise MapError if a vertex no longer exists."""
     indices: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
     for vertex in vertices:
         find_position(sketch, vertex)
@@ -164,7 +172,7 @@ def _group_by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, di
 
 
 def fill_hole(sketch: Sketch, key: int, ring: int) -> Change:
-    """Fill a hole of a polygon."""
+    """Fill a hole of a polygon, given by the number of its ring."""
     rings = sketch.list_vertex_rings(key)
     if not isinstance(sketch.find_object(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
         raise MapError("there is no such hole")
@@ -173,16 +181,17 @@ def fill_hole(sketch: Sketch, key: int, ring: int) -> Change:
 
 
 def bevel_corners(sketch: Sketch, selection: Selection, length: float) -> Change:
-    """Cut the selected corners off, a length, m, from each along both edges; ends of walls have none."""
+    """Bevel the selected corners: cut off a length, m, of both edges. Ends of walls are not corners."""
     require(0.0 < length < math.inf, "a bevel needs a length above 0 m")
     return _cut_corners(sketch, selection, lambda turn: CornerCut(length, 1), "bevelled")
 
 
 def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Round the selected corners with a radius, m, by arcs that touch both edges, to a millimeter."""
+    """Round the selected corners by polygonal arcs with a radius, m, that touch both edges."""
     require(0.0 < radius < math.inf, "expected a radius above 0 m")
 
     def compute_cut(turn: float) -> CornerCut:
+        # Angle of a segment that deviates from the arc by at most MAX_SAGITTA_M.
         step = 2.0 * math.acos(max(1.0 - env.MAX_SAGITTA_M / radius, 0.0))
         return CornerCut(radius * math.tan(turn / 2.0), min(MAX_ARC_SEGMENTS, math.ceil(turn / step)))
 
@@ -190,6 +199,7 @@ def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change
 
 
 def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, verb: str) -> Change:
+    """Cut off the selected corners of all objects, with the cut that `compute_cut` returns for each."""
     changed = sketch
     count = 0
     for owner, indices_by_ring in _group_by_ring(sketch, selection.vertices).items():
@@ -209,7 +219,7 @@ def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, 
 
 
 def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool) -> Ring:
-    """Return a ring with arcs in place of the corners that are cut off."""
+    """Return a ring in which arcs replace the corners with cuts."""
     points: list[Array] = []
     for index, point in enumerate(ring):
         if index in cuts:
@@ -222,7 +232,7 @@ def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool)
 def _compute_cuts(
     ring: Ring, indices: set[int], is_closed: bool, compute_cut: ComputeCut
 ) -> dict[int, CornerCut]:
-    """Return the cuts of those vertices that are corners; raise MapError if an edge is too short."""
+    """Return the cut of each given vertex that is a corner; raise MapError if an edge is too short."""
     cuts: dict[int, CornerCut] = {}
     count = len(ring)
     for index in sorted(indices):
@@ -248,7 +258,7 @@ def _compute_cuts(
 
 
 def _list_neighbors(ring: Ring, index: int) -> tuple[complex, complex, complex]:
-    """Return the vertex before a corner, the corner, and the vertex after it as complex numbers."""
+    """Return the vertex before a corner, the corner and the vertex after it, as complex numbers x + iy."""
     count = len(ring)
     before = complex(*ring[(index - 1) % count])
     after = complex(*ring[(index + 1) % count])
@@ -256,13 +266,13 @@ def _list_neighbors(ring: Ring, index: int) -> tuple[complex, complex, complex]:
 
 
 def _compute_turn(ring: Ring, index: int) -> float:
-    """Return the angle by which a ring turns at a vertex to either side, rad; 0 at edges without length."""
+    """Return the absolute angle by which a ring turns at a vertex, rad; 0 next to an edge of length 0."""
     before, corner, after = _list_neighbors(ring, index)
     return abs(cmath.phase((after - corner) * (corner - before).conjugate()))
 
 
 def _build_arc(ring: Ring, index: int, cut: CornerCut) -> Array:
-    """Return the (segments + 1, 2) points, m, of the arc that touches both edges in place of a corner."""
+    """Return the points of the arc that replaces a corner and touches both edges, (segments + 1, 2) m."""
     before, corner, after = _list_neighbors(ring, index)
     backwards = (before - corner) / abs(before - corner)
     forwards = (after - corner) / abs(after - corner)
@@ -290,7 +300,7 @@ def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
 
 
 def split_wall(sketch: Sketch, vertex: Vertex) -> Change:
-    """Split a wall in two at a vertex between its ends."""
+    """Split a wall into two walls at a vertex that is not an end."""
     wall = _require_wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
@@ -301,7 +311,7 @@ def split_wall(sketch: Sketch, vertex: Vertex) -> Change:
 
 
 def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
-    """Return the wall of a vertex; raise MapError if the vertex has gone, or is not part of a wall."""
+    """Return the wall of a vertex; raise MapError if the vertex no longer exists or is not part of a wall."""
     find_position(sketch, vertex)
     wall = sketch.find_object(vertex.owner)
     if not isinstance(wall, env.WallObstacle):
@@ -310,7 +320,7 @@ def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
 
 
 def join_walls(sketch: Sketch, selection: Selection) -> Change:
-    """Join the selected walls by their nearest ends; the lowest gives the width."""
+    """Join the selected walls at their nearest ends into one, with the width of the lowest wall."""
     items = selection.list_items(sketch)
     walls = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
     require(len(walls) == len(items) >= 2, "select two or more walls to join, and nothing else")
@@ -324,7 +334,7 @@ def join_walls(sketch: Sketch, selection: Selection) -> Change:
 
 
 def _join_lines(lines: list[Ring]) -> Ring:
-    """Join lines one after the other, always by the two ends that are nearest, m."""
+    """Join lines to the first one, always the line with the nearest end next."""
     chain = lines[0]
     remaining = lines[1:]
     while remaining:
@@ -332,6 +342,7 @@ def _join_lines(lines: list[Ring]) -> Ring:
         for line in remaining:
             for head in (chain, chain[::-1]):
                 for tail in (line, line[::-1]):
+                    # The second number makes all entries different, so that min compares no rings.
                     pairs.append((math.dist(head[-1], tail[0]), len(pairs), head, tail, line))
         _, _, head, tail, line = min(pairs)
         if math.dist(head[-1], tail[0]) <= JOIN_DISTANCE_M:
@@ -342,7 +353,10 @@ def _join_lines(lines: list[Ring]) -> Ring:
 
 
 def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
-    """Remove vertices by Douglas and Peucker (1973), to a tolerance, m, so that nothing crosses itself."""
+    """Remove vertices by the algorithm of Douglas and Peucker (1973) with a tolerance, m.
+
+    The tolerance is reduced if an outline would intersect itself.
+    """
     require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
 
     def redraw(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
@@ -358,7 +372,7 @@ def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
 
 
 def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN_ANGLE_DEG) -> Change:
-    """Make edges horizontal or vertical that nearly are, so that edges in line lie on one line."""
+    """Make edges horizontal or vertical that are so within an angle; consecutive ones end up on one line."""
     is_possible = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
     require(is_possible, f"expected an angle of up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
 
@@ -374,14 +388,14 @@ def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN
 def _redraw(
     sketch: Sketch, selection: Selection, redraw: RedrawRings
 ) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
-    """Redraw the selected obstacles and the boundary, or all obstacles.
+    """Redraw the rings of the selected obstacles and boundary; without a selection, of all obstacles.
 
     Returns
     -------
     sketch : Sketch
         The redrawn map.
     replaced : list of tuple of Ring
-        The rings that have changed, before and after.
+        Each ring that has changed, before and after.
     """
     owners: Collection[Owner] = sketch.index_by_key.keys()
     if selection.items or selection.boundary:
@@ -401,7 +415,7 @@ def _redraw(
 
 
 def _simplify_rings(rings: tuple[Ring, ...], tolerance: float, is_closed: bool) -> tuple[Ring, ...]:
-    """Simplify the rings of an obstacle to a tolerance, m, or less if they would cross."""
+    """Simplify the rings of an object with a tolerance, m, which is reduced while they would intersect."""
     for attempt in range(SIMPLIFY_ATTEMPTS):
         simplified = tuple(_simplify_ring(ring, tolerance / 2**attempt, is_closed) for ring in rings)
         if not is_closed or _is_valid_polygon(simplified) or not _is_valid_polygon(rings):
@@ -410,19 +424,20 @@ def _simplify_rings(rings: tuple[Ring, ...], tolerance: float, is_closed: bool) 
 
 
 def _is_valid_polygon(rings: tuple[Ring, ...]) -> bool:
-    """Return whether closed rings make a valid polygon."""
+    """Return whether closed rings, outline and holes, form a valid polygon."""
     has_corners = min(map(len, rings)) >= 3
     return has_corners and bool(Polygon(rings[0], rings[1:]).is_valid)
 
 
 def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
+    """Simplify one ring with a tolerance, m; return it unchanged if it would become degenerate."""
     if len(set(ring)) < 3:
         return ring
     if not is_closed:
         return tuple(LineString(ring).simplify(tolerance, preserve_topology=False).coords)
     if len(set(ring)) == 3:
         return ring
-    # Start at a vertex that stays: the one farthest from the center is a corner of the convex hull.
+    # Start at a vertex that must remain: the one farthest from the center is a corner of the convex hull.
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
     line = LineString([*ring[first:], *ring[: first + 1]])
@@ -433,17 +448,19 @@ def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
 
 
 def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
+    """Straighten the edges of one ring; return it unchanged if it would become degenerate."""
     points = to_array(ring)
     count = len(points)
     if count < 2:
         return ring
     edges = np.roll(points, -1, axis=0) - points
     if not is_closed:
+        # The last vertex of a line has no edge.
         edges[-1] = np.nan
     max_slope = math.tan(math.radians(degrees))
     extents = np.abs(edges)
     moved = points.copy()
-    # The ends of level edges in a row get the same y, those of upright edges the same x.
+    # The ends of consecutive horizontal edges get the same y, those of vertical edges the same x.
     for axis in (1, 0):
         is_straight = extents[:, axis] <= max_slope * extents[:, 1 - axis]
         straight = np.flatnonzero(is_straight & (extents.max(axis=1) > 0.0))

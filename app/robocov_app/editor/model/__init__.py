@@ -1,4 +1,4 @@
-"""Editor model: sketches, their files, their problems. Knows no pygame."""
+"""Model of the editor: sketches, their files and their problems. Independent of pygame."""
 
 from typing import TypeVar
 
@@ -8,7 +8,7 @@ _Value = TypeVar("_Value")
 
 
 def require(value: _Value | None, message: str) -> _Value:
-    """Return a value that an edit needs; raise MapError with a message if it is None, false or empty."""
+    """Return a value unchanged; raise MapError with a message if it is None, false, zero or empty."""
     if not value:
         raise MapError(message)
     return value

@@ -1,4 +1,8 @@
-"""The picture under a map, and the marks of obstacles that the editor keeps in a map's free keys."""
+"""The picture under a map, and the marks of obstacles, which the editor stores in the map's free keys.
+
+Free keys are members of ``extra`` in a map file, where any program may store data. Marks are attributes of an
+obstacle that only the editor uses; see `MARKS`.
+"""
 
 import json
 import math
@@ -24,12 +28,12 @@ MAX_PIXEL_M = 1e3
 
 @dataclass(frozen=True)
 class Background:
-    """A picture under the map; its pixels count from the upper left corner, y downwards.
+    """A picture under the map. Pixel coordinates start at the upper left corner; y points down.
 
     Attributes
     ----------
     path : str
-        Its path as in the map: relative to the map's folder, or absolute.
+        Path of the picture as written in the map: relative to the map's folder, or absolute.
     pixels : tuple of int
         Width and height, px.
     scale : float
@@ -37,11 +41,11 @@ class Background:
     corner : tuple of float
         Position of the lower left corner, m.
     turn : float
-        Rotation about that corner, degrees counter-clockwise.
+        Counter-clockwise rotation about that corner, degrees.
     opacity : float
-        From 0, invisible, to 1.
+        Opacity from 0 (invisible) to 1.
     shown : bool
-        Whether it is shown.
+        Whether the picture is shown.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -55,7 +59,7 @@ class Background:
     shown: bool = True
 
     def to_world(self, pixel: Point) -> Point:
-        """Return the position of a pixel, m."""
+        """Return the position of a pixel on the map, m."""
         x = pixel[0] * self.scale
         y = (self.pixels[1] - pixel[1]) * self.scale
         cos, sin = compute_cos_sin(self.turn)
@@ -73,13 +77,13 @@ class Background:
         )
 
     def to_document(self) -> dict[str, Any]:
-        """Return the picture as it is written to a map."""
+        """Return the JSON object that describes the picture in a map file."""
         document = {name: to_json_value(value) for name, value in asdict(self).items()}
         return document | {"shown": self.shown}
 
     @classmethod
     def from_document(cls, document: Any) -> "Background | None":
-        """Return the picture in a map; None if that is something else."""
+        """Return the picture that a JSON value describes; None if the value is something else."""
         if not isinstance(document, dict) or set(document) != {field.name for field in fields(cls)}:
             return None
         try:
@@ -95,12 +99,12 @@ _ADAPTER = TypeAdapter(Background)
 
 
 def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT_WIDTH_M) -> Background:
-    """Return a picture of a width, m, with its lower left corner at the origin.
+    """Create a picture with its lower left corner at the origin.
 
     Parameters
     ----------
     path : str
-        Its path as in the map.
+        Path of the picture as written in the map.
     pixels : tuple of int
         Width and height, px.
     width : float
@@ -118,7 +122,7 @@ def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT
 
 
 def scale_to_length(background: Background, a: Point, b: Point, length: float) -> Background:
-    """Return a picture scaled about `a` so that two of its points, m, are a length, m, apart."""
+    """Scale a picture about point `a` so that the distance between points `a` and `b` becomes a length, m."""
     require(0.0 < length < math.inf, "the length between the two points must be above 0 m")
     _require_apart(background, a, b)
     factor = length / math.dist(a, b)
@@ -131,13 +135,13 @@ def scale_to_length(background: Background, a: Point, b: Point, length: float) -
 
 
 def level_background(background: Background, a: Point, b: Point) -> Background:
-    """Return a picture turned about `a` so that the line to `b` is level or upright."""
+    """Rotate a picture about point `a` so that the line to `b` is horizontal or vertical."""
     _require_apart(background, a, b)
     return rotate_background(background, compute_levelling_angle(a, b), a)
 
 
 def rotate_background(background: Background, degrees: float, about: Point) -> Background:
-    """Return a picture turned counter-clockwise about a point, m."""
+    """Rotate a picture counter-clockwise about a point, m."""
     cos, sin = compute_cos_sin(degrees)
     dx = background.corner[0] - about[0]
     dy = background.corner[1] - about[1]
@@ -151,9 +155,9 @@ def _require_apart(background: Background, a: Point, b: Point) -> None:
 
 
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
-"""Attributes of an obstacle besides its shape, with their types; empty and false values are not written."""
+"""Marks of an obstacle with their types. Empty and false values are not written to files."""
 
-_HOME = "editor"  # free key that the editor uses, unless it contains something else
+_HOME = "editor"  # free key of the editor, unless another program uses it
 _SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OWN_KEYS = {*_SECTIONS, "background"}
 _LOST_NOTES = "notes of obstacles that are gone"
@@ -163,16 +167,16 @@ Names: TypeAlias = Sequence[str | None]  # of the obstacles
 
 
 class ReadMarks(NamedTuple):
-    """Data of the editor in the free keys of a map.
+    """What was read from the free keys of a map.
 
     Attributes
     ----------
     marks : dict of int to dict
-        Marks by the index of their obstacle.
+        Marks of obstacles, by obstacle index.
     background : Background or None
         The picture under the map.
     others : dict
-        The free keys of others.
+        Free keys of other programs.
     """
 
     marks: MarksByIndex
@@ -183,14 +187,14 @@ class ReadMarks(NamedTuple):
 def write_marks(
     extra: FreeKeys, marks: MarksByIndex, names: Names, background: Background | None
 ) -> dict[str, Any]:
-    """Return the free keys of a map with marks and picture.
+    """Return the free keys of a map, including the marks and the picture.
 
     Parameters
     ----------
     extra : mapping
-        The free keys of others.
+        Free keys of other programs.
     marks : dict of int to dict
-        Marks by the index of their obstacle.
+        Marks of obstacles, by obstacle index.
     names : sequence of str or None
         Names of the obstacles.
     background : Background or None
@@ -211,7 +215,7 @@ def write_marks(
 
 
 def _identify(index: int, names: Names) -> dict[str, Any]:
-    """Return the keys that identify an obstacle in the free keys: its index, and its name if it has one."""
+    """Return the members that identify an obstacle in an entry: its index, and its name if it has one."""
     name = names[index]
     if name is None:
         return {"obstacle": index}
@@ -219,7 +223,10 @@ def _identify(index: int, names: Names) -> dict[str, Any]:
 
 
 def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
-    """Return marks and picture in the free keys of a map, given the names of its obstacles."""
+    """Read the marks and the picture from the free keys of a map, given the names of its obstacles.
+
+    A key whose content the editor could not have written is left to other programs.
+    """
     for home in islice(_list_homes(), len(extra) + 1):
         content = extra.get(home)
         if not isinstance(content, dict) or _is_free(content):
@@ -245,14 +252,14 @@ def _has_valid_sections(content: FreeKeys) -> bool:
 
 
 def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[str, Any]]:
-    """Assign the entries of the editor's free key to obstacles.
+    """Find the obstacle of each entry in the editor's free key.
 
     Returns
     -------
     marks : dict of int to dict
-        Marks by the index of their obstacle.
+        Marks of obstacles, by obstacle index.
     rest : dict
-        Entries that other programs have written to the key, and notes whose obstacle has gone.
+        Members that other programs have added to the key, and notes whose obstacle no longer exists.
     """
     marks: MarksByIndex = {}
     rest = {key: value for key, value in content.items() if key not in _OWN_KEYS}
@@ -270,7 +277,7 @@ def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[s
 
 
 def _list_homes() -> Iterator[str]:
-    """Yield the free keys that the editor may use, in their order."""
+    """Yield the free keys that the editor may use, in order of preference."""
     yield _HOME
     yield from (f"{_HOME} {k}" for k in count(2))
 
@@ -284,7 +291,8 @@ def _are_entries(entries: object, mark_names: tuple[str, ...]) -> bool:
 
 
 def _is_entry(entry: object, mark_names: tuple[str, ...]) -> bool:
-    """Return whether a value is an entry with some of the marks."""
+    """Return whether a JSON value is an entry, with an obstacle and at least one of the given marks."""
+    # `type`, because bool is a subclass of int.
     if not isinstance(entry, dict) or type(entry.get("obstacle")) is not int:
         return False
     if not isinstance(entry.get("name", ""), str) or not set(entry) <= {"obstacle", "name", *mark_names}:
@@ -294,14 +302,14 @@ def _is_entry(entry: object, mark_names: tuple[str, ...]) -> bool:
 
 
 def _find_obstacle(entry: FreeKeys, names: Names) -> int | None:
-    """Return the index of the obstacle of an entry: by index and name, or by a name that is unique."""
+    """Find the index of the obstacle of an entry: by index and name, or by a unique name; None if missing."""
     index: int = entry["obstacle"]
     name = entry.get("name")
     exists = 0 <= index < len(names)
     has_same_name = exists and names[index] == name
     if not has_same_name and name is not None and names.count(name) == 1:
         return names.index(name)
-    # The obstacle may have got a name since, or lost it.
+    # The obstacle may have been given a name since, or have lost its name.
     is_compatible = exists and (name is None or names[index] in (None, name))
     if not is_compatible:
         return None

@@ -1,6 +1,7 @@
-"""Typed coordinates, lengths and angles: ``3.2 1.5``, ``+0.5 0``, ``120cm``, ``@2<45``.
+"""Parsing of typed coordinates, lengths and angles: ``3.2 1.5``, ``+0.5 0``, ``120cm``, ``@2<45``.
 
-A comma between digits is a decimal comma, except next to a blank and among decimal points (``3.2,1.5``).
+A comma between digits is a decimal comma, unless it is next to a blank or the text contains decimal points
+(``3.2,1.5``).
 """
 
 import math
@@ -28,14 +29,14 @@ _ANGLE_HELP = "type an angle in degrees, such as 45"
 
 
 def parse_length(text: str, *, now: float | None = None) -> float:
-    """Return a typed length, m: ``3,2``, ``1200 mm``, ``4'6"``.
+    """Parse a length that the user typed, m: ``3,2``, ``1200 mm``, ``4'6"``.
 
     Parameters
     ----------
     text : str
-        The typed text.
+        Text that the user typed.
     now : float, optional
-        The present length, m, for relative ones: ``+0.5``, ``/2``, ``50%``.
+        Current length, m. With it, the text may be relative: ``+0.5``, ``/2``, ``50%``.
 
     Raises
     ------
@@ -60,19 +61,19 @@ def parse_length(text: str, *, now: float | None = None) -> float:
 
 
 def parse_point(text: str, *, last: Point | None = None) -> Point:
-    """Return a typed position, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``.
+    """Parse a position that the user typed, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``.
 
     Parameters
     ----------
     text : str
-        The typed text.
+        Text that the user typed.
     last : Point, optional
         The previous point, m, for relative positions: ``@2<45``, ``+0.5 0``.
 
     Raises
     ------
     MapError
-        If the text is not a position, or the position is beyond the reach of maps.
+        If the text is not a position, or the position is too far from the origin for a map.
     """
     typed = _clean(text)
     is_relative = typed[:1] in ("@", "+")
@@ -93,17 +94,17 @@ def parse_point(text: str, *, last: Point | None = None) -> Point:
 
 
 def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Point:
-    """Return the next point of a line, m.
+    """Parse the next point of a line that is being drawn, m.
 
     Parameters
     ----------
     text : str
-        The typed text: a position as in `parse_point`, a length towards the cursor, or ``<45`` for the
-        cursor's distance at an angle.
+        Text that the user typed: a position as in `parse_point`, a length in the direction of the cursor, or
+        an angle, such as ``<45``, at the distance of the cursor.
     last : Point or None
         The previous point of the line, m.
     towards : Point or None
-        The cursor, m.
+        Position of the cursor, m.
     """
     if last is None or towards is None:
         return parse_point(text, last=last)
@@ -125,7 +126,7 @@ def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Po
 
 
 def parse_size(text: str) -> tuple[float, float]:
-    """Return a typed width and height, m: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both."""
+    """Parse a width and height, m: ``3 x 2``, ``3 2``, ``120cm × 80cm``. A single length is used for both."""
     typed = _clean(text)
     side = _parse_length(typed)
     width, height = (side, side)
@@ -138,12 +139,12 @@ def parse_size(text: str) -> tuple[float, float]:
 
 
 def parse_angle(text: str) -> float:
-    """Return a typed angle, degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
+    """Parse an angle that the user typed, degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
     return _require_value(_parse_angle(_clean(text)), text, _ANGLE_HELP)
 
 
 def _clean(text: str) -> str:
-    """Return a text in lower case, with plain signs and single blanks."""
+    """Return a text in lower case, with ASCII signs instead of typographic ones, and with single blanks."""
     return " ".join(text.translate(_TYPOGRAPHIC_SIGNS).lower().split())
 
 
@@ -153,7 +154,7 @@ def _require_value(value: float, text: str, help_text: str) -> float:
 
 
 def _parse_number(typed: str) -> float:
-    """Return a number; nan if there is none, as the functions below do for lengths and angles."""
+    """Parse a number; return nan if the text is not one, as the functions below do."""
     typed = typed.strip()
     if not re.fullmatch(_NUMBER, typed):
         return math.nan
@@ -164,6 +165,7 @@ def _parse_number(typed: str) -> float:
 
 
 def _parse_length(typed: str) -> float:
+    """Parse a length with an optional unit, or in feet and inches, m; return nan if it is not one."""
     feet = _FEET_AND_INCHES.fullmatch(typed)
     if feet:
         whole = _parse_number(feet[1])
@@ -176,7 +178,7 @@ def _parse_length(typed: str) -> float:
 
 
 def _parse_pair(typed: str, signs: str) -> tuple[float, float]:
-    """Return two lengths between which there is a sign, a semicolon, a comma or a blank.
+    """Parse two lengths that are separated by one of `signs`, a semicolon, a comma or a blank, m.
 
     A comma between digits is a decimal comma, unless there are decimal points.
     """
@@ -185,7 +187,7 @@ def _parse_pair(typed: str, signs: str) -> tuple[float, float]:
     splits.append(re.split(r"\s*,\s+|\s+,\s*", typed))
     if "." in typed:
         splits.append(re.split(r"\s*,\s*", typed))
-    # A blank may also separate a length from its unit.
+    # A blank separates two lengths only before a number, because it may also precede a unit.
     splits.append(re.split(r"\s+(?=[+\-.,\d])", typed))
     for parts in splits:
         if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts)):
@@ -194,7 +196,7 @@ def _parse_pair(typed: str, signs: str) -> tuple[float, float]:
 
 
 def _parse_angle(typed: str) -> float:
-    """Return an angle in degrees; nan if there is none."""
+    """Parse an angle, degrees; return nan if the text is not one."""
     match = _ANGLE.fullmatch(typed.strip())
     if not match:
         return math.nan
@@ -210,7 +212,7 @@ def _convert_polar(length: float, degrees: float, text: str) -> tuple[float, flo
 
 
 def _round_exactly(value: float) -> float:
-    """Return a coordinate without the rounding errors of units: 1.1 inches are 0.02794 m."""
+    """Round away the errors of unit conversion: 1.1 inches are exactly 0.02794 m. Never minus zero."""
     return round(value, 9) + 0.0
 
 

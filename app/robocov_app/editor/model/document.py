@@ -34,33 +34,39 @@ _CHECK_INTERVAL_S = 1.0
 
 
 class Document:
-    """A map with its history and file. Unsaved changes are kept in a draft.
+    """A map with its history and file. Unsaved changes are stored in a draft.
 
     Parameters
     ----------
     sketch : Sketch
+        Content of the map.
     drafts : Path or None
-        Folder for the draft; None to keep none.
+        Folder for drafts; None to save no drafts.
     path : Path, optional
         File of the map.
     version : FileVersion, optional
-        Version of the file that was read.
+        Version of the file from which the map was read.
     resumed : Path, optional
-        Folder of an earlier draft, which is continued.
+        Folder of a draft from which the map was recovered; it continues to be used.
     saved : bool
-        Whether the file has this content.
+        Whether the file contains this map.
     stem : str
-        Suggested name for a map without a file.
+        Suggested file name, without suffix, for a map without a file.
 
     Attributes
     ----------
     history : UndoHistory
+        Current content of the map, and its changes.
     path : Path or None
+        File of the map.
     version : FileVersion or None
+        Version of the file that was read or written last.
     stem : str
+        Suggested file name, without suffix.
     file_state : {"same", "changed", "gone"}
         State of the file at the last check.
     autosaver : Autosaver
+        Writes the draft.
     """
 
     def __init__(
@@ -89,12 +95,12 @@ class Document:
 
     @classmethod
     def new(cls, drafts: Path | None, path: Path | None = None) -> Self:
-        """Create an empty map with the default boundary; its file need not exist."""
+        """Create a map that contains only the default boundary; its file need not exist yet."""
         return cls(Sketch(boundary=DEFAULT_BOUNDARY), drafts, path)
 
     @classmethod
     def open_file(cls, path: Path, drafts: Path | None) -> Self:
-        """Open a file; a bundled map is opened as a copy without a file."""
+        """Open a map file. A bundled map is opened as a copy without a file."""
         sketch, version = read_sketch(path)
         if is_bundled(path):
             return cls(sketch, drafts, stem=path.stem)
@@ -102,25 +108,25 @@ class Document:
 
     @classmethod
     def recover(cls, draft: MapDraft, drafts: Path | None) -> Self:
-        """Open a draft."""
+        """Open the map of a draft, and continue to use the draft."""
         sketch = draft.read_sketch()
         return cls(sketch, drafts, draft.path, draft.version, resumed=draft.folder, saved=False)
 
     @property
     def title(self) -> str:
-        """Name of the file, or of the map."""
+        """Name of the file; without a file, the suggested name or the name of the map."""
         if self.path is not None:
             return self.path.name
         return self.stem or self.history.sketch.name
 
     def get_folder(self, default: Path) -> Path:
-        """Return the folder of the map's file, or a default one if it has no file."""
+        """Return the folder of the map's file, or a default folder if it has no file."""
         if self.path is None:
             return default
         return self.path.parent
 
     def suggest_path(self, folder: Path) -> Path:
-        """Return the path of the map, or a free one in a folder."""
+        """Return the path of the map or, if it has none, an unused path in a folder, named after the map."""
         if self.path is not None:
             return self.path
         name = self.stem or "-".join(self.history.sketch.name.lower().split())
@@ -134,7 +140,7 @@ class Document:
         return path
 
     def would_replace_valid_map(self, path: Path) -> bool:
-        """Return whether saving would replace a valid map with one that breaks rules."""
+        """Return whether saving to a path would replace a valid map by one that breaks the rules of maps."""
         with suppress(MapError):
             load_map(add_suffix(path))
             try:
@@ -144,28 +150,28 @@ class Document:
         return False
 
     def save(self, path: Path, *, overwrites: bool = False) -> str:
-        """Save the map to a file, whose name also becomes that of an unnamed map.
+        """Save the map to a file. A map without a name is named after the file.
 
         Parameters
         ----------
         path : Path
-            The suffix is added if it is missing.
+            Path of the file. A missing suffix is added.
         overwrites : bool
-            Whether a file that another program has changed is replaced.
+            Whether to replace the file even if another program has changed it.
 
         Returns
         -------
         str
-            A message.
+            Message for the user.
 
         Raises
         ------
         FileChangedError
-            If the file has changed, or another one exists.
+            If another program has changed the file, or the path is new but a file exists there.
         MapError
             If the file is a bundled map.
         OutputError
-            If it cannot be written.
+            If the file cannot be written.
         """
         path = add_suffix(path)
         if is_bundled(path):
@@ -183,7 +189,7 @@ class Document:
         return f"saved: {path}"
 
     def update_draft(self) -> None:
-        """Save a draft of unsaved changes, or remove it if there are none."""
+        """Save a draft if there are unsaved changes, or remove their draft if there are none."""
         previous = self._drafted
         self._drafted = self.history.sketch
         if self._drafted is previous:
@@ -194,12 +200,12 @@ class Document:
             self.autosaver.mark_saved(self.path)
 
     def save_draft(self, sketch: Sketch) -> None:
-        """Save a draft of a sketch that may not be a part of the history yet."""
+        """Save a draft of a sketch, which need not be in the history yet."""
         self._drafted = sketch
         self.autosaver.save_draft(partial(build_draft_content, sketch, self.version))
 
     def flush(self, timeout: float = 5.0) -> bool:
-        """Wait until the draft is written, or for `timeout` seconds; return whether it is."""
+        """Wait at most `timeout` seconds until the draft is written; return whether it is."""
         return self.autosaver.flush(timeout)
 
     def close(self, *, discard: bool) -> None:
@@ -208,7 +214,7 @@ class Document:
         Parameters
         ----------
         discard : bool
-            Whether it is removed.
+            Whether the draft is removed; otherwise the next start offers it.
         """
         self.autosaver.close(discard=discard)
 
@@ -218,12 +224,12 @@ class Document:
         Parameters
         ----------
         now : float, s
-            Time on any clock; the file is checked once a second.
+            Time on any clock. The file is checked at most once per second.
 
         Returns
         -------
         {"same", "changed", "gone"}
-            "same" also if the change was reported before.
+            A change is reported only once; after that, "same".
         """
         if self.version is None or now - self._checked_at < _CHECK_INTERVAL_S:
             return "same"
@@ -236,14 +242,14 @@ class Document:
         return self.file_state
 
     def reload(self) -> None:
-        """Read the file again, as an edit that can be undone."""
+        """Read the file again, as a change that can be undone."""
         assert self.path is not None
         sketch, self.version = read_sketch(self.path)
         self.history.apply(Change(sketch, Selection(), "read again from the file"))
         self._mark_as_saved()
 
     def ignore_disk_change(self) -> None:
-        """Let the next save replace the file although it has changed."""
+        """Allow the next save to replace the file even though another program has changed it."""
         self._overwrites_changed_file = True
 
     def _mark_as_saved(self) -> None:

@@ -1,4 +1,4 @@
-"""Points, angles and outlines, to a tenth of a millimeter and within the reach of maps."""
+"""Points, angles and outlines, rounded to tenths of a millimeter and limited to the range of maps."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,19 +15,20 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.toolkit.tools.geometry import compute_bearing, compute_cos_sin
 
-Box: TypeAlias = tuple[float, float, float, float]  # low x, low y, high x, high y, m
-SHIFT_ANGLE_DEG = 15.0  # with Shift, lines are drawn at multiples of this
-DECIMALS = 4  # decimal places of the lengths that the editor writes, m
+Box: TypeAlias = tuple[float, float, float, float]  # minimum x and y, maximum x and y, m
+SHIFT_ANGLE_DEG = 15.0  # while Shift is held, lines snap to multiples of this angle
+DECIMALS = 4  # decimal places of lengths in files, m: tenths of a millimeter
 distance = math.dist
 
 
 def round_length(length: float) -> float:
-    """Return a length to a tenth of a millimeter, never minus zero."""
+    """Round a length to tenths of a millimeter; never return minus zero."""
+    # Adding 0.0 turns -0.0 into 0.0.
     return round(float(length), DECIMALS) + 0.0
 
 
 def round_point(point: Iterable[float]) -> Point:
-    """Return a point to a tenth of a millimeter."""
+    """Round a point to tenths of a millimeter."""
     x, y = point
     return round_length(x), round_length(y)
 
@@ -38,9 +39,9 @@ def to_array(points: Sequence[Point] | Array) -> Array:
 
 
 def round_ring(points: Sequence[Point] | Array) -> Ring:
-    """Return points to a tenth of a millimeter; raise MapError if any is beyond the reach of maps."""
+    """Round points to tenths of a millimeter; raise MapError if any is too far from the origin."""
     coordinates = to_array(points)
-    # Written so that nan is too far away, too.
+    # This comparison is also false for nan.
     is_within_reach = np.all(np.abs(coordinates) <= MAX_COORDINATE_M)
     limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
     require(is_within_reach, f"that is too far away: {limit}")
@@ -48,12 +49,12 @@ def round_ring(points: Sequence[Point] | Array) -> Ring:
 
 
 def check_point(point: Point) -> Point:
-    """Return a point to a tenth of a millimeter; raise MapError if it is beyond the reach of maps."""
+    """Round a point to tenths of a millimeter; raise MapError if it is too far from the origin."""
     return round_ring([point])[0]
 
 
 def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
-    """Return points without those that repeat the one before; closed rings also at their end."""
+    """Remove points that equal the previous one; in a closed ring, also a last one that equals the first."""
     points = [point for point, _ in groupby(ring)]
     if closed and len(points) > 1 and points[0] == points[-1]:
         points.pop()
@@ -61,19 +62,19 @@ def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
 
 
 def compute_levelling_angle(a: Point, b: Point) -> float:
-    """Return the angle by which a line must turn to be level or upright, whichever is nearer, degrees."""
+    """Return the smallest rotation that makes the line from `a` to `b` horizontal or vertical, degrees."""
     return 90.0 * round(compute_bearing(a, b) / 90.0) - compute_bearing(a, b)
 
 
 def constrain_angle(origin: Point, point: Point) -> Point:
-    """Return the nearest point on a line through `origin` at a multiple of `SHIFT_ANGLE_DEG`."""
+    """Move a point to the nearest line through `origin` whose angle is a multiple of `SHIFT_ANGLE_DEG`."""
     cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
     along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
     return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0
 
 
 def build_rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
-    """Return the corners of a rectangle between two opposite ones."""
+    """Return the four corners of an axis-aligned rectangle, given two opposite ones."""
     return a, (b[0], a[1]), b, (a[0], b[1])
 
 
@@ -83,13 +84,16 @@ def compute_center(box: Box) -> Point:
 
 
 def enclose_boxes(boxes: Iterable[Box]) -> Box:
-    """Return the bounding box of boxes, m."""
+    """Return the common bounding box of several boxes, m."""
     low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
     return min(low_x), min(low_y), max(high_x), max(high_y)
 
 
 def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Return the polygons of a geometry to a tenth of a millimeter, the largest first, without tiny ones."""
+    """Convert the polygons of a geometry to obstacles with a name, the largest first.
+
+    Coordinates are rounded to tenths of a millimeter. Tiny polygons and holes are dropped.
+    """
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_tiny(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
@@ -103,21 +107,21 @@ def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tup
 
 def _is_tiny(part: shapely.Geometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
-    # Written so that an empty geometry, whose bounds are nan, is tiny, too.
+    # `not` includes empty geometries, whose bounds are nan.
     return not min(high_x - low_x, high_y - low_y) >= MIN_SIZE_M
 
 
 def format_bearing(a: Point, b: Point) -> str:
-    """Format length and direction from a point to another: "2.40 m  ∠ 90°"."""
+    """Format the distance and direction from one point to another, for example "2.40 m  ∠ 90°"."""
     angle = compute_bearing(a, b)
     if abs(angle) < 0.05:
-        # Otherwise it could become "-0".
+        # Prevents "-0".
         angle = 0.0
     return f"{format_length(distance(a, b))}  ∠ {angle:.1f}".removesuffix(".0") + "°"
 
 
 def format_length(meters: float) -> str:
-    """Format a length: "2.3 cm", "12.35 m", "1234.5 m"."""
+    """Format a length, for example "2.3 cm", "12.35 m" or "1234.5 m"."""
     if meters < 0.1:
         return f"{100 * meters:.1f} cm"
     if meters < 1000:
@@ -126,7 +130,7 @@ def format_length(meters: float) -> str:
 
 
 def format_point(point: Point) -> str:
-    """Format a position: "(1.00, 2.50) m"."""
+    """Format a position, for example "(1.00, 2.50) m"."""
     x = round(point[0], 2) + 0.0  # never minus zero
     y = round(point[1], 2) + 0.0
     return f"({x:.2f}, {y:.2f}) m"

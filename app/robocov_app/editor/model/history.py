@@ -1,4 +1,4 @@
-"""The history of a sketch: changes that can be undone and redone."""
+"""Undo history of a sketch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robocov_app.editor.model.sketch import Sketch
 
 @dataclass
 class _Step:
-    """A change, and the state before it, which has the description of the change."""
+    """A step of the history: the states before and after a change, both with its description."""
 
     before: Change
     after: Change
@@ -19,24 +19,25 @@ class _Step:
 
 
 class UndoHistory:
-    """A sketch, and all its earlier states.
+    """A sketch with the steps that can be undone and redone.
 
     Parameters
     ----------
     sketch : Sketch
     saved : bool
-        Whether the file has this content.
+        Whether the file contains this sketch.
 
     Attributes
     ----------
     sketch : Sketch
-        The present state.
+        Current state.
     selection : Selection
-        The present selection, which the window may set.
+        Current selection, which the window may set.
     saved : Sketch or None
-        Content of the file; None if it is not one of these states.
+        The state that the file contains; None if it is none of the states.
     starts_new_step : bool
-        Whether the next change is a step of its own, as after the mouse was released.
+        Whether the next change becomes a new step even if it belongs to the same drag, for example because
+        the mouse button was released.
     """
 
     def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
@@ -50,18 +51,18 @@ class UndoHistory:
         self._redoable: list[_Step] = []
 
     def apply(self, change: Change, *, drag: Hashable | None = None) -> bool:
-        """Apply a change.
+        """Apply a change as a new step, or as part of the current drag.
 
         Parameters
         ----------
         change : Change
         drag : hashable, optional
-            Identity of a movement of the mouse; consecutive changes of the same drag become one step.
+            Identifies a drag of the mouse. Consecutive changes of the same drag become one step.
 
         Returns
         -------
         bool
-            Whether anything has changed, besides the selection.
+            Whether anything other than the selection has changed.
         """
         before = Change(self.sketch, self.selection, change.description)
         continues_drag = drag is not None and bool(self._undoable) and self._undoable[-1].drag == drag
@@ -74,7 +75,7 @@ class UndoHistory:
             before = replace(self._undoable.pop().before, description=change.description)
         self.sketch = change.sketch
         self._redoable = []
-        # A drag that returns to where it started is no step.
+        # A drag that has returned to its start leaves no step.
         if change.sketch != before.sketch:
             self._undoable.append(_Step(before, change, drag))
         return True
@@ -85,7 +86,7 @@ class UndoHistory:
         Returns
         -------
         Change or None
-            The state before, with the description of the change; None if there is nothing to undo.
+            State before the change, with its description; None if there is nothing to undo.
         """
         if not self._undoable:
             return None
@@ -94,12 +95,12 @@ class UndoHistory:
         return self._go_to(step.before)
 
     def redo(self) -> Change | None:
-        """Redo the change that was undone last.
+        """Redo the most recently undone change.
 
         Returns
         -------
         Change or None
-            The state after it; None if there is nothing to redo.
+            State after the change; None if there is nothing to redo.
         """
         if not self._redoable:
             return None
@@ -114,18 +115,18 @@ class UndoHistory:
         return state
 
     def rewrite_all(self, change: Callable[[Sketch], Sketch]) -> None:
-        """Change the present state and all others, without a step of its own.
+        """Replace the sketches of the current state and of all steps, without adding a step.
 
         Parameters
         ----------
         change : callable
-            Called once for each different state.
+            Takes a sketch and returns the new one.
         """
         steps = [*self._undoable, *self._redoable]
         sketches = [self.sketch]
         for step in steps:
             sketches += [step.before.sketch, step.after.sketch]
-        # Steps that share a sketch still share it afterwards.
+        # Steps that share a sketch object still share one afterwards.
         changed_by_id = {id(sketch): change(sketch) for sketch in sketches}
         for step in steps:
             step.before = replace(step.before, sketch=changed_by_id[id(step.before.sketch)])
@@ -143,7 +144,7 @@ class UndoHistory:
         return tuple(step.after.description for step in reversed(self._redoable))
 
     def build_save_point(self) -> Callable[[], None]:
-        """Return a function that restores the present state, with its steps."""
+        """Return a function that restores the current state together with all steps."""
         state = dict(vars(self))
         undoable = [*self._undoable]
         redoable = [*self._redoable]
@@ -156,11 +157,11 @@ class UndoHistory:
         return restore
 
     def mark_saved(self) -> None:
-        """Note that the file has the present content."""
+        """Record that the file contains the current state."""
         self.saved = self.sketch
         self.starts_new_step = True
 
     @property
     def has_unsaved_changes(self) -> bool:
-        """Whether changes would be lost; false again after undoing back to the saved state."""
+        """Whether the current state differs from the file; false again after undo to the saved state."""
         return self.saved is not self.sketch and self.saved != self.sketch

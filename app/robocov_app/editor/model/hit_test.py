@@ -1,4 +1,4 @@
-"""Hit testing under the cursor and in a box; locked and hidden obstacles are skipped."""
+"""Hit tests at the cursor and in a box; locked and hidden obstacles are skipped."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,25 +13,26 @@ from robocov_app.editor.model.selection import Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 from robocov_app.toolkit.tools.geometry import find_nearest_on_edges
 
-MANY_OBJECTS = 8  # of more objects, only those near the point are searched
+MANY_OBJECTS = 8  # if there are more objects, only those near the point are searched
 
 
 def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
-    """Return the objects that a click may mean, the most likely first.
+    """Return the objects that a click may refer to, the most likely first.
 
     Parameters
     ----------
     sketch : Sketch
         The map.
     point : Point
-        Where the click was, m.
+        Position of the click, m.
     reach : float
-        Distance within which an object is meant, m.
+        Maximum distance of an object from the click, m.
 
     Returns
     -------
     tuple of Owner
-        Starts near the point, obstacles on it, starts around it, obstacles near it, and the boundary.
+        In this order: starts near the point, obstacles that contain it, disc-shaped starts that contain it,
+        obstacles near it, and the boundary if an edge is near.
     """
     near_starts: list[Owner] = []
     surrounding_starts: list[Owner] = []
@@ -53,7 +54,7 @@ def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]
 
 
 def _is_near_start(start: StartSpec, point: Point, reach: float) -> bool:
-    """Return whether the center or rim of a disc, or a position, is within `reach` meters."""
+    """Return whether the center or rim of a disc, or any position, is within `reach` meters of a point."""
     if isinstance(start, DiscStart):
         distance = math.dist(point, start.center)
         return distance <= reach or abs(distance - start.radius) <= reach
@@ -63,13 +64,13 @@ def _is_near_start(start: StartSpec, point: Point, reach: float) -> bool:
 
 
 def find_obstacles(sketch: Sketch, point: Point, reach: float) -> list[int]:
-    """Return the keys of the obstacles that a click may mean, see `find_owners`."""
+    """Return the keys of the obstacles that a click may refer to; see `find_owners`."""
     owners = find_owners(sketch, point, reach)
     return [owner for owner in owners if isinstance(owner, int) and owner != BOUNDARY]
 
 
 def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
-    """Return the nearest edge of some objects within `reach` meters of a point."""
+    """Return the edge of the given objects nearest to a point; None if it is farther than `reach` meters."""
     searched = list(owners)
     if len(searched) > MANY_OBJECTS:
         nearby = {item.key for item in _list_items_near(sketch, point, reach)}
@@ -93,7 +94,7 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
 
 
 def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
-    """Return the objects in a box.
+    """Select the objects in a box.
 
     Parameters
     ----------
@@ -102,7 +103,8 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
     a, b : Point
         Opposite corners of the box, m.
     touched : bool
-        Whether to include objects that the box only touches; the boundary counts only as a whole.
+        Whether to include objects that are only partly in the box. The boundary must always be completely
+        inside.
     """
     box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
     if touched:
@@ -126,7 +128,7 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
 
 
 def _is_start_in_box(sketch: Sketch, name: str, a: Point, b: Point, *, touched: bool) -> bool:
-    """Return whether all points of a start, or with `touched` any of them, are in a box."""
+    """Return whether all vertices of a start (with `touched`, any of them) are in a box."""
     inside = _is_in_box([position for _, position in list_vertices(sketch, name)], a, b)
     if touched:
         return bool(inside.any())
@@ -134,21 +136,21 @@ def _is_start_in_box(sketch: Sketch, name: str, a: Point, b: Point, *, touched: 
 
 
 def find_vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
-    """Return the vertices of some objects in a box between two corners, m."""
+    """Select the vertices of the given objects in a box between two corners, m."""
     pairs = [pair for owner in owners for pair in list_vertices(sketch, owner)]
     inside = _is_in_box([position for _, position in pairs], a, b)
     return Selection(vertices=frozenset(pairs[k][0] for k in np.flatnonzero(inside).tolist()))
 
 
 def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
-    """Return for each of (k, 2) points, m, whether it is in a box."""
+    """Return which of (k, 2) points, m, are in a box between two corners."""
     coordinates = to_array(points)
     is_inside = (coordinates >= np.minimum(a, b)) & (coordinates <= np.maximum(a, b))
     return np.asarray(is_inside.all(axis=1))
 
 
 def _list_items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
-    """Return the obstacles whose bounding boxes are within `reach` meters, from the bottom to the top."""
+    """Return the obstacles whose bounds are within `reach` meters of a point, from bottom to top."""
     x, y = point
     indices = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
     return [sketch.obstacles[index] for index in sorted(indices.tolist())]

@@ -1,4 +1,4 @@
-"""Drafts of unsaved maps, which an editor that ended unexpectedly leaves behind."""
+"""Drafts of unsaved maps, which can be recovered after the editor has ended unexpectedly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robocov_app.editor.model.sketch import Sketch, dump_sketch, to_document
 from robocov_app.storage import autosave
 
 KIND = "robocov-draft"
-"""Kind of these drafts."""
+"""Kind of the drafts of maps; see `robocov_app.storage.autosave`."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,15 @@ class MapDraft:
     folder : Path
         Folder of the draft.
     path : Path or None
-        The file that the map belongs to; None if it was never saved.
+        File of the map; None if it was never saved.
     name : str
         Name of the map.
     when : datetime
-        Local time of the draft.
+        Local time at which the draft was written.
     obstacles : int
         Number of obstacles.
     version : FileVersion or None
-        Version of the file that was read or written last.
+        Version of the file that the editor read or wrote last.
     """
 
     folder: Path
@@ -48,11 +48,11 @@ class MapDraft:
     version: FileVersion | None
 
     def read_sketch(self) -> Sketch:
-        """Return the map."""
+        """Read the map from the draft."""
         return build_sketch(autosave.read_draft(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def describe(self, now: datetime | None = None) -> str:
-        """Describe the draft: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
+        """Describe the draft, such as "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
         now = now or datetime.now().astimezone()
         days = (now.date() - self.when.date()).days
         day = {0: "today", 1: "yesterday"}.get(days, f"{self.when:%Y-%m-%d}")
@@ -64,7 +64,7 @@ class MapDraft:
 
 
 def build_draft_content(sketch: Sketch, version: FileVersion | None) -> dict[str, Any]:
-    """Return the content of a draft."""
+    """Build the content of a draft: the version of the file, and the map."""
     disk = None
     if version is not None:
         disk = {"digest": version.digest, "stamp": list(version.stamp)}
@@ -72,7 +72,10 @@ def build_draft_content(sketch: Sketch, version: FileVersion | None) -> dict[str
 
 
 def _read_draft(draft: autosave.Draft) -> MapDraft | None:
-    """Return the map of a draft; None if it has none, or if the file already has the same content."""
+    """Return the map of a draft; None if there is nothing to recover.
+
+    That is the case if the draft has no map, or if the file already contains the same map.
+    """
     document = draft.content.get("sketch")
     if document is None:
         return None
@@ -92,7 +95,7 @@ def _read_draft(draft: autosave.Draft) -> MapDraft | None:
 
 
 def _read_version(draft: autosave.Draft) -> FileVersion | None:
-    """Return the version of the file that a draft belongs to; None if it has no file."""
+    """Return the version of the file of a draft; None if it has no file."""
     disk = draft.content.get("disk")
     if disk is None or draft.path is None:
         return None
@@ -104,6 +107,6 @@ def _read_version(draft: autosave.Draft) -> FileVersion | None:
 
 
 find_recoverable = partial(autosave.find_drafts, kind=KIND, read=_read_draft)
-"""Find the drafts below a folder."""
+"""Find the drafts of maps in a folder for drafts; see `autosave.find_drafts`."""
 is_open_elsewhere = partial(autosave.is_open_elsewhere, kind=KIND)
-"""Return whether another editor has a map open, given by `path`."""
+"""Return whether another editor has the map file `path` open; see `autosave.is_open_elsewhere`."""

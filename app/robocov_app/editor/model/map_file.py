@@ -1,4 +1,4 @@
-"""Reading and writing of the editor's map files, and changes that other programs make to them."""
+"""Reading and writing map files in the editor, and detecting changes by other programs."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from robocov_app.editor.model.sketch import Sketch, dump_sketch
 
 SUFFIX = ".json"
 FileState: TypeAlias = Literal["same", "changed", "gone"]
-"""State of a file compared with an earlier one."""
+"""State of a file compared with an earlier version."""
 _Stamp: TypeAlias = tuple[int, int]
-"""Size (bytes) and time of the last change (ns) of a file, which are quick to read."""
+"""Size (bytes) and modification time (ns) of a file, which are quick to read."""
 _UNKNOWN_STAMP = (-1, 0)
 
 
 class FileChangedError(OutputError):
-    """A file has changed since it was read or written, or one exists that was not expected."""
+    """A file has changed since it was read or written, or a file exists that was expected to be new."""
 
 
 @dataclass(frozen=True)
 class FileVersion:
-    """A version of a file, which was read or written.
+    """A version of a file, as it was read or written.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class FileVersion:
     digest : str
         SHA-256 of its content.
     stamp : tuple of int
-        Size (bytes) and time of the last change (ns).
+        Size (bytes) and modification time (ns).
     """
 
     path: Path
@@ -48,7 +48,7 @@ class FileVersion:
 
 
 def read_sketch(path: Path) -> tuple[Sketch, FileVersion]:
-    """Read a map.
+    """Read a map file.
 
     Parameters
     ----------
@@ -57,7 +57,9 @@ def read_sketch(path: Path) -> tuple[Sketch, FileVersion]:
     Returns
     -------
     sketch : Sketch
+        The map.
     version : FileVersion
+        The version of the file that was read.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def read_sketch(path: Path) -> tuple[Sketch, FileVersion]:
         If the file cannot be read.
     """
     path = path.absolute()
-    # The stamp is taken first, so that a change during reading is noticed later.
+    # The stamp is read first, so that a change while reading is detected later.
     stamp = _read_stamp(path)
     content = read_bytes(path)
     version = FileVersion(path, sha256(content).hexdigest(), stamp or _UNKNOWN_STAMP)
@@ -75,28 +77,28 @@ def read_sketch(path: Path) -> tuple[Sketch, FileVersion]:
 def write_sketch(
     sketch: Sketch, path: Path, expected: FileVersion | None = None, *, overwrites: bool = False
 ) -> FileVersion:
-    """Write a map, completely or not at all.
+    """Write a map file atomically.
 
     Parameters
     ----------
     sketch : Sketch
     path : Path
     expected : FileVersion, optional
-        The version that may be replaced; without it, there must be no file.
+        Version of the file that may be replaced. By default, no file may exist.
     overwrites : bool
-        Whether any file is replaced.
+        Whether to replace the file whatever its version.
 
     Returns
     -------
     FileVersion
-        The new version.
+        The version that was written.
 
     Raises
     ------
     FileChangedError
         If the file is not the expected version, unless `overwrites` is set.
     OutputError
-        If it cannot be written.
+        If the file cannot be written.
     """
     path = path.absolute()
     content = dump_sketch(sketch).encode()
@@ -119,7 +121,7 @@ def _require_unchanged(path: Path, expected: FileVersion | None) -> None:
 
 
 def check_file(version: FileVersion) -> FileState:
-    """Compare a file with an earlier version; a file that was only written again is the same.
+    """Compare a file with an earlier version. It counts as the same if its content is the same.
 
     Parameters
     ----------
@@ -147,14 +149,14 @@ def check_file(version: FileVersion) -> FileState:
 
 def is_bundled(path: Path) -> bool:
     """Return whether a file is one of the maps that come with robocov."""
-    # A path that no file can have is not that of a bundled map.
+    # Invalid paths raise errors; they are not those of bundled maps.
     with suppress(OSError, ValueError, RuntimeError):
         return path.resolve() in {bundled.resolve() for bundled in list_bundled_maps().values()}
     return False
 
 
 def add_suffix(path: Path) -> Path:
-    """Return a path with the suffix of map files."""
+    """Return a path with the suffix of map files, which is added if it is missing."""
     if path.suffix.lower() == SUFFIX:
         return path
     return path.with_name(path.name + SUFFIX)

@@ -17,34 +17,36 @@ from robocov_app.jobs.messages import Channel, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
 _WALL_TOLERANCE_M = 1e-5
-"""Distance within which an edge lies on a wall."""
+"""Maximum distance from a wall at which an edge counts as lying on it."""
 _FIT_TOLERANCE_M = 1e-6
-"""Length by which a passage may be narrower than a robot that just fits."""
+"""Tolerance for a passage that is exactly as wide as a robot."""
 _MAX_GAPS = 20
-"""Maximum number of gaps with a warning of their own."""
+"""Maximum number of gaps with separate warnings; the others share one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Measurements of a sketch for robots of a radius.
+    """Measurements of a sketch for robots with a given radius.
 
     Attributes
     ----------
     free_area : float, m²
+        Area of the free space.
     components : tuple of float, m²
         Areas of the connected components of the free space, the largest first.
     reached : tuple of float, m²
-        Areas that a robot can sweep without leaving its part of the free space, the largest first.
+        Area of each part of the free space that a robot can cover without leaving it, the largest first.
     gap : Gap or None
         The narrowest passage.
     impassable : MultiPolygon
-        For each passage that is too narrow, the largest disc that passes; and the space that no robot
-        touches, see `compute_reach`.
+        Areas to mark as impassable: in each passage that is too narrow, the largest disc that fits through
+        it; and the space that no robot can touch, see `compute_reach`.
     sealed : MultiPolygon
-        Free space where robots fit, but that they cannot reach from the largest part.
+        Free space in which robots fit, but which they cannot reach from the largest part.
     vertices : int
         Number of vertices of the boundary, walls, polygons and their holes.
     problems : tuple of Problem
+        Errors and warnings.
     radius : float, m
         Radius of the robots.
     """
@@ -61,12 +63,12 @@ class Measurement:
 
 
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
-    """Measure a sketch.
+    """Measure a sketch, and find its problems.
 
     Parameters
     ----------
     sketch : Sketch
-        It may break rules, as long as its free space can be determined.
+        The map. It may break rules; then its free space is approximated.
     radius : float, m
         Radius of the robots.
 
@@ -105,21 +107,23 @@ def _count_vertices(sketch: Sketch) -> int:
 def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry, ...], MultiPolygon]:
     """Compute the space that robots can sweep, and the space that none of them can touch.
 
-    The results are right to about a hundredth of the radius.
+    The results are accurate to about a hundredth of the radius.
 
     Parameters
     ----------
     free : MultiPolygon, m
+        The free space.
     radius : float, m
+        Radius of the robots.
 
     Returns
     -------
     swept : tuple of geometries, m
-        The space that a robot sweeps from anywhere in each part that it can drive in, the largest first: the
-        connected components of the opening of the free space by the robot's disc.
+        For each part in which a robot can move, the space that it sweeps, the largest first. These are the
+        connected components of the morphological opening of the free space by the disc of a robot.
     untouched : MultiPolygon, m
-        Passages and niches that are too narrow for robots. The remainders in corners do not count; they meet
-        the swept space in one arc, and lie within the radius of it.
+        Passages and niches that are too narrow for robots. The remainders in corners are not included: each
+        of them meets the swept space in a single arc, and lies within the radius of it.
     """
     eroded = _list_polygons(free.buffer(_FIT_TOLERANCE_M - radius))
     dilated = [part.buffer(radius) & free for part in eroded if part.area > 0.0]
@@ -130,17 +134,17 @@ def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geom
     if not len(parts):
         return swept, MultiPolygon()
     is_beyond_corner = _exceeds_distance(parts, opening, radius) | (_count_open_stretches(parts, free) != 1)
-    # A part that is no wider than a crack counts as touched.
+    # Cracks that are hardly wider than the accuracy of arcs are ignored.
     is_wide = ~shapely.is_empty(shapely.buffer(parts, -MAX_SAGITTA_M, quad_segs=2))
     return swept, MultiPolygon(list(parts[is_beyond_corner & is_wide]))
 
 
 def _exceeds_distance(parts: Array, target: shapely.Geometry, distance: float) -> BoolArray:
-    """Return for each polygon whether any vertex is farther from the target than a distance, m."""
+    """Return which polygons have a vertex that is farther from the target than a distance, m."""
     if target.is_empty:
         return np.ones(len(parts), dtype=bool)
     points, part_of_point = shapely.get_coordinates(parts, return_index=True)
-    # GEOS uses the prepared geometry for `dwithin`, but not for `distance`, which matters with many walls.
+    # GEOS uses prepared geometries for `dwithin` but not for `distance`, which is slow with many walls.
     shapely.prepare(target)
     exceeds = np.zeros(len(parts), dtype=bool)
     np.logical_or.at(exceeds, part_of_point, ~shapely.dwithin(target, shapely.points(points), distance))
@@ -148,7 +152,7 @@ def _exceeds_distance(parts: Array, target: shapely.Geometry, distance: float) -
 
 
 def _count_open_stretches(parts: Array, free: MultiPolygon) -> IntArray:
-    """Return for each polygon the number of stretches of its outline that do not lie on walls."""
+    """Count, for each polygon, the connected stretches of its outline that do not lie on walls."""
     walls = free.boundary
     shapely.prepare(walls)
     rings, part_of_ring = shapely.get_rings(parts, return_index=True)
@@ -157,14 +161,14 @@ def _count_open_stretches(parts: Array, free: MultiPolygon) -> IntArray:
     middles = ((points[1:] + points[:-1]) / 2)[is_edge]
     ring_of_edge = ring_of_point[1:][is_edge]
     is_open = ~shapely.dwithin(walls, shapely.points(middles), _WALL_TOLERANCE_M)
-    # The edge before the first one of a ring is its last one.
+    # The predecessor of the first edge of a ring is the last edge of the same ring.
     first_edges = np.searchsorted(ring_of_edge, np.arange(len(rings)))
     previous_edge = np.arange(len(ring_of_edge)) - 1
     previous_edge[first_edges] = np.append(first_edges[1:], len(ring_of_edge)) - 1
     counts = np.zeros(len(parts), dtype=np.intp)
     begins_stretch = is_open & ~is_open[previous_edge]
     np.add.at(counts, part_of_ring[ring_of_edge[begins_stretch]], 1)
-    # A ring that does not touch any wall is one stretch without a beginning.
+    # A ring that touches no wall is a single stretch that begins nowhere.
     is_all_open = np.logical_and.reduceat(is_open, first_edges)
     np.add.at(counts, part_of_ring[is_all_open], 1)
     return counts
@@ -175,7 +179,10 @@ def _compute_middle(gap: Gap) -> Point:
 
 
 def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
-    """Warn of each passage that is too narrow; of several gaps in the same mark, only of the narrowest."""
+    """Warn about each passage that is too narrow.
+
+    If several gaps are in the same marked area, only the narrowest one is reported.
+    """
     reason = f"too narrow for robots of radius {radius:g} m"
     tree = shapely.STRtree(marks)
     problem_by_mark: dict[int, Problem] = {}
@@ -184,6 +191,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
         message = f"the gap at {format_position(*middle)} is {gap.width:.3g} m wide: {reason}"
         mark = int(tree.nearest(shapely.Point(middle)))
         problem = Problem(message, LineString(gap.between), None, False, "narrow")
+        # Gaps are sorted by width, so the first one of a mark is the narrowest.
         problem_by_mark.setdefault(mark, problem)
     problems = list(problem_by_mark.values())
     others = problems[_MAX_GAPS:]
@@ -196,7 +204,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
 def _build_reach_warnings(
     free: MultiPolygon, swept: tuple[shapely.Geometry, ...], sealed: MultiPolygon, radius: float
 ) -> list[Problem]:
-    """Warn of free space that no robot can enter, or that robots cannot reach from the largest part."""
+    """Warn if robots fit nowhere, or if they cannot reach all parts of the free space from the largest."""
     if not free.is_empty and not swept:
         return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
     min_area = np.pi * radius**2
@@ -215,17 +223,17 @@ def _list_polygons(geometry: shapely.Geometry) -> list[Polygon]:
 
 
 Question: TypeAlias = tuple[Sketch, tuple[int, ...], float]
-"""A sketch with the obstacles that the process does not know, the keys of all, and a radius, m."""
+"""A sketch with only new or changed obstacles, the keys of all its obstacles in order, and a radius, m."""
 
 
 class MeasurementWire(Wire):
-    """Sends a process only the changes of each sketch."""
+    """Wire that sends only the obstacles that have changed since the previous sketch."""
 
     def __init__(self) -> None:
         self._known: dict[int, Item] = {}
 
     def encode(self, question: tuple[Sketch, float]) -> Question:
-        """Return a question with only those obstacles that the process does not know."""
+        """Return a question with only those obstacles that the process has not received yet."""
         sketch, radius = question
         changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
         self._known = {item.key: item for item in sketch.obstacles}
@@ -233,7 +241,7 @@ class MeasurementWire(Wire):
 
 
 class SketchMeasurer:
-    """Measures sketches; it receives only their changes."""
+    """Service that measures sketches, of which it receives only the changes."""
 
     failure_message = "the map could not be measured"
 
@@ -241,7 +249,7 @@ class SketchMeasurer:
         self._known: dict[int, Item] = {}
 
     def __call__(self, questions: list[Question], channel: Channel) -> Measurement:
-        """Apply the changes of all questions, and measure the last sketch."""
+        """Apply the changes in all questions, and measure the last sketch."""
         for sketch, order, _ in questions:
             known = self._known | {item.key: item for item in sketch.obstacles}
             self._known = {key: known[key] for key in order}
@@ -249,12 +257,12 @@ class SketchMeasurer:
 
 
 def create_measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
-    """Create a worker that measures sketches; its questions are (sketch, radius in m).
+    """Create a worker that measures sketches. Its questions are tuples (sketch, radius in m).
 
     Parameters
     ----------
     direct : bool
-        Whether it measures at once in this process, instead of in another one.
+        Whether to measure immediately in this process instead of in a separate one.
     """
     if direct:
         return DirectWorker(SketchMeasurer(), MeasurementWire())

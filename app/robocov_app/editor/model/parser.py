@@ -1,7 +1,7 @@
 """Reading of sketches from map documents.
 
-A sketch may break the rules of maps, so that its mistakes can be corrected in the editor. A document that
-cannot be represented as a sketch, for instance because a point has three coordinates, is an error.
+A sketch may break the rules of maps, so that mistakes can be corrected in the editor. A document that cannot
+be represented as a sketch, for instance because a point has three coordinates, raises an error.
 """
 
 from __future__ import annotations
@@ -48,10 +48,11 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
     Parameters
     ----------
     text : str or bytes
+        JSON text.
     where : str
         Name of the file in messages.
     folder : Path, optional
-        Folder of its pictures.
+        Folder of the pictures to which the map refers.
 
     Returns
     -------
@@ -60,7 +61,7 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
     Raises
     ------
     MapError
-        If it cannot be represented as a sketch; the message has the line and column.
+        If the text cannot be represented as a sketch. The message contains line and column.
     """
     document = parse_json(text, where)
     try:
@@ -75,10 +76,11 @@ def build_sketch(document: Any, where: str = "map", folder: Path | None = None) 
     Parameters
     ----------
     document : object
+        Parsed JSON.
     where : str
         Name of the document in messages.
     folder : Path, optional
-        Folder of its pictures.
+        Folder of the pictures to which the map refers.
 
     Returns
     -------
@@ -87,7 +89,7 @@ def build_sketch(document: Any, where: str = "map", folder: Path | None = None) 
     Raises
     ------
     MapError
-        If it cannot be represented as a sketch.
+        If the document cannot be represented as a sketch.
     """
     where = to_one_line(where)
     require_json(document, where)
@@ -136,7 +138,7 @@ def _read_starts(reader: _Reader, value: Any) -> tuple[tuple[str, Any], ...]:
 
 
 class _Reader:
-    """Reads the parts of a map document; the message of each MapError has the path in the document.
+    """Reads the parts of a map document. Each MapError contains the path in the document.
 
     Parameters
     ----------
@@ -146,6 +148,7 @@ class _Reader:
 
     def __init__(self, where: str) -> None:
         self._where = where
+        # How to read the fields of obstacles, starts and paths, by their names.
         self._readers: dict[str, Callable[[Any, JsonPath], Any]] = {
             "center": self.read_point,
             "holes": self.read_rings,
@@ -161,7 +164,7 @@ class _Reader:
         }
 
     def fail(self, path: JsonPath, message: str, *, at_key: bool = False) -> NoReturn:
-        """Raise MapError for the value at a path, or with `at_key` for its key."""
+        """Raise MapError about the value at a path or, with `at_key`, about its key."""
         named_path = path
         if at_key:
             named_path = path[:-1]
@@ -170,13 +173,13 @@ class _Reader:
         raise MapError.from_mistakes(self._where, [Mistake(path, message, at_key)])
 
     def require_type(self, kind: type[_Value], value: Any, path: JsonPath, expected: str) -> _Value:
-        """Return a value if it is of a type."""
+        """Return a value unchanged; raise MapError unless it has the given type."""
         if not isinstance(value, kind):
             self.fail(path, f"expected {expected}, got {quote_json(value)}")
         return value
 
     def read_object(self, value: Any, path: JsonPath, keys: Sequence[str]) -> dict[str, Any]:
-        """Return an object that has no keys besides the given ones."""
+        """Return a JSON object; raise MapError if it has keys other than the given ones."""
         members = self.require_type(dict, value, path, "an object")
         for key in members:
             if key not in keys:
@@ -184,47 +187,47 @@ class _Reader:
         return members
 
     def read_text(self, value: Any, path: JsonPath) -> str:
-        """Return a string."""
+        """Read a string."""
         return self.require_type(str, value, path, "a string")
 
     def read_number(self, value: Any, path: JsonPath) -> float:
-        """Return a finite number."""
+        """Read a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             self.fail(path, f"expected a number, got {quote_json(value)}")
         return float(value)
 
     def read_point(self, value: Any, path: JsonPath) -> Point:
-        """Return a position, m."""
+        """Read a position, m."""
         if not isinstance(value, list | tuple) or len(value) != 2:
             self.fail(path, f"expected a point [x, y] in meters, got {quote_json(value)}")
         x, y = value
         if type(x) is float and type(y) is float:
-            # A large file consists mostly of such points, for which no paths need to be built.
+            # Fast path: large files consist mostly of such points, and building paths takes time.
             return x, y
         return self.read_number(x, (*path, 0)), self.read_number(y, (*path, 1))
 
     def read_ring(self, value: Any, path: JsonPath) -> Ring:
-        """Return a list of positions, m."""
+        """Read a list of positions, m."""
         points = self.require_type(list, value, path, "a list of points [x, y]")
         return tuple([self.read_point(point, (*path, k)) for k, point in enumerate(points)])
 
     def read_rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
-        """Return a list of lists of positions, m."""
+        """Read a list of lists of positions, m."""
         rings = self.require_type(list, value, path, "a list of rings")
         return tuple([self.read_ring(ring, (*path, k)) for k, ring in enumerate(rings)])
 
     def read_repeat(self, value: Any, path: JsonPath) -> env.Repeat:
-        """Return the mode in which a moving obstacle repeats its path."""
+        """Read how a moving obstacle repeats its path."""
         if value not in env.REPEATS:
             self.fail(path, f"expected one of {', '.join(env.REPEATS)}, got {quote_json(value)}")
         return value  # type: ignore[no-any-return]
 
     def read_motion(self, value: Any, path: JsonPath) -> env.ObstaclePath:
-        """Return the path of a moving obstacle."""
+        """Read the path of a moving obstacle."""
         return self.read_fields(env.ObstaclePath, value, path)
 
     def read_variant(self, classes: Mapping[str, type[_Value]], value: Any, path: JsonPath) -> _Value:
-        """Return an object of the class that its key ``kind`` names."""
+        """Read an object whose class is given by its key ``kind``."""
         expected = f"one of {', '.join(classes)}"
         members = self.require_type(dict, value, path, f"an object whose kind is {expected}")
         if "kind" not in members:
@@ -237,9 +240,9 @@ class _Reader:
     def read_fields(
         self, cls: type[_Value], value: Any, path: JsonPath, other_keys: Sequence[str] = ()
     ) -> _Value:
-        """Return an object of a dataclass whose fields are the keys of a JSON object.
+        """Read an instance of a dataclass from a JSON object whose keys are the fields.
 
-        A field whose default is None may also be null.
+        Fields with the default None may also be null.
         """
         dataclass_fields: tuple[Field[Any], ...] = fields(cls)  # type: ignore[arg-type]
         names = [field.name for field in dataclass_fields]

@@ -1,4 +1,4 @@
-"""Problems of a map, and messages in which objects have their names instead of paths in a file."""
+"""Problems of a map, and messages that name objects instead of paths in a file."""
 
 import re
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ ProblemKind: TypeAlias = Literal[
     "narrow",
     "cut off",
 ]
-"""Kind of a problem, by which fixes are found: see `robocov_app.editor.edits.fixes`."""
+"""Kind of a problem, which determines its fix; see `robocov_app.editor.edits.fixes`."""
 
 _JSON_PATH = re.compile(r"\b(obstacles|starts|boundary|density)((?:\[\d+\]|\.\w+|\[\"[^\"]*\"\])+)")
 _STEP = re.compile(r"\[(\d+)\]|\.(\w+)|\[\"([^\"]*)\"\]")
@@ -36,16 +36,16 @@ class Problem:
     Attributes
     ----------
     message : str
-        A sentence for the user. Checks of single objects leave out the name: their messages begin
-        with a colon or a blank.
+        Message for the user. If it begins with a colon or a blank, the name of the object must be put before
+        it.
     geometry : shapely.Geometry or None
-        Where it is on the map, m; None where it is nowhere.
+        Location of the problem on the map, m; None if it has no location.
     owner : Owner or None
-        Object that it concerns; None for the map as a whole.
+        Object that has the problem; None for the whole map.
     is_error : bool
-        Whether the map cannot run because of it; otherwise it is a warning.
+        True for an error, with which the map cannot be simulated; false for a warning.
     kind : str
-        Its kind.
+        Kind of the problem; see `ProblemKind`.
     """
 
     message: str
@@ -56,12 +56,12 @@ class Problem:
 
 
 def format_position(x: float, y: float) -> str:
-    """Format a position, m, for messages."""
+    """Format a position, m, for messages, for example "(1.5, 2)"."""
     return f"({x:.5g}, {y:.5g})"
 
 
 def translate_message(message: str, sketch: Sketch) -> str:
-    """Return a message about a map file with names of objects instead of paths in the file."""
+    """Replace the JSON paths in a message about a map file by the names of objects."""
 
     def replace_path(match: re.Match[str]) -> str:
         return _translate_path(match, sketch)
@@ -70,11 +70,12 @@ def translate_message(message: str, sketch: Sketch) -> str:
 
 
 def _translate_path(match: re.Match[str], sketch: Sketch) -> str:
-    """Return a name such as "wall 3, point 2" for a path such as "obstacles[2].points[1]"."""
+    """Translate a matched path such as "obstacles[2].points[1]" to a name such as "wall 3, point 2"."""
     section = match[1]
     words = [section]
     noun = "corner"
-    steps: list[tuple[str, str, str]] = _STEP.findall(match[2])  # index, attribute or key
+    # Index, attribute and key of each step; two of the three are empty.
+    steps: list[tuple[str, str, str]] = _STEP.findall(match[2])
     if section == "obstacles":
         index = steps[0][0]
         if not index or int(index) >= len(sketch.obstacles):
@@ -92,7 +93,7 @@ def _translate_path(match: re.Match[str], sketch: Sketch) -> str:
             if words[-1] == noun:
                 words.pop()
             words.append(numbered)
-            # A hole has numbered corners in its turn.
+            # A hole is followed by the number of its corner.
             is_hole = noun == "hole"
             noun = ""
             if is_hole:

@@ -23,7 +23,8 @@ class Vertex:
     ring : int
         0 for the outline or a wall's line; 1, 2, ... for the holes of a polygon.
     index : int
-        Index in the ring. Of a circle, 0 is the center and 1 to 4 its rim in the east, north, west and south.
+        Index in the ring. A circle has five vertices: 0 is its center; 1 to 4 are its easternmost,
+        northernmost, westernmost and southernmost points.
     """
 
     owner: Owner
@@ -33,7 +34,7 @@ class Vertex:
 
 @dataclass(frozen=True, slots=True)
 class Edge(Vertex):
-    """A point, m, on the edge from a vertex of a ring to the next."""
+    """A point, m, on the edge from a vertex of a ring to the next one."""
 
     point: Point
 
@@ -47,7 +48,7 @@ class Selection:
     items : frozenset of int
         Keys of obstacles.
     vertices : frozenset of Vertex
-        Single vertices.
+        Vertices that are selected individually.
     starts : frozenset of str
         Names of starts.
     boundary : bool
@@ -64,14 +65,14 @@ class Selection:
 
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
-        """Return the selection of some objects."""
+        """Build the selection of the given objects."""
         items = frozenset(owner for owner in owners if isinstance(owner, int) and owner != BOUNDARY)
         starts = frozenset(owner for owner in owners if isinstance(owner, str))
         return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
     def select_all(cls, sketch: Sketch) -> Selection:
-        """Return the selection of everything except locked and hidden obstacles."""
+        """Build the selection of all objects except for locked and hidden obstacles."""
         excluded = frozenset(item.key for item in sketch.obstacles if not item.is_selectable)
         owners = [owner for owner in sketch.owners if owner not in excluded]
         return cls.of(*owners).restrict_to(sketch)
@@ -107,7 +108,7 @@ class Selection:
         )
 
     def restrict_to(self, sketch: Sketch) -> Selection:
-        """Return the part of the selection that exists in a map, for instance after undoing."""
+        """Return the part of the selection that exists in a map, for instance after undo."""
         return Selection(
             items=self.items & sketch.index_by_key.keys(),
             vertices=frozenset(vertex for vertex in self.vertices if has_vertex(sketch, vertex)),
@@ -120,13 +121,13 @@ class Selection:
         return replace(self, vertices=frozenset())
 
     def with_groups(self, sketch: Sketch) -> Selection:
-        """Return the selection with the members of its groups, except for locked and hidden ones."""
+        """Return the selection extended to whole groups, except for locked and hidden obstacles."""
         groups = {sketch.get_item(key).group for key in self.items} - {""}
         members = {item.key for item in sketch.obstacles if item.group in groups and item.is_selectable}
         return replace(self, items=self.items | members)
 
     def describe(self, sketch: Sketch) -> str:
-        """Describe the selection: "wall “west”", "3 obstacles", "2 vertices"."""
+        """Describe the selection, for example "wall “west”", "3 obstacles" or "2 vertices"."""
         owners = self.owners
         vertex_count = len(self.vertices)
         kinds = [self.items, self.starts, self.boundary, self.vertices]
@@ -147,7 +148,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Change:
-    """The change that an edit makes.
+    """The result of an edit.
 
     Attributes
     ----------
@@ -156,7 +157,7 @@ class Change:
     selection : Selection
         The selection after the edit.
     description : str
-        Description for the history: "3 obstacles moved".
+        Description for the history, for example "3 obstacles moved".
     """
 
     sketch: Sketch
@@ -165,7 +166,7 @@ class Change:
 
 
 def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
-    """Return a unique name of an object; obstacles without a name get their number: "wall 17"."""
+    """Return the name of an object; for obstacles without a name, kind and number, such as "wall 17"."""
     name = sketch.display_name(owner)
     if isinstance(owner, str) or owner == BOUNDARY or sketch.get_item(owner).shape.name:
         return name
@@ -173,7 +174,10 @@ def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
 
 
 def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], description: str) -> Change:
-    """Return the change that replaces obstacles, given by their keys, with any number of shapes each."""
+    """Return the change that replaces each of the given obstacles by any number of shapes.
+
+    The first shape keeps the key of the obstacle; all of them keep its marks. The new obstacles are selected.
+    """
     next_key = sketch.next_key
     items: list[Item] = []
     keys: list[int] = []
@@ -204,6 +208,6 @@ def has_vertex(sketch: Sketch, vertex: Vertex) -> bool:
 
 
 def find_position(sketch: Sketch, vertex: Vertex) -> Point:
-    """Return the position of a vertex, m; raise MapError if it has gone."""
+    """Return the position of a vertex, m; raise MapError if it no longer exists."""
     require(has_vertex(sketch, vertex), "this vertex no longer exists")
     return sketch.list_vertex_rings(vertex.owner)[vertex.ring][vertex.index]

@@ -1,4 +1,4 @@
-"""Checks of names and shapes by the rules of map files, with messages for the user."""
+"""Checks of names and shapes against the rules of map files, with messages for the user."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -18,13 +18,13 @@ from robocov_app.editor.model.problem import Problem, format_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 MAX_TEXT_CHARACTERS = 10_000
-MAX_CROSSINGS = 20  # of an outline that are marked
-FLAT_RATIO = 1e-9  # outlines with a smaller ratio of area to squared extent are lines
+MAX_CROSSINGS = 20  # number of crossings of an outline that are marked on the map
+FLAT_RATIO = 1e-9  # outlines with a smaller ratio of area to squared extent count as lines
 _CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
 
 
 def check_shapes(sketch: Sketch) -> Iterator[Problem]:
-    """Yield the errors in names, texts, boundary, obstacles and starts of a map."""
+    """Yield the errors in the names, description, boundary, obstacles and starts of a map."""
     for text in _check_label(sketch.name):
         yield Problem(f"the map {text}", None)
     if len(sketch.description) > MAX_TEXT_CHARACTERS:
@@ -50,7 +50,7 @@ def _check_label(name: str) -> Iterator[str]:
 
 
 def _check_object(sketch: Sketch, owner: Owner) -> Iterator[Problem]:
-    """Yield the errors of the boundary, an obstacle or a start, without its name."""
+    """Yield the errors of an object; their messages do not contain its name."""
     if owner == BOUNDARY:
         if sketch.boundary is not None:
             yield from _check_ring(sketch.boundary, "it")
@@ -70,6 +70,7 @@ def _check_circle(circle: env.CircleObstacle | env.DiscStart) -> Iterator[Proble
 
 
 def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
+    """Yield errors in the width, position and length of a wall."""
     yield from _check_size("width", wall.width, wall.points)
     far = list(_check_distance(wall.points))
     if far:
@@ -108,7 +109,7 @@ def _check_polygon(shape: env.PolygonObstacle) -> Iterator[Problem]:
 
 
 def _check_holes(shape: env.PolygonObstacle) -> Iterator[Problem]:
-    """Yield the holes that stick out of the outline, or meet it or another hole."""
+    """Yield an error for each hole that extends beyond the outline, or touches it or another hole."""
     shell = Polygon(shape.vertices)
     valid_holes: list[Ring] = []
     for hole in shape.holes:
@@ -123,11 +124,13 @@ def _check_holes(shape: env.PolygonObstacle) -> Iterator[Problem]:
 
 
 def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
+    """Yield errors in the outline of a boundary or polygon, or in a hole; `label` is its name in messages."""
     far = list(_check_distance(ring))
     if far:
         yield from far
         return
     points = to_array(ring)
+    # Only different corners count.
     corners = len(set(ring))
     if corners < 3:
         count = ("no corners", "one corner", "two corners")[corners]
@@ -163,9 +166,9 @@ def _describe_crossings(label: str, points: Array, polygon: Polygon) -> Problem:
 
 
 def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
-    """Return the points where an outline meets itself, from left to right.
+    """Return the points where an outline crosses or touches itself, from left to right.
 
-    The outline is cut into pieces at all crossings. At ordinary points exactly two pieces end.
+    The outline is cut into pieces at all crossings. More than two pieces end at a crossing.
     """
     line = LineString(np.concatenate([points, points[:1]]))
     pieces = shapely.get_parts(shapely.unary_union(line))
@@ -176,6 +179,7 @@ def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
         is_crossing = counts != 2
     crossings = positions[is_crossing]
     if not len(crossings):
+        # The reason ends with the coordinates of a point, for example "Self-intersection[1 2]".
         reason = shapely.is_valid_reason(polygon)
         x, y = map(float, reason[reason.index("[") + 1 : -1].split())
         return [(x, y)]
@@ -183,7 +187,7 @@ def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
 
 
 def _check_size(label: str, size: float, points: Ring) -> Iterator[Problem]:
-    """Yield an error, at the first of some points, if a size, m, is not possible."""
+    """Yield an error if a width or radius, m, is out of range, located at the first of the given points."""
     if MIN_SIZE_M <= size <= MAX_SIZE_M:
         return
     limit = f"at most {MAX_SIZE_M / 1000:g} km"
@@ -196,9 +200,9 @@ def _check_size(label: str, size: float, points: Ring) -> Iterator[Problem]:
 
 
 def _check_distance(points: Ring) -> Iterator[Problem]:
-    """Yield an error for the first point that is beyond the reach of maps."""
+    """Yield an error for the first point that is too far from the origin."""
     for x, y in points:
-        # Written so that nan is too far away, too.
+        # This comparison is also false for nan.
         if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
             limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
             yield Problem(f"{format_position(x, y)} is too far away: {limit}", shapely.Point(x, y))
@@ -206,7 +210,7 @@ def _check_distance(points: Ring) -> Iterator[Problem]:
 
 
 def _build_line(points: Array) -> shapely.Geometry | None:
-    """Return points as a line, one as a point, none as None."""
+    """Build a line from points, or a point if there is only one; return None if there are none."""
     if not len(points):
         return None
     if len(points) == 1:

@@ -1,4 +1,4 @@
-"""A map that is being edited, valid or not. It is immutable; edits share unchanged objects."""
+"""A map that is being edited, valid or not. Sketches are immutable; edits share unchanged objects."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,14 +18,14 @@ from robocov_app.editor.model.background import MARKS, Background, read_marks, w
 from robocov_app.editor.model.geometry import Box, to_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
-_SHARED = ("name", "description", "schema", "density")  # fields that sketches and environments have
-BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
+_SHARED = ("name", "description", "schema", "density")  # fields that sketches and environments have in common
+BOUNDARY: Final = -1  # key of the boundary, which no obstacle has
 Owner: TypeAlias = int | str
-"""An object that has vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+"""Identifies an object with vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
 
 
 class VertexRing(NamedTuple):
-    """A line through vertices of an object.
+    """A ring or line of vertices of an object.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class VertexRing(NamedTuple):
     points : Ring
         The vertices, m.
     is_closed : bool
-        Whether an edge leads from the last vertex to the first.
+        Whether there is an edge from the last vertex to the first.
     """
 
     number: int
@@ -43,7 +43,7 @@ class VertexRing(NamedTuple):
 
     @property
     def edge_count(self) -> int:
-        """Number of edges."""
+        """Number of edges between the vertices."""
         if self.is_closed:
             return len(self.points)
         return max(len(self.points) - 1, 0)
@@ -56,17 +56,17 @@ class Item:
     Attributes
     ----------
     key : int
-        Identifies the obstacle through all edits; not in the file.
+        Identifies the obstacle throughout all edits. Not stored in the file.
     shape : Obstacle
-        Its shape. In a draft it may break rules, such as a polygon with two corners.
+        Shape of the obstacle. It may break the rules of maps, such as a polygon with two corners.
     note : str
-        Note of the user.
+        Note that the user has written.
     group : str
-        Name of its group; empty for none.
+        Name of the group; empty if there is none.
     locked : bool
-        Whether the mouse does not select it.
+        Whether the obstacle cannot be selected with the mouse.
     hidden : bool
-        Whether the editor does not show it; robots collide with it all the same.
+        Whether the editor does not show the obstacle. It is still part of the map.
     """
 
     key: int
@@ -78,39 +78,39 @@ class Item:
 
     @cached_property
     def geometry(self) -> shapely.Geometry:
-        """Covered area as a valid geometry, m; a line or a point if it covers nothing."""
+        """Covered area as a valid geometry, m; a line, a point or empty if the shape is invalid."""
         return build_geometry(self.shape)
 
     @property
     def is_selectable(self) -> bool:
-        """Whether the mouse can select it."""
+        """Whether the obstacle can be selected with the mouse."""
         return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what can be computed again."""
+        """Return the state for pickling, without cached geometries."""
         return {name: getattr(self, name) for name in ("key", *MARKS)} | {"shape": replace(self.shape)}
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """A map that is being edited. Immutable; equal if the content with the keys of obstacles is equal.
+    """A map that is being edited. Immutable. Sketches are equal if content and obstacle keys are equal.
 
     Attributes
     ----------
     name, description : str
-        Texts for the user.
+        Name and description of the map.
     boundary : Ring or None
-        The boundary, m; None while there is none.
+        The boundary, m; None if it has not been drawn yet.
     obstacles : tuple of Item
-        Obstacles from the bottom to the top.
+        Obstacles from bottom to top.
     starts : tuple of (str, StartSpec)
-        Starts with their names; the first is the default.
+        Names and starts; the first one is the default.
     background : Background or None
         The picture under the map.
     extra : mapping
-        Free keys of the file, without those of the editor.
+        Free keys of the file, except for those of the editor.
     schema : str or None
-        The key ``$schema`` of the file.
+        Value of the key ``$schema`` in the file.
     density : Density or None
         The density.
     """
@@ -130,7 +130,7 @@ class Sketch:
 
     @classmethod
     def from_environment(cls, environment: env.Environment) -> Self:
-        """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
+        """Build a sketch of a map; the keys of its obstacles are 0, 1, ..."""
         shapes = environment.obstacles
         marks, background, extra = read_marks(dict(environment.extra), [shape.name for shape in shapes])
         return cls(
@@ -143,11 +143,11 @@ class Sketch:
         )
 
     def build_environment(self, where: str = "map") -> env.Environment:
-        """Build the map for simulations; raise MapError, about a file called `where`, if it breaks a rule."""
+        """Build the map for simulation; raise MapError, with `where` as file name, if it breaks a rule."""
         return from_json(to_document(self), where)
 
     def build_unchecked_environment(self) -> env.Environment:
-        """Build the map without checking its rules; if it breaks any, using it may raise any error."""
+        """Build the map without checking the rules; using a map that breaks them may raise any error."""
         shapes = [item.shape for item in self.obstacles]
         marks: dict[int, dict[str, Any]] = {}
         for k, item in enumerate(self.obstacles):
@@ -170,7 +170,7 @@ class Sketch:
         return dict(self.starts)[name]
 
     def find_object(self, owner: Owner) -> Obstacle | StartSpec | None:
-        """Return the shape of an obstacle, or a start; None for other objects."""
+        """Return the shape of an obstacle, or a start; None for the boundary and missing objects."""
         if isinstance(owner, str):
             return dict(self.starts).get(owner)
         if owner not in self.index_by_key:
@@ -179,11 +179,11 @@ class Sketch:
 
     @property
     def owners(self) -> tuple[Owner, ...]:
-        """The boundary, the keys of the obstacles and the names of the starts."""
+        """All objects: `BOUNDARY` (even if there is none), obstacle keys from bottom to top, start names."""
         return BOUNDARY, *self.index_by_key, *dict(self.starts)
 
     def display_name(self, owner: Owner) -> str:
-        """Return the name of an object for the user: "polygon “desk”", "start “corner”", "boundary"."""
+        """Return the name of an object for the user, such as "polygon “desk”", "start “corner”" or "wall"."""
         if isinstance(owner, str):
             return to_one_line(f"start “{owner}”")
         if owner == BOUNDARY:
@@ -195,7 +195,7 @@ class Sketch:
         return kind
 
     def list_vertex_rings(self, owner: Owner) -> tuple[Ring, ...]:
-        """Return the positions of an object's vertices, m, ring by ring; empty if there is no such object."""
+        """Return the vertices of an object ring by ring, m; empty if there is no such object."""
         if owner == BOUNDARY:
             if self.boundary is None:
                 return ()
@@ -210,12 +210,13 @@ class Sketch:
         if isinstance(shape, env.CircleObstacle | env.DiscStart):
             x, y = shape.center
             radius = shape.radius
+            # East, north, west, south.
             rim = ((x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius))
             return (((x, y), *rim),)
         return ()
 
     def list_rings(self, owner: Owner) -> tuple[VertexRing, ...]:
-        """Return the rings of an object that have edges; circles and starts have none."""
+        """Return the rings of an object with edges between its vertices; circles and starts have none."""
         shape = self.find_object(owner)
         if isinstance(owner, str) or isinstance(shape, env.CircleObstacle):
             return ()
@@ -224,7 +225,7 @@ class Sketch:
         return tuple(VertexRing(number, points, is_closed) for number, points in rings)
 
     def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Self:
-        """Return the map with other vertices, m, for an object that is not a circle."""
+        """Return the map with new vertices, m, for an object that is not a circle or disc."""
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
             return replace(self, boundary=line)
@@ -253,25 +254,25 @@ class Sketch:
 
     @property
     def next_key(self) -> int:
-        """A key that no obstacle has, nor any greater one."""
+        """Smallest key that is greater than those of all obstacles."""
         return max(self.index_by_key, default=-1) + 1
 
     def with_obstacles(self, shapes: Iterable[Obstacle]) -> tuple[Self, tuple[int, ...]]:
-        """Return the map with more obstacles on top, and their keys."""
+        """Return the map with new obstacles on top, and their keys."""
         return self.with_annotated_obstacles((shape, "") for shape in shapes)
 
     def with_annotated_obstacles(self, pairs: Iterable[tuple[Obstacle, str]]) -> tuple[Self, tuple[int, ...]]:
-        """Return the map with more obstacles on top, given with their notes, and their keys."""
+        """Return the map with new obstacles on top, given as pairs of shape and note, and their keys."""
         items = [Item(key, shape, note) for key, (shape, note) in enumerate(pairs, self.next_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
     def with_items(self, items: Iterable[Item]) -> Self:
-        """Return the map with items in place of those that have the same keys."""
+        """Return the map in which the given items replace those with the same keys."""
         by_key = {item.key: item for item in items}
         return replace(self, obstacles=tuple(by_key.get(item.key, item) for item in self.obstacles))
 
     def with_objects(self, objects: Mapping[Any, Any]) -> Self:
-        """Return the map with other obstacles by their keys, and other or more starts by their names."""
+        """Return the map with new shapes of obstacles, by key, and with replaced or added starts, by name."""
         items: list[Item] = []
         starts = dict(self.starts)
         for owner, shape in objects.items():
@@ -282,14 +283,14 @@ class Sketch:
         return replace(self.with_items(items), starts=tuple(starts.items()))
 
     def without(self, owners: Iterable[Owner]) -> Self:
-        """Return the map without some obstacles and starts."""
+        """Return the map without the given obstacles and starts."""
         removed = frozenset(owners)
         obstacles = tuple(item for item in self.obstacles if item.key not in removed)
         starts = tuple((name, start) for name, start in self.starts if name not in removed)
         return replace(self, obstacles=obstacles, starts=starts)
 
     def with_default_name(self, name: str) -> Self:
-        """Return the map with a name, unless it has one."""
+        """Return the map with a name if it still has the default name."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
         if self.name != Sketch.name or not name:
             return self
@@ -297,7 +298,7 @@ class Sketch:
 
     @property
     def bounds(self) -> Box | None:
-        """Bounding box of everything including a shown picture, m; None of an empty map."""
+        """Bounding box of all objects and of the picture if it is shown, m; None for an empty map."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
@@ -314,7 +315,7 @@ class Sketch:
 
 
 def to_document(sketch: Sketch) -> dict[str, Any]:
-    """Return the document of a map, valid or not; `parser.build_sketch` reads it back, with other keys."""
+    """Return the map document of a sketch, valid or not; `parser.build_sketch` reads it, with new keys."""
     document = to_json(sketch.build_unchecked_environment())
     if sketch.boundary is None:
         del document["boundary"]
@@ -322,12 +323,12 @@ def to_document(sketch: Sketch) -> dict[str, Any]:
 
 
 def dump_sketch(sketch: Sketch) -> str:
-    """Return the text of the file of a map."""
+    """Return the content of the map file of a sketch."""
     return dump_document(to_document(sketch))
 
 
 def build_geometry(shape: Obstacle) -> shapely.Geometry:
-    """Build the area that an obstacle covers as a valid geometry, m; empty beyond the reach of maps."""
+    """Build the area that an obstacle covers as a valid geometry, m; empty if it is too far away."""
     if isinstance(shape, env.CircleObstacle):
         return _build_circle(shape)
     if isinstance(shape, env.WallObstacle):
@@ -336,7 +337,7 @@ def build_geometry(shape: Obstacle) -> shapely.Geometry:
 
 
 def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
-    """Build the area of a circle, or its center if its radius is invalid."""
+    """Build the area of a circle; its center if the radius is invalid."""
     if not _is_within_reach([circle.center]):
         return shapely.GeometryCollection()
     if not 0.0 < circle.radius <= MAX_SIZE_M:
@@ -345,7 +346,7 @@ def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
 
 
 def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
-    """Build the area of a wall, or its line if its width or length is invalid."""
+    """Build the area of a wall; its line if the width or length is invalid."""
     if not wall.points or not _is_within_reach(wall.points):
         return shapely.GeometryCollection()
     line = _build_line(wall.points)
@@ -356,7 +357,7 @@ def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
 
 
 def _build_polygon(shape: env.PolygonObstacle) -> shapely.Geometry:
-    """Build the area of a polygon without invalid holes, or its line if it has fewer than three vertices."""
+    """Build the area of a polygon without invalid holes; a line if it has fewer than three vertices."""
     if not shape.vertices or not _is_within_reach(shape.vertices):
         return shapely.GeometryCollection()
     if len(shape.vertices) < 3:

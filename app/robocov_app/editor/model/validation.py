@@ -1,4 +1,4 @@
-"""Everything that is wrong with a map, or may be: errors by the rules of map files, and warnings."""
+"""Validation of a map: errors against the rules of map files, and warnings about likely mistakes."""
 
 import math
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ __all__ = ["Problem", "ProblemKind", "find_problems", "format_position", "transl
 
 
 def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Find everything that is wrong with a map.
+    """Find the errors in a map, and what may be a mistake.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], M
     problems : tuple of Problem
         Errors, then warnings.
     free : MultiPolygon
-        The free space, m; of a broken map, as far as it can be made valid.
+        The free space, m. For an invalid map, it is an approximation.
     """
     errors = list(check_shapes(sketch))
     if errors:
@@ -65,7 +65,7 @@ def _list_owners(problems: list[Problem]) -> set[Owner | None]:
 
 
 def _add_name(problem: Problem, sketch: Sketch) -> Problem:
-    """Put the name of an object before a message that leaves it out."""
+    """Put the name of the object before a message that begins with a colon or a blank."""
     if problem.owner is None or problem.message[0] not in ": ":
         return problem
     name = format_numbered_name(sketch, problem.owner)
@@ -73,7 +73,7 @@ def _add_name(problem: Problem, sketch: Sketch) -> Problem:
 
 
 def _check_map_rules(sketch: Sketch, environment: env.Environment) -> list[Problem]:
-    """Return the errors by the rules of map files, with the editor's own messages where there are any."""
+    """Return the errors against the rules of map files, with the editor's own messages where possible."""
     try:
         validate_document(to_document(sketch), "map")
         check_rules(environment, "map")
@@ -84,7 +84,7 @@ def _check_map_rules(sketch: Sketch, environment: env.Environment) -> list[Probl
 
 
 def _build_rough_free_space(sketch: Sketch) -> MultiPolygon:
-    """Return the free space of a draft, as far as its boundary and its obstacles can be made valid."""
+    """Build the free space of an invalid map from what can be repaired; empty without a usable boundary."""
     ring = sketch.boundary or ()
     if len(ring) < 3 or np.abs(ring).max() > MAX_COORDINATE_M or np.ptp(ring, axis=0).max() > MAX_SIZE_M:
         return MultiPolygon()
@@ -92,7 +92,7 @@ def _build_rough_free_space(sketch: Sketch) -> MultiPolygon:
     solid = MultiPolygon()
     if len(sketch.geometries):
         solid = shapely.union_all(sketch.geometries)
-    # The difference of broken outlines may contain lines and points.
+    # The difference may contain lines and points, which are dropped.
     parts = shapely.get_parts(inside - solid)
     polygons = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
     polygons.sort(key=lambda polygon: (-polygon.area, polygon.bounds))
@@ -100,7 +100,7 @@ def _build_rough_free_space(sketch: Sketch) -> MultiPolygon:
 
 
 def _check_free_space(sketch: Sketch, free: MultiPolygon, skipped: set[Owner | None]) -> Iterator[Problem]:
-    """Yield errors of the free space and of the positions of starts, except for objects to skip."""
+    """Yield an error if there is no free space, and errors of starts; objects in `skipped` are left out."""
     if sketch.boundary is None or len(sketch.boundary) < 3:
         return
     if free.is_empty:
@@ -118,7 +118,7 @@ def _check_free_space(sketch: Sketch, free: MultiPolygon, skipped: set[Owner | N
 def _check_positions(
     sketch: Sketch, name: str, start: env.PointsStart, free: MultiPolygon
 ) -> Iterator[Problem]:
-    """Yield the positions of a start that are not in the free space."""
+    """Yield an error for each position of a start that is not in the free space."""
     points = shapely.points(to_array(start.positions))
     for number in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
         covering = sketch.tree.query(points[number], predicate="intersects")
@@ -137,7 +137,7 @@ def _describe_position(start: env.PointsStart, number: int) -> str:
 def _check_space(
     name: str, start: StartSpec, free: MultiPolygon, radius: float, *, is_error: bool
 ) -> Iterator[Problem]:
-    """Yield a problem if no robot of a radius, m, fits at a start."""
+    """Yield a problem if no robot with a radius, m, fits at a start."""
     try:
         env.Start(name, start, free).sample(1, radius=radius)
     except StartError:
@@ -152,7 +152,7 @@ def _check_space(
 def _list_warnings(
     sketch: Sketch, free: MultiPolygon, radius: float, skipped: set[Owner | None]
 ) -> Iterator[Problem]:
-    """Yield what may be a mistake, except for objects to skip."""
+    """Yield warnings about likely mistakes; checks that need valid objects leave out those in `skipped`."""
     if BOUNDARY not in skipped:
         yield from _warn_of_outside_obstacles(sketch)
     yield from _warn_of_duplicates(sketch)
@@ -201,7 +201,7 @@ def _warn_of_repeated_vertices(sketch: Sketch) -> Iterator[Problem]:
 
 
 def _find_repeated_vertices(ring: Ring, is_closed: bool) -> list[Point]:
-    """Return the vertices that the next vertex repeats."""
+    """Return the vertices whose successor has the same position."""
     if len(set(ring)) == len(ring):
         return []
     line = ring
@@ -211,7 +211,7 @@ def _find_repeated_vertices(ring: Ring, is_closed: bool) -> list[Point]:
 
 
 def _warn_of_blocked_paths(sketch: Sketch, skipped: set[Owner | None]) -> Iterator[Problem]:
-    """Yield moving obstacles that meet standing ones or the boundary."""
+    """Warn about moving obstacles whose path crosses obstacles at rest or the boundary."""
     checked = [item for item in sketch.obstacles if item.key not in skipped and not item.geometry.is_empty]
     standing = {item.key: item.geometry for item in checked if item.shape.path is None}
     inside = None
@@ -225,6 +225,7 @@ def _warn_of_blocked_paths(sketch: Sketch, skipped: set[Owner | None]) -> Iterat
 def _check_path(
     sketch: Sketch, item: Item, standing: dict[int, shapely.Geometry], inside: Polygon | None
 ) -> Iterator[Problem]:
+    """Warn if a moving obstacle passes through any of the obstacles at rest, or leaves the boundary."""
     assert item.shape.path is not None
     swept = env.compute_swept_area(item.shape.polygon, item.shape.path)
     overlaps, beyond = env.find_overlaps(swept, standing, inside)
@@ -237,7 +238,7 @@ def _check_path(
 
 
 def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    """Yield the parts of the free space without an entrance; those smaller than a robot together."""
+    """Warn about parts of the free space without an entrance; those smaller than a robot share a warning."""
     robot_area = math.pi * radius * radius
     others = list(free.geoms)[1:]
     pockets = [part for part in others if part.area < robot_area]
@@ -257,7 +258,7 @@ def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem
 def _warn_of_tight_positions(
     name: str, start: env.PointsStart, free: MultiPolygon, radius: float
 ) -> Iterator[Problem]:
-    """Yield the positions of a start that are too near to a wall or to each other."""
+    """Warn about positions of a start that are too close to a wall or to each other."""
     points = shapely.points(to_array(start.positions))
     gaps = shapely.distance(points, free.boundary)
     for number in np.flatnonzero(gaps < radius).tolist():
