@@ -1,4 +1,4 @@
-"""The world as matplotlib draws it: a map, and a whole run in it."""
+"""Maps, and whole runs in them, drawn with matplotlib."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,9 +30,9 @@ from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obst
 from robocov_app.render.scene import are_centroids
 
 _DISC_PT = 6.4
-"""Radius of a robot if there is space."""
+"""Radius of the disc of a robot if there is enough space."""
 _MIN_DISC_PT = 1.7
-"""Radius of a robot in the densest crowd."""
+"""Radius of the disc of a robot in the densest crowd."""
 _MIN_NUMBER_PT = 4.2
 """Numbers of robots that would be smaller are left out."""
 _NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
@@ -40,15 +40,15 @@ _NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
 _START_PT = 6.2
 _GOAL_PT = 8.0
 _MIN_MARK_PT = 3.2
-"""Sizes of starts and goals if there is space, and in the densest crowd."""
+"""Sizes of starts and goals: of each if there is enough space, and of both in the densest crowd."""
 _ARROW_PT = 16.0
 """Length of the arrow on a moving obstacle."""
 _DENSITY_DOTS = 400
-"""Dots of the image of a density along the longer side of a map."""
+"""Number of dots of a density image along the longer side of the map."""
 
 
 def set_meter_axes(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Give axes of a notebook ticks in meters, and limits that show the whole map."""
+    """Set ticks in meters, and limits that show the whole map, on axes of a notebook."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
@@ -57,7 +57,7 @@ def set_meter_axes(axes: Axes, environment: Environment, theme: Theme) -> None:
 
 
 def _build_obstacle_style(theme: Theme) -> dict[str, Any]:
-    """Return the look of obstacles."""
+    """Return the matplotlib properties of obstacles."""
     return {
         "facecolor": to_plot_color(theme.obstacle),
         "edgecolor": to_plot_color(theme.obstacle_edge),
@@ -66,14 +66,14 @@ def _build_obstacle_style(theme: Theme) -> dict[str, Any]:
 
 
 def _build_path_style(theme: Theme) -> dict[str, Any]:
-    """Return the look of the paths of moving obstacles."""
+    """Return the matplotlib properties of the paths of moving obstacles."""
     return {"color": to_plot_color(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 
 def draw_map(
     axes: Axes, environment: Environment, theme: Theme, *, has_density: bool = True, time: float = 0.0
 ) -> None:
-    """Draw a map.
+    """Draw a map: its density, obstacles at rest, moving obstacles and boundary.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def draw_map(
 
 
 def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Draw the density as an image. Unlike `imshow`, this does not change the limits of the axes."""
+    """Draw the density as an image, without changing the limits of the axes as `imshow` would."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     image = AxesImage(
         axes,
@@ -127,7 +127,7 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
 def _draw_moving_obstacle(
     axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme
 ) -> None:
-    """Draw an obstacle that moves, its path, and an arrow in its direction."""
+    """Draw a moving obstacle, its path, and an arrow that shows its heading."""
     fill: Any = to_plot_color(theme.moving_obstacle)
     is_hollow = bool(obstacle.polygon.interiors)
     if is_hollow:
@@ -194,7 +194,18 @@ def _draw_cells(
     theme: Theme,
     colors: ColorScheme,
 ) -> None:
-    """Draw the cells of working robots; `hues` has one entry for each of these."""
+    """Draw the cells of working robots.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    outlines : (list of (k, 2) arrays, (c,) int array)
+        Outlines of cells, m, and the working robot that owns each.
+    hues : (w,) int array
+        Hue of each working robot.
+    theme : Theme
+    colors : {"paper", "robots"}
+    """
     get_color = theme.get_paper_cell_color if colors == "paper" else theme.get_cell_color
     polygons = []
     faces = []
@@ -224,7 +235,7 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
 
 
 def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
-    """Draw a ring where each robot started; where it joined if it joined later."""
+    """Draw a ring at the first position of each robot: its start, or where it joined later."""
     present = np.flatnonzero(record.present[-1])
     first_rows = np.argmax(record.present, axis=0)[present]
     starts = record.positions[first_rows, present]
@@ -235,7 +246,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
 def _draw_final_positions(
     axes: Axes, record: Record, hues: IntArray, theme: Theme, colors: ColorScheme
 ) -> dict[int, float]:
-    """Draw the final positions of robots, and return the radius of each, points."""
+    """Draw the robots at their final positions; return the drawn radius of each by its row, points."""
     present = np.flatnonzero(record.present[-1])
     failed = record.present[-1] & ~record.working[-1]
     fills = []
@@ -255,7 +266,10 @@ def _draw_final_positions(
 def _draw_headings(
     axes: Axes, record: Record, steering: Array, radii: Mapping[int, float], theme: Theme
 ) -> None:
-    """Draw a triangle at the disc of each unicycle in the direction it faces."""
+    """Draw a triangle beside the disc of each working unicycle, pointing in its heading.
+
+    The first column of `steering`, (n, ...), is the heading, rad. `radii` are those of discs, points.
+    """
     dots_per_inch = get_figure(axes).dpi_scale_trans
     is_turning = record.working[-1] & record.team.is_unicycle
     for robot in np.flatnonzero(is_turning).tolist():
@@ -267,6 +281,7 @@ def _draw_headings(
         axes.plot(
             *record.positions[-1, robot],
             transform=axes.transData + offset,
+            # A triangle (3 sides, style 0); without rotation it points up.
             marker=(3, 0, float(np.degrees(heading)) - 90.0),
             ms=0.9 * radii[robot],
             mec="none",
@@ -280,7 +295,7 @@ def _draw_headings(
 def _draw_goals(
     axes: Axes, record: Record, centroids: Array, radii: Mapping[int, float], theme: Theme
 ) -> None:
-    """Draw the goals of working robots, as centroids of their cells if all goals are centroids."""
+    """Draw the goals of working robots, or the centroids of their cells if all goals are centroids."""
     working = np.flatnonzero(record.working[-1])
     goals = record.goals[-1][working]
     is_centroid = are_centroids(goals, centroids)
@@ -289,7 +304,7 @@ def _draw_goals(
     goal_points = _to_points(axes, goals)
     distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
-    # At a goal that is reached, only the ends of the cross would stick out from under the disc.
+    # Of a goal that is reached, only the ends of the cross would stick out from under the disc.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
     axes.plot(*goals[is_away].T, zorder=6, **_build_goal_style(is_centroid, theme, size))
 
@@ -310,7 +325,7 @@ def draw_robots(
     axes : matplotlib.axes.Axes
     positions : (n, 2) array, m
     radius : (n,) array, m
-        True radii. Discs are larger if there is space, so that their numbers can be read.
+        True radii. Discs are drawn larger if there is enough space, so that their numbers are readable.
     fills : sequence of Color
     theme : Theme
     numbers : sequence of int, optional
@@ -328,6 +343,7 @@ def draw_robots(
     axes.scatter(
         positions[:, 0],
         positions[:, 1],
+        # The size of a scatter mark is the square of its diameter, in points.
         s=[(2 * disc) ** 2 for disc in radii],
         c=[to_plot_color(fill) for fill in fills],
         edgecolors=to_plot_color(theme.robot_ring),
@@ -356,18 +372,19 @@ def draw_robots(
 
 
 def _to_points(axes: Axes, positions: Array) -> Array:
-    """Convert (n, 2) positions, m, to points of the page."""
+    """Convert positions, (n, 2) m, to points of the page."""
+    # The transformation is only valid once the aspect has been applied.
     axes.apply_aspect()
     return np.asarray(axes.transData.transform(positions)) * (POINTS_PER_INCH / axes.figure.dpi)
 
 
 def has_goals(record: Record) -> bool:
-    """Return whether robots have goals at the end."""
+    """Return whether any robot has a goal at the end of a run."""
     return bool(np.isfinite(record.goals[-1]).any())
 
 
 def _build_start_style(theme: Theme, size: float) -> dict[str, Any]:
-    """Return the look of starts, with a size in points."""
+    """Return the matplotlib properties of the mark of a start, with a size in points."""
     return {
         "linestyle": "none",
         "marker": "o",
@@ -379,7 +396,7 @@ def _build_start_style(theme: Theme, size: float) -> dict[str, Any]:
 
 
 def _build_goal_style(is_centroid: bool, theme: Theme, size: float) -> dict[str, Any]:
-    """Return the look of goals, with a size in points."""
+    """Return the matplotlib properties of the mark of a goal or centroid, with a size in points."""
     if is_centroid:
         return {
             "label": legend.CELL_CENTROID,
@@ -405,7 +422,7 @@ def get_label(handle: Artist) -> str:
 
 
 def build_map_handles(environment: Environment, theme: Theme, *, has_density: bool = True) -> list[Artist]:
-    """Build the entries of the legend of a map, see `draw_map`."""
+    """Build the legend entries for what `draw_map` draws; the first one is the boundary."""
     handles: list[Artist] = [
         Line2D([], [], color=to_plot_color(theme.boundary), linewidth=1.6, label=legend.KNOWN_REGION)
     ]
@@ -425,13 +442,14 @@ def build_map_handles(environment: Environment, theme: Theme, *, has_density: bo
         handles.append(square)
     density = describe_density(environment)
     if has_density and density:
+        # A medium density, since the legend has a single color for the gradient.
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=to_plot_color(color), linewidth=0.0, label=density))
     return handles
 
 
 def build_robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
-    """Build the entry of the legend of robots."""
+    """Build a legend entry with a disc, for robots of one color."""
     return Line2D(
         [],
         [],
@@ -445,7 +463,7 @@ def build_robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
 
 
 def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list[Artist]:
-    """Build the entries of the legend of a run, see `draw_run`."""
+    """Build the legend entries for what `draw_run` draws."""
     robots = len(record.team)
     trail_color = choose_trail_colors(theme, list(range(robots)), colors)[0]
     final_color = theme.robots[0]
@@ -463,4 +481,5 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
         handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
     cell_edge = to_plot_color(theme.cell_edge)
     handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))
+    # The boundary needs no entry here.
     return [*handles, *build_map_handles(record.environment, theme)[1:]]

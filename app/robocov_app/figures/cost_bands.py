@@ -15,11 +15,11 @@ from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT
 
 _FULL_WEIGHT_WIDTH_PX = 700.0
-"""Minimum width of a page whose lines have their full width. On a smaller page they are thinner."""
+"""Minimum width of a page on which lines have their full width; on narrower pages they are thinner."""
 _SMALL_WEIGHT = 0.7
 _MARGINS = CurveMargins(left=44, top=44, bottom=50, right=30, max_right_fraction=1.0)
 _MAX_NAME_FRACTION = 0.5
-"""Fraction of the page into which shortened names fit, with their values and the margin on the right."""
+"""Maximum fraction of the page width for a shortened name, its value and the margin on the right."""
 
 
 class Band(NamedTuple):
@@ -42,12 +42,12 @@ class Band(NamedTuple):
 
 @plain_style()
 def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, unit: str) -> Figure:
-    """Plot values against time.
+    """Plot the values of runs against time, with one color for each controller.
 
     Parameters
     ----------
     bands : sequence of Band
-        Several runs have their median and a band between the quartiles, a single run has its line.
+        Several runs are drawn as their median with a band between the quartiles, a single run as a line.
     size : (width, height), px
     label : str
         Label of the value axis.
@@ -85,7 +85,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
 
 
 def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> TimeCurve:
-    """Return the median of a band, with a name that fits with its final value into half of the page."""
+    """Return the median curve of a band, its name shortened so that the end label fits on the page."""
 
     def measure_end_label(name: str) -> float:
         return page.measure_text(format_end_label(TimeCurve(name, "", band.time, median), unit), bold=True)
@@ -96,12 +96,12 @@ def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> Time
 
 
 def compute_quartiles(values: Array) -> Array:
-    """Compute the quartiles and the median of runs over time.
+    """Compute the quartiles and the median over runs at each time.
 
     Parameters
     ----------
     values : (m, T) array
-        Values that are not finite do not count.
+        Values that are not finite are ignored.
 
     Returns
     -------

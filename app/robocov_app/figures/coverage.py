@@ -1,4 +1,4 @@
-"""The coverage cost as one page: its curves, and maps of the distances to the nearest robot."""
+"""A page about the coverage cost: its curves, and maps of the distance to the nearest robot."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,14 +42,14 @@ from robocov_app.render.distance_map.colors import (
 from robocov_app.render.distance_map.field import DistanceField
 
 DOTS_PER_PIXEL = 2
-"""Dots of the image of a map for each pixel of the page."""
+"""Dots of a map image per pixel of the page."""
 MIN_SIZE_PX = (720, 400)
-"""Minimum size of a page with curves and maps. A smaller one has the curves alone."""
+"""Minimum size of a page with curves and maps; a smaller page shows only the curves."""
 DEFAULT_WIDTH_PX = 1500
 MAX_HEIGHT_PX = 2600
 MAX_MAP_HEIGHT_PX = 760
 MAX_ASPECT_BESIDE = 1.9
-"""A map that is wider than this is below the curves, not to their right."""
+"""Maximum width / height of a map to the right of the curves; a wider map is below them."""
 _DEFAULT_SCALE = 1.3
 _BORDER_WIDTH = 1.4
 _BAR_LABEL = "distance to the nearest robot"
@@ -64,7 +64,7 @@ _CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
 
 @dataclass(frozen=True, eq=False)
 class DistanceSnapshot:
-    """A team at one time of a run, with the distances to its robots.
+    """A team at one time of a run, with the distance map.
 
     Attributes
     ----------
@@ -105,15 +105,16 @@ class DistanceSnapshot:
             Distances at the end.
         mean_distance : float, m
         counted : int array, optional
-            Robots that the cost counts; by default all.
+            Rows of the robots that the cost takes into account; by default all.
         mean_time : float, s, optional
+            Mean time until the first robot arrives, if robots differ in speed.
 
         Returns
         -------
         DistanceSnapshot
         """
         cost = format_cost(get_cost_name(record.environment), mean_distance, mean_time)
-        # Three maps side by side leave little space.
+        # Captions above three maps side by side have little space.
         cost = cost.replace(", mean time", ", time")
         time = float(record.time[-1])
         if counted is None:
@@ -131,7 +132,7 @@ class DistanceSnapshot:
 
 @dataclass(frozen=True)
 class _Arrangement:
-    """Positions of the elements of a page, px.
+    """Positions of the parts of a page, px.
 
     Attributes
     ----------
@@ -139,7 +140,7 @@ class _Arrangement:
     bar_row : float
         Vertical middle of the color scale.
     bar_min_left : float
-        Left limit of the color scale and its label.
+        Leftmost position of the color scale and its label.
     is_below : bool
         Whether the maps are below the curves.
     """
@@ -170,10 +171,11 @@ def plot_coverage(
     snapshots : sequence of DistanceSnapshot
     theme : Theme or str
     size : (width, height), px, optional
-        Size of the page. If it is smaller than `MIN_SIZE_PX`, the page has the curves alone.
+        Size of the page; by default chosen to fit the maps. If it is smaller than `MIN_SIZE_PX` and there
+        are curves, the page shows only these.
     title : str
     times : sequence of TimeCurve
-        Mean times, s, if robots are not equally fast.
+        Mean times, s, if robots differ in speed.
 
     Returns
     -------
@@ -218,10 +220,24 @@ def _create_page(
     map_count: int,
     has_curves: bool,
 ) -> tuple[FigurePage, _Arrangement]:
-    """Create a page of a size, or one as high as its maps need, and arrange curves and maps on it."""
+    """Create a page, and arrange curves and maps on it.
+
+    Parameters
+    ----------
+    theme : Theme
+    size : (width, height) or None, px
+        Without a size, the page is as high as its maps need.
+    extent : Extent
+        Area that all maps show.
+    handles : sequence of Artist
+        Entries of the legend in the footer.
+    map_count : int
+    has_curves : bool
+    """
     is_beside = has_curves and map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE
     is_below = has_curves and not is_beside
     if size is None:
+        # A page of any height serves to measure the footer; its final height is chosen below.
         page = FigurePage((DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE)
     else:
         page = FigurePage(size, theme)
@@ -240,13 +256,15 @@ def _create_page(
 def _choose_height(
     page: FigurePage, extent: Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
 ) -> int:
-    """Return the height of a page of the default width, px."""
+    """Return the height that a page of the default width needs for `maps` maps, px."""
     scale = page.scale
     columns = maps
+    # Up to three maps are side by side; more form a grid that is about 1.6 times as wide as high.
     if maps > 3:
         columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / extent.aspect))))
     slot_width = (maps_width - (columns - 1) * _PANEL_GAP * scale) / columns
     slot_height = min(slot_width / extent.aspect, MAX_MAP_HEIGHT_PX) + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
+    # Rounded up.
     rows = -(-maps // columns)
     maps_height = rows * slot_height - _PANEL_GAP * scale
     head_height = _HEAD * scale
@@ -261,7 +279,7 @@ def _choose_height(
 def _arrange_below(
     page: FigurePage, maps_width: float, footer_height: float, *, has_fixed_size: bool
 ) -> _Arrangement:
-    """Arrange maps below curves, which are as wide as the page."""
+    """Arrange the maps below the curves, which are as wide as the page."""
     width, height = page.size
     scale = page.scale
     head = _HEAD * scale
@@ -281,7 +299,7 @@ def _arrange_below(
 def _arrange_beside(
     page: FigurePage, maps_fraction: float, footer_height: float, *, has_curves: bool
 ) -> _Arrangement:
-    """Arrange a map to the right of the curves, or maps alone."""
+    """Arrange one map to the right of the curves or, without curves, maps over the whole page."""
     width, height = page.size
     scale = page.scale
     head = _HEAD * scale
@@ -298,7 +316,7 @@ def _arrange_beside(
 
 @plain_style()
 def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = LIGHT) -> None:
-    """Plot distances on axes of a notebook, which get ticks in meters and a color scale.
+    """Plot the distance map on axes of a notebook, with ticks in meters and a color scale.
 
     Parameters
     ----------
@@ -312,7 +330,7 @@ def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = 
     axes.apply_aspect()
     extent = axes.get_window_extent()
     scale = axes.figure.dpi / 100
-    # Small axes may be saved large.
+    # The image is at least as fine as on the smallest page, because small axes may be saved at a larger size.
     enlargement = max(MIN_SIZE_PX[0] / extent.width, 1.0)
     box = (0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
     _draw_snapshot(axes, snapshot, limit, theme, box=box, scale=enlargement * scale)
@@ -326,7 +344,7 @@ def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = 
 
 
 def _choose_limit(snapshots: Sequence[DistanceSnapshot]) -> float:
-    """Return the end of the color scale, m."""
+    """Return the end of the color scale that all snapshots share, m."""
     finite = [
         snapshot.field.max_distance for snapshot in snapshots if np.isfinite(snapshot.field.max_distance)
     ]
@@ -334,7 +352,7 @@ def _choose_limit(snapshots: Sequence[DistanceSnapshot]) -> float:
 
 
 def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[Artist]:
-    """Build the entries of the legend."""
+    """Build the legend entries of all snapshots, each once."""
     border = Line2D(
         [], [], color=to_plot_color(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER
     )
@@ -365,7 +383,7 @@ def _draw_curves(
     box: PageBox,
     distance_label: str,
 ) -> None:
-    """Draw the mean distances, and mean times if there are any: below, or to the right in a wide box."""
+    """Draw the mean distances and, if there are any, the mean times: below or, in a wide box, beside them."""
     left, top, width, height = box
     if not times:
         _draw_curve_panel(page, curves, box, distance_label, "m")
@@ -380,7 +398,7 @@ def _draw_curves(
 def _draw_curve_panel(
     page: FigurePage, curves: Sequence[TimeCurve], box: PageBox, label: str, unit: str
 ) -> None:
-    """Draw curves in a box with space for their labels."""
+    """Draw curves in a box, px, that leaves space for axis labels and for end labels."""
     axes = add_curve_axes(page, curves, _CURVE_MARGINS, box=box, unit=unit)
     draw_curves(axes, curves, page.theme, label=label, unit=unit)
 
@@ -388,7 +406,7 @@ def _draw_curve_panel(
 def _draw_maps(
     page: FigurePage, snapshots: Sequence[DistanceSnapshot], extent: Extent, limit: float, area: PageBox
 ) -> list[PageBox]:
-    """Draw the map of each snapshot below its title, and return their boxes, px."""
+    """Draw the map of each snapshot below its title; return the boxes of the maps, px."""
     scale = page.scale
     panels = _arrange_panels(area, len(snapshots), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
     for snapshot, (box, caption_width) in zip(snapshots, panels, strict=True):
@@ -405,11 +423,27 @@ def _draw_maps(
 def _arrange_panels(
     area: PageBox, count: int, aspect: float, caption_height: float, gap: float
 ) -> list[tuple[PageBox, float]]:
-    """Return the largest equal boxes in an area, with the width of the captions above them, px."""
+    """Arrange panels of equal size in a grid, as large as possible.
+
+    Parameters
+    ----------
+    area : PageBox, px
+    count : int
+    aspect : float
+        Width of a panel divided by its height.
+    caption_height, gap : float, px
+        Space above each panel, and between panels.
+
+    Returns
+    -------
+    list of (PageBox, float), px
+        Box of each panel, and the width of the caption above it.
+    """
     left, top, width, height = area
     panel_width = 0.0
     columns = 1
     for candidate in range(1, count + 1):
+        # Rounded up.
         rows = -(-count // candidate)
         max_width = (width - (candidate - 1) * gap) / candidate
         max_height = (height - (rows - 1) * gap) / rows - caption_height
@@ -434,7 +468,7 @@ def _arrange_panels(
 def _draw_snapshot(
     axes: Axes, snapshot: DistanceSnapshot, limit: float, theme: Theme, *, box: PageBox, scale: float
 ) -> None:
-    """Draw distances, the borders of geodesic cells, the map and the robots in axes of a box, px."""
+    """Draw distances, the borders of geodesic cells, the map and the robots in axes that fill a box, px."""
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
     columns = max(round(DOTS_PER_PIXEL * box[2]), 2)
@@ -469,7 +503,19 @@ def _paint_distances(
     zoom: float,
     border_width: float,
 ) -> NDArray[np.uint8]:
-    """Return the colors of distances and of borders at (w,) x and (h,) y, m, as (h, w, 3)."""
+    """Return the RGB image of distances and borders, (h, w, 3).
+
+    Parameters
+    ----------
+    field : DistanceField
+    x : (w,) array, m
+    y : (h,) array, m
+    limit : float, m
+        End of the color scale.
+    theme : Theme
+    zoom : float, dots/m
+    border_width : float, px
+    """
     pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
     width = DOTS_PER_PIXEL * border_width
     borders = field.compute_borders(x, y, width / zoom)
@@ -481,9 +527,7 @@ def _paint_distances(
 
 
 def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> float:
-    """Draw the color scale above the right edge of the maps.
-
-    Its label is left out if there is not enough space.
+    """Draw the color scale above the maps, at the right, with a label if there is enough space.
 
     Parameters
     ----------

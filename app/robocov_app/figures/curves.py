@@ -1,4 +1,4 @@
-"""Curves over time, each with its name and its final value at its end."""
+"""Curves over time, each labeled at its end with its name and its final value."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -31,9 +31,9 @@ WEIGHTED_DISTANCE = "mean distance to the nearest robot, weighted by φ (m)"
 _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4
 _MIN_SHORT_VALUE = 10.0
-"""Larger values have four digits instead of three decimals."""
+"""From this value on, units other than meters have four significant digits instead of three decimals."""
 _MAX_WIDENED_LINES = 3
-"""A line is widened for at most this number of lines on top of it."""
+"""Maximum number of lines on top of a line for which it is widened."""
 _LINE_WIDTH_PT = 2.2
 _EXTRA_LINE_WIDTH_PT = 0.9
 """Additional width of a line for each one on top of it, so that equal curves can be seen."""
@@ -42,7 +42,7 @@ _EXTRA_MARK_PT = 2.0
 _LABEL_LINE_HEIGHT = 1.45
 """Height of a line of labels, in text sizes."""
 _MIN_MOVED_FRACTION = 0.3
-"""A label that was moved by more than this fraction of its height is connected with its curve."""
+"""A label that is moved by more than this fraction of its height is connected with its curve by a line."""
 # Horizontal distances from the axes.
 _CONNECTION_START_PT = 4
 _CONNECTION_END_PT = 10
@@ -82,7 +82,7 @@ class CurveMargins(NamedTuple):
     right : float
         In addition to the width of the labels at the ends of the curves.
     max_right_fraction : float
-        Maximum width to the right of the axes, with the labels, as a fraction of that of the box.
+        Maximum width to the right of the axes, labels included, as a fraction of the width of the box.
     """
 
     left: float
@@ -93,7 +93,7 @@ class CurveMargins(NamedTuple):
 
 
 class _CurveEnd(NamedTuple):
-    """The last known value of a curve.
+    """The last known value of a curve, and its label.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     ----------
     curve : TimeCurve
     unit : str
-        Meters have three decimals, other units four digits if the value is large.
+        Meters have three decimals; large values in other units have four significant digits.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
 
 
 def _format_end_value(value: float, unit: str) -> str:
-    """Return the last value of a curve as text."""
+    """Return the last value of a curve as text, without its unit; see `format_end_label`."""
     if abs(value) >= _MIN_EXPONENT_VALUE:
         return f"{value:.4g}"
     if unit == "m" or abs(value) < _MIN_SHORT_VALUE:
@@ -154,7 +154,7 @@ def add_curve_axes(
         At least one.
     margins : CurveMargins
     box : PageBox, optional
-        Area of the page for the axes and all their labels. By default the whole page.
+        Area of the page for the axes and all their labels; by default the whole page.
     unit : str
         Unit of the values at the ends, as for `draw_curves`.
 
@@ -188,7 +188,7 @@ def draw_curves(
     unit: str = "m",
     weight: float = 1.0,
 ) -> None:
-    """Draw curves, the first one at the bottom and widest, with labels at their ends.
+    """Draw curves with labels at their ends; the first curve is at the bottom and has the widest line.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def draw_curves(
     curves : sequence of TimeCurve
     theme : Theme
     styles : sequence of CurveStyle, optional
-        By default those of the controllers.
+        By default the styles of the controllers.
     bands : sequence of ((T,) array, (T,) array) or None, optional
         Lower and upper edge of a band around each curve.
     label : str
@@ -204,7 +204,7 @@ def draw_curves(
     unit : str
         Unit of the values at the ends.
     weight : float
-        Factor of the widths of lines.
+        Factor by which line widths and marks are multiplied.
     """
     if styles is None:
         styles = choose_curve_styles([curve.controller for curve in curves])
@@ -234,6 +234,7 @@ def _set_axes(axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[Arr
         if band is not None:
             lines += band
     start = float(times.min())
+    # Limits must differ, even if there is a single time.
     axes.set_xlim(start, max(float(times.max()), start + 1e-9))
     set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
     set_value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
@@ -242,7 +243,10 @@ def _set_axes(axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[Arr
 def _draw_line(
     axes: Axes, curve: TimeCurve, style: CurveStyle, color: PlotColor, *, weight: float, lines_above: int
 ) -> tuple[float, float]:
-    """Draw a curve with a mark at its end, and return the time and the value there."""
+    """Draw a curve with a mark at its last finite value; return the time and the value there.
+
+    `lines_above` is the number of curves that are drawn on top of it.
+    """
     times = curve.times
     values = curve.values
     extra = min(lines_above, _MAX_WIDENED_LINES)
@@ -250,7 +254,7 @@ def _draw_line(
     dashes = style.dashes
     dash_lengths = style.list_dash_lengths()
     if dash_lengths:
-        # Dashes are given in line widths. Those of wide lines are as long as those of others.
+        # matplotlib measures dashes in line widths; this makes them equally long on lines of all widths.
         dashes = 0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dash_lengths)
     axes.plot(times, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
     last = int(np.nonzero(np.isfinite(values))[0][-1])
@@ -267,9 +271,10 @@ def _draw_line(
 
 
 def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd]) -> None:
-    """Write the label of each curve next to the axes, with a line to it if it had to be moved."""
+    """Write the label of each curve to the right of the axes, with a line to it if it had to be moved."""
     dpi = get_figure(axes).dpi
     box = axes.get_window_extent()
+    # One point as a fraction of the width of the axes.
     point = dpi / POINTS_PER_INCH / box.width
     line_height = _LABEL_LINE_HEIGHT * TEXT * dpi / POINTS_PER_INCH
     rows: list[float] = axes.transData.transform([(end.time, end.value) for end in ends])[:, 1].tolist()

@@ -1,4 +1,4 @@
-"""The bounding box of several maps, which are drawn at the same scale."""
+"""The bounding box of several maps that are drawn at the same scale."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Extent:
 
 
 def enclose_maps(environments: Iterable[Environment]) -> Extent:
-    """Compute the bounding box of the regions of maps."""
+    """Compute the common bounding box of the regions of several maps."""
     bounds = np.array([environment.region.bounds for environment in environments])
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()

@@ -1,4 +1,4 @@
-"""Figures as PNG, SVG and PDF files. The same plot gives the same bytes."""
+"""Figures as PNG, SVG and PDF files. Equal plots give identical files."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _METADATA: dict[str, dict[str, str | None]] = {
 _FILE_STYLE: Any = {
     "savefig.bbox": None,
     "svg.hashsalt": "robocov",
-    # Outlines: an SVG does not contain its font, and the glyphs of others have different widths.
+    # Glyphs as outlines: an SVG does not embed its font, and a substitute has glyphs of other widths.
     "svg.fonttype": "path",
-    # TrueType: publishers reject Type 3 fonts, and texts can be searched and copied.
+    # TrueType fonts: publishers reject Type 3 fonts, and TrueType texts can be searched and copied.
     "pdf.fonttype": 42,
 }
 _PLAIN_STYLE: Any = {
@@ -40,10 +40,10 @@ _PLAIN_STYLE: Any = {
 
 @contextmanager
 def plain_style() -> Iterator[None]:
-    """Let matplotlib draw the same in every style that the user may have set.
+    """Make matplotlib draw the same, regardless of the style that the user has set.
 
-    A dollar sign does not start a formula, and glyphs that the font does not have cause no warning. It is
-    also a decorator: ``@plain_style()``.
+    A dollar sign does not start a formula, and characters that the font lacks cause no warning. The context
+    manager can also be used as a decorator: ``@plain_style()``.
 
     Yields
     ------
@@ -95,7 +95,7 @@ def render_png(figure: Figure) -> bytes:
 
 
 def save_figure(figure: Figure, path: Path | str) -> None:
-    """Save a figure. An existing file is replaced only when the new one is complete.
+    """Save a figure to a file; an existing file is only replaced once the new one is complete.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
     OutputError
         If the file cannot be written.
     ParameterError
-        If the suffix is a different one.
+        If the suffix is none of these.
 
     See Also
     --------
@@ -129,7 +129,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
 
 
 def _write_figure(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
-    """Write a figure as ``png``, ``svg`` or ``pdf``."""
+    """Write a figure to a path or a binary file, as ``png``, ``svg`` or ``pdf``, with controls escaped."""
     import matplotlib
     from matplotlib.text import Text
 
@@ -139,7 +139,7 @@ def _write_figure(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
     with plain_style(), matplotlib.rc_context(_FILE_STYLE):
         figure.savefig(file, format=kind, metadata=_METADATA[kind], **page)
     if kind == "svg" and isinstance(file, Path):
-        # Only now are the labels of ticks known, which may contain characters that XML does not allow.
+        # Tick labels are only generated while saving, and may contain characters that XML does not allow.
         content = file.read_text("utf-8")
         escaped = escape_controls(content)
         if escaped != content:
@@ -147,7 +147,7 @@ def _write_figure(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
 
 
 def check_figure_path(path: Path) -> None:
-    """Check, before any work is done, that a figure can be saved.
+    """Check that a figure can be saved, before any work is done.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def check_figure_path(path: Path) -> None:
     OutputError
         If the folder does not exist.
     ParameterError
-        If the suffix is not that of a figure.
+        If the suffix is not that of a figure format.
 
     See Also
     --------
@@ -174,7 +174,7 @@ def check_figure_path(path: Path) -> None:
 
 
 def get_figure_kind(path: Path) -> str:
-    """Return the format for the suffix of a path.
+    """Return the figure format that the suffix of a path stands for.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def get_figure_kind(path: Path) -> str:
     Raises
     ------
     ParameterError
-        If it is not the suffix of a figure.
+        If the suffix is not that of a figure format.
 
     See Also
     --------

@@ -24,12 +24,12 @@ from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
 _WHISKER_LENGTH = 1.5
-"""Maximum length of whiskers, in lengths of the box."""
+"""Maximum length of a whisker, in interquartile ranges."""
 _MARGIN_FRACTION = 0.06
 
 
 class Sample(NamedTuple):
-    """One value of each of several runs.
+    """The values of several runs, one of each.
 
     Attributes
     ----------
@@ -53,13 +53,13 @@ def plot_final_costs(
     theme: Theme = LIGHT,
     origin: float = 0.0,
 ) -> Figure:
-    """Plot samples in groups, such as maps: boxes with the quartiles, and every value as a point.
+    """Plot samples in rows, grouped for example by map: a box with the quartiles, and values as points.
 
     Parameters
     ----------
     groups : sequence of (str, sequence of Sample)
         Name of each group, which may be empty, and its samples. Values that are not finite are left out.
-        Samples of less than `MIN_BOX_VALUES` values have no box.
+        Samples of fewer than `MIN_BOX_VALUES` values have no box.
     label : str
         Label of the value axis.
     width : int, px
@@ -68,7 +68,7 @@ def plot_final_costs(
         Scale of texts and lines.
     theme : Theme
     origin : float
-        The axis starts here unless all values are far from it.
+        Start of the axis, unless all values are far from it.
 
     Returns
     -------
@@ -92,6 +92,7 @@ def plot_final_costs(
 def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], theme: Theme) -> None:
     """Write the name of each group at the left edge of the page."""
     box = axes.get_position()
+    # Just right of the left edge of the page, in fractions of the width of the axes.
     left = -box.x0 / box.width + 0.01
     for name, height in zip(names, heights, strict=True):
         if name:

@@ -20,18 +20,18 @@ from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT, Theme
 
 MAX_LEVELS = 15
-"""Maximum number of values of a gain that have a median each. More are a sample of a range."""
+"""Maximum number of gain values with a median each; more values are taken as samples of a range."""
 MAX_NAME_CHARS = 28
-"""Maximum length of a name at an axis or in a legend."""
+"""Maximum length of a name on an axis or in a legend."""
 MAX_DRAWN_RUNS = 600
-"""Maximum number of points of a controller that are drawn."""
+"""Approximate maximum number of points drawn for a controller."""
 _MIN_LOG_RATIO = 8.0
 """Minimum ratio of the highest value to the lowest for a logarithmic axis."""
 _MAX_LEVEL_TICKS = 8
-"""Maximum number of values of a gain that have a tick each."""
+"""Maximum number of gain values with a tick each."""
 _MARGIN_FRACTION = 0.07
 _CELL_SIZE = 0.96
-"""Width and height of a cell of a grid. The rest is a thin line of the background."""
+"""Width and height of a drawn cell; the rest of its square is a thin line in the background color."""
 _MAX_DECIMALS = 4
 
 
@@ -43,7 +43,7 @@ class Dependence(NamedTuple):
     label : str
     style : CurveStyle
     gains : (m,) array
-        Values of the gain; nan for no limit, and the index of a text.
+        Values of the gain; nan stands for no limit. If the gain is a text, indices of its values.
     values : (m,) array
     """
 
@@ -82,7 +82,7 @@ def plot_gains(
     label: str,
     choices: Sequence[str] = (),
 ) -> Figure:
-    """Plot values against a gain, as points, and their medians.
+    """Plot the results of runs against a gain, as points, with the median at each gain.
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ def plot_gains(
     label : str
         Label of the value axis.
     choices : sequence of str
-        Values of a gain that is a text. For a number, a line connects the medians; the axis is logarithmic
-        for a wide range, and "none", for no limit, is at its right end.
+        Possible values of a gain that is a text; empty if the gain is a number. Then a line connects the
+        medians, the axis is logarithmic if its range is wide, and "none", for no limit, is at its right end.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def plot_gains(
 
 @plain_style()
 def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
-    """Plot a grid on a page, see `draw_gain_grid`."""
+    """Plot a grid of two gains on a page of its own, see `draw_gain_grid`."""
     axes = _create_axes(size)
     draw_gain_grid(axes, grid, LIGHT)
     return get_figure(axes)
@@ -130,7 +130,7 @@ def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
 
 @plain_style()
 def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
-    """Draw a grid of two gains as a heat map with numbers. The lowest one is bold.
+    """Draw the results over two gains as a heat map with numbers, the lowest in bold.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
 
 
 def _choose_decimals(low: float, high: float) -> int:
-    """Return decimals for three digits of the highest number, and for a tenth of the range."""
+    """Return the number of decimals that shows three digits of the highest value and tenths of the range."""
     sizes = [size for size in (high, 10.0 * (high - low)) if size]
     if not sizes:
         return 2
@@ -175,29 +175,29 @@ def _choose_decimals(low: float, high: float) -> int:
 
 
 def _create_axes(size: tuple[int, int]) -> Axes:
-    """Create axes that fill a page."""
+    """Create axes that fill a page, except for margins for labels."""
     width, height = size
     return FigurePage(size, LIGHT, 1.0).add_axes((52, 34, width - 70, height - 84))
 
 
 def _shorten_name(name: str) -> str:
-    """Return a name that fits at an axis or in a legend."""
+    """Shorten a name so that it fits on an axis or in a legend."""
     return shorten_text(name, len, MAX_NAME_CHARS)
 
 
 def _set_number_axis(axes: Axes, gains: Array) -> float | None:
-    """Set scale, limits and ticks of an axis of numbers.
+    """Set the scale, limits and ticks of the horizontal axis for a gain that is a number.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
     gains : (m,) array
-        nan for no limit.
+        Values of the gain; nan stands for no limit.
 
     Returns
     -------
     float or None
-        Position that stands for no limit; None if all gains have a limit.
+        Position on the axis for "no limit"; None if no gain is without limit.
     """
     levels = np.unique(gains[np.isfinite(gains)])
     low, high = 0.0, 0.0
@@ -228,7 +228,7 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
 
 
 def _set_logarithmic_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
-    """Set the limits of a logarithmic axis, and return its last position."""
+    """Set the limits of a logarithmic axis; return the position of "no limit" or, without it, `high`."""
     axes.set_xscale("log")
     margin = (high / low) ** _MARGIN_FRACTION
     end = high
@@ -239,7 +239,7 @@ def _set_logarithmic_limits(axes: Axes, low: float, high: float, *, has_unlimite
 
 
 def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
-    """Set the limits of a linear axis, and return its last position."""
+    """Set the limits of a linear axis; return the position of "no limit" or, without it, `high`."""
     if high > low:
         margin = _MARGIN_FRACTION * (high - low)
     else:
@@ -252,7 +252,7 @@ def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bo
 
 
 def _draw_dependence(axes: Axes, dependence: Dependence, positions: Array, *, is_joined: bool) -> None:
-    """Draw the runs of a controller as points, and the medians at each position if there are not many.
+    """Draw the runs of a controller as points, and the median at each position if there are few positions.
 
     Parameters
     ----------
@@ -261,17 +261,18 @@ def _draw_dependence(axes: Axes, dependence: Dependence, positions: Array, *, is
     positions : (m,) array
         Positions of the gains on the axis.
     is_joined : bool
-        Whether a line joins the medians.
+        Whether a line connects the medians.
     """
     style = dependence.style
     label = _shorten_name(dependence.label)
     color = to_plot_color(style.get_color(LIGHT))
+    # Draw every step-th run; rounded up.
     step = -(-len(positions) // MAX_DRAWN_RUNS)
     points: dict[str, Any] = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}
     axes.plot(positions[::step], dependence.values[::step], style.mark, markersize=3.6, alpha=0.5, **points)
     levels = np.unique(positions)
     if len(levels) > MAX_LEVELS:
-        # These points are not drawn, but have an entry in the legend.
+        # An empty plot adds the entry in the legend.
         axes.plot([], [], style.mark, markersize=5.0, label=label, **points)
         return
     medians = np.array([np.median(dependence.values[positions == level]) for level in levels])

@@ -33,7 +33,7 @@ PlotColor: TypeAlias = tuple[float, float, float]
 
 _Anchor: TypeAlias = Literal["upper left", "upper center", "center right"]
 _FULL_SCALE_SIZE_PX = (960, 640)
-"""Size of a page whose texts have their size at 100 dots per inch."""
+"""Page size at scale 1, at which texts have their nominal size at 100 dots per inch."""
 _MIN_SCALE = 0.8
 _MAX_SCALE = 6.0
 # Lengths at scale 1, px.
@@ -46,13 +46,13 @@ _ONE_LINE_FOOTER = 46
 
 
 def to_plot_color(color: Color) -> PlotColor:
-    """Convert a color of a theme to one of matplotlib."""
+    """Convert a color of a theme to a matplotlib color."""
     red, green, blue = color
     return red / 255, green / 255, blue / 255
 
 
 def get_figure(axes: Axes) -> Figure:
-    """Return the figure of axes, even if they are in a subfigure."""
+    """Return the figure that contains axes, even if they are in a subfigure."""
     return cast("Figure", axes.get_figure(root=True))
 
 
@@ -63,14 +63,14 @@ def check_not_empty(name: str, items: Sequence[object]) -> None:
 
 
 def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
-    """Give axes the colors of a theme, and labels. Only the line below a grid has a frame.
+    """Give axes the colors of a theme, and labels; of the frame, only the bottom line of a grid is visible.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
     theme : Theme
     x, y : str
-        Labels. That of the vertical axis is horizontal, above the axis.
+        Labels of the axes. The label of the vertical axis is horizontal and above the axis.
     grid : {"x", "y", ""}
         Axis whose ticks have grid lines.
     """
@@ -92,13 +92,13 @@ def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
 
 
 def set_even_ticks(axis: Axis, max_intervals: int) -> None:
-    """Give an axis round ticks with a maximum number of intervals; they adapt when a notebook zooms."""
+    """Set round ticks with at most `max_intervals` intervals, which adapt when a notebook zooms."""
     axis.set_major_locator(MaxNLocator(nbins=max_intervals, steps=list(TICK_FACTORS)))
     axis.set_major_formatter("{x:g}")
 
 
 def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, origin: float = 0.0) -> None:
-    """Give an axis limits and ticks for finite values, see `choose_value_limits`."""
+    """Set the limits and ticks of an axis for finite values, see `choose_value_limits`."""
     low = float(values.min())
     high = float(values.max())
     limits = choose_value_limits(low, high, margin=margin, origin=origin)
@@ -112,16 +112,16 @@ def _get_font_weight(bold: bool) -> str:
 
 
 class PageAxes(Axes):
-    """Axes of a page. Notebooks display the whole page for them.
+    """Axes of a page, for which notebooks display the whole page.
 
-    They would not display a figure that was made without pyplot.
+    Without this, notebooks would not display a figure that is created without pyplot.
     """
 
     def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
-        """Return the page as PNG, with its width in a notebook, and its texts for screen readers."""
+        """Return the page as PNG, its width in a notebook, and its texts for screen readers."""
         figure = get_figure(self)
         texts = [text.get_text() for text in figure.texts if text.get_text()]
-        # At 100 dots per inch, a dot of the page is a pixel of the screen.
+        # The width in a notebook is that of the page at 100 dots per inch.
         width = round(figure.bbox.width * 100 / figure.dpi)
         return render_png(figure), {"width": width, "alt": "; ".join(texts)}
 
@@ -133,7 +133,7 @@ class PagePanel(NamedTuple):
     ----------
     box : PageBox
     caption_width : float, px
-        Maximum width of the lines above the panel.
+        Maximum width of the text above the panel.
     """
 
     box: PageBox
@@ -141,7 +141,7 @@ class PagePanel(NamedTuple):
 
 
 class _LegendExtent(NamedTuple):
-    """Size of a legend.
+    """Size of a legend, and its number of columns.
 
     Attributes
     ----------
@@ -155,14 +155,14 @@ class _LegendExtent(NamedTuple):
 
 
 class FigurePage:
-    """A figure on which positions are in pixels.
+    """A figure on which positions are in pixels from the top left.
 
     Parameters
     ----------
     size : (width, height), px
     theme : Theme
     scale : float, optional
-        Size of texts and lines; 1 is that at 100 dots per inch. By default it suits the size of the page.
+        Scale of texts and lines; 1 means 100 dots per inch. By default it suits the size of the page.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class FigurePage:
         self.content_width = width - 2 * self.margin
         self._max_bar_length = max(min(_MAX_SCALE_BAR * scale, width / 7), 20.0)
         dpi = 100.0 * scale
-        # matplotlib truncates the number of pixels, and might get 899 from 899.9999.
+        # matplotlib truncates the number of pixels, so rounding errors could turn 900 into 899.
         inches = ((width + 1e-3) / dpi, (height + 1e-3) / dpi)
         self.figure = Figure(figsize=inches, dpi=dpi, facecolor=to_plot_color(theme.background))
         FigureCanvasAgg(self.figure)
@@ -199,7 +199,7 @@ class FigurePage:
         return x / width, 1.0 - y / height
 
     def add_axes(self, box: PageBox) -> Axes:
-        """Add axes that fill a box. Notebooks display the page for them."""
+        """Add axes that fill a box, px."""
         left, top, width, height = box
         x, y = self.to_figure(left, top + height)
         page_width, page_height = self.size
@@ -207,7 +207,7 @@ class FigurePage:
         return self.figure.add_axes(rectangle, axes_class=PageAxes)
 
     def add_map_axes(self, box: PageBox, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
-        """Add axes without ticks that show a rectangle of the world, m, in a box of the same aspect."""
+        """Add axes without ticks that show a rectangle of the world, m, in a box with the same aspect, px."""
         axes = self.add_axes(box)
         axes.set(xlim=(low_x, high_x), ylim=(low_y, high_y))
         axes.set_axis_off()
@@ -222,7 +222,7 @@ class FigurePage:
         y : float
             Middle of the line, px at scale 1.
         max_width : float, px, optional
-            By default that between the margins.
+            By default the width between the margins.
         """
         if max_width is None:
             max_width = self.content_width
@@ -240,19 +240,19 @@ class FigurePage:
         max_width: float | None = None,
         align: str = "left",
     ) -> None:
-        """Write one line.
+        """Write one line of text.
 
         Parameters
         ----------
         text : str
         x, y : float, px
-            Position on the middle of the line, at the edge given by `align`.
+            Left edge, right edge or center of the text, depending on `align`; y is its vertical middle.
         points : float
             Text size.
         bold : bool
         color : Color, optional
         max_width : float, px, optional
-            A longer text is shortened.
+            Texts that are wider are shortened.
         align : {"left", "right", "center"}
         """
         text_x, text_y = self.to_figure(x, y)
@@ -268,20 +268,20 @@ class FigurePage:
         )
         if max_width is None:
             return
-        # The same text is up to a pixel wider at one position than at another.
+        # The measured width of a text varies with its position by up to a pixel.
         while len(text) > 1 and self._measure_width(artist) > max_width + 1:
             text = text[:-1]
             artist.set_text(text.rstrip(" ·") + "…")
 
     def measure_text(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
-        """Return the width of a text, px."""
+        """Return the width of a text of a size in points, px."""
         artist = self.figure.text(0, 0, text, fontsize=points, fontweight=_get_font_weight(bold))
         width = self._measure_width(artist)
         artist.remove()
         return width
 
     def _measure_width(self, artist: Artist) -> float:
-        """Return the width of an artist, px."""
+        """Return the width at which an artist is drawn, px."""
         return float(artist.get_window_extent(self._get_renderer()).width)
 
     def _get_renderer(self) -> Any:
@@ -300,16 +300,16 @@ class FigurePage:
         top: float,
         bottom: float,
     ) -> list[PagePanel]:
-        """Arrange equal panels, each with lines above it.
+        """Arrange panels of equal size in a centered grid, each with a caption above it.
 
         Parameters
         ----------
         count : int
         columns : int
         aspect : float
-            Width by height of a panel.
+            Width of a panel divided by its height.
         caption_width : float, px
-            Width of the widest lines; columns are this wide if there is enough space.
+            Width of the widest caption; columns are at least this wide if there is enough space.
         caption_height : float, px
         top, bottom : float, px
             Space above and below all panels.
@@ -320,6 +320,7 @@ class FigurePage:
         """
         page_width, page_height = self.size
         gap = _PANEL_GAP * self.scale
+        # Rounded up.
         rows = -(-count // columns)
         max_width = (page_width - self.margin) / columns - self.margin
         max_height = (page_height - top - bottom + gap) / rows - caption_height - gap
@@ -338,7 +339,7 @@ class FigurePage:
         return panels
 
     def measure_footer(self, handles: Sequence[Artist], start: float = 0) -> float:
-        """Return the height of a footer, px, see `draw_footer`."""
+        """Return the height that `draw_footer` needs, px."""
         start = max(start, self.margin)
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), start):
@@ -357,9 +358,9 @@ class FigurePage:
         boxes : sequence of PageBox
             Boxes of the maps.
         zoom : float, px/m
-            Zoom of the maps.
+            Scale at which the maps are drawn.
         start : float, px
-            Nothing is drawn to the left of this.
+            Left edge of the footer.
         """
         start = max(start, self.margin)
         end = self.size[0] - self.margin
@@ -379,16 +380,16 @@ class FigurePage:
             self._draw_legend(handles, legend.columns, "upper center", middle)
 
     def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, start: float) -> bool:
-        """Return whether a legend is a single line that fits next to the scale bar."""
+        """Return whether a legend of some entries is a single line that fits next to the scale bar."""
         return legend.columns == entries and legend.width <= self._compute_legend_space(start)
 
     def _compute_legend_space(self, start: float) -> float:
-        """Return the width that the longest scale bar and its label leave for a legend in the same line."""
+        """Return the width that a legend may have in the same line as the longest scale bar, px."""
         label_width = _SCALE_BAR_LABEL * self.scale
         return self.size[0] - self.margin - start - self._max_bar_length - label_width
 
     def _draw_scale_bar(self, left: float, y: float, zoom: float) -> float:
-        """Draw a bar of a round length, and return where its label ends, px."""
+        """Draw a scale bar of a round length; return the right end of its label, px."""
         length = round_down(self._max_bar_length / zoom)
         right = left + length * zoom
         half_tick = 4 * self.scale
@@ -408,10 +409,11 @@ class FigurePage:
         self.figure.add_artist(line)
 
     def _measure_legend(self, handles: Sequence[Artist], start: float) -> _LegendExtent:
-        """Return the size of a legend in the fewest rows that fit to the right of a position, px."""
+        """Return the size of a legend with the fewest rows that fit to the right of `start`, px."""
         max_width = self.size[0] - start
         rows = 1
         while True:
+            # Rounded up.
             columns = -(-len(handles) // rows)
             legend = self._draw_legend(handles, columns, "upper left", (0.0, 0.0))
             extent = legend.get_window_extent(self._get_renderer())

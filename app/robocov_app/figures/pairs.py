@@ -1,4 +1,4 @@
-"""Plots of ratios in pairs of runs, on a logarithmic axis."""
+"""Plots of the ratios of pairs of runs, on a logarithmic axis."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
 _MAX_INTERVAL_FACTOR = 1.5
-"""Maximum factor by which the ends of intervals extend an axis beyond the ratios."""
+"""Maximum factor by which an axis is extended beyond the ratios to show the ends of intervals."""
 _TICKS = (
     *(0.01, 0.02, 0.05),
     *(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
@@ -35,7 +35,7 @@ _MAX_TICK_INTERVALS = 7
 
 
 class Pairs(NamedTuple):
-    """Ratios of two controllers in pairs of runs.
+    """Ratios of two controllers over pairs of runs.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Pairs(NamedTuple):
     ratios : (m,) array
         Above 0.
     interval : Interval
-        The typical ratio.
+        The typical ratio with its 95 % interval.
     """
 
     label: str
@@ -57,7 +57,7 @@ class Pairs(NamedTuple):
 def plot_pairs(
     pairs: Sequence[Pairs], label: str, *, width: int, scale: float, theme: Theme = LIGHT
 ) -> Figure:
-    """Plot each ratio, and the typical one with its 95 % interval.
+    """Plot all ratios in one row per comparison, and the typical ratio with its 95 % interval.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def _draw_interval(axes: Axes, interval: Interval, row: float, theme: Theme) -> 
 
 
 def _list_axis_values(pairs: Sequence[Pairs]) -> Array:
-    """Return the values that an axis shows: all ratios, and the ends of intervals.
+    """Return the values that an axis must show: all ratios, and the ends of intervals.
 
-    An interval of two or three values may be extremely wide. It is cut off at the limits of the axis then.
+    An interval from two or three values may be extremely wide, so its ends are limited.
     """
     ratios = np.concatenate([row_pairs.ratios for row_pairs in pairs])
     ends = np.array([(row_pairs.interval.low, row_pairs.interval.high) for row_pairs in pairs]).ravel()
@@ -113,7 +113,7 @@ def _list_axis_values(pairs: Sequence[Pairs]) -> Array:
 
 
 def set_ratio_axis(axes: Axes, ratios: Array, theme: Theme) -> None:
-    """Make the horizontal axis logarithmic, with limits and ticks for ratios, and a line at 1."""
+    """Make the horizontal axis logarithmic, with limits and ticks for ratios, and draw a line at 1."""
     low = min(float(ratios.min()), 0.95)
     high = max(float(ratios.max()), 1.05)
     margin = (high / low) ** 0.05
@@ -129,7 +129,7 @@ def set_ratio_axis(axes: Axes, ratios: Array, theme: Theme) -> None:
 
 
 def _space_ticks(ticks: Sequence[float], min_distance: float) -> list[float]:
-    """Return ticks whose logarithms have a minimum distance, including 1, and those near 1 first."""
+    """Select ticks whose logarithms are far enough apart: 1, then the others from the nearest to 1."""
     spaced = [1.0]
     for tick in sorted(ticks, key=lambda tick: abs(np.log(tick))):
         distances = [abs(np.log(tick / other)) for other in spaced]

@@ -17,9 +17,9 @@ from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import Theme
 
 MAX_POINTS = 250
-"""Maximum number of points of a sample that are drawn; of more, ones with evenly distributed ranks."""
+"""Maximum number of points drawn for a sample; of larger samples, points with evenly spaced ranks."""
 MIN_BOX_VALUES = 5
-"""Minimum number of values for a box. Of fewer values, the points alone are more informative."""
+"""Minimum number of values for a box; of fewer values, the points alone say more."""
 HALF_BOX_HEIGHT = 0.27
 _ROW_HEIGHT_PX = 30.0
 _HEADING_HEIGHT_PX = 26.0
@@ -29,7 +29,7 @@ _NAME_GAP_PT = 13.0
 """Space between the name of a row and the axis, for its mark."""
 _MARK_MARGIN_PT = 3.0
 _MAX_NAME_FRACTION = 0.42
-"""Maximum width of names as a fraction of that of the page."""
+"""Maximum width of names, as a fraction of the page width."""
 # Margins of a page at scale 1, px.
 _LEFT_MARGIN = 32
 _RIGHT_MARGIN = 16
@@ -42,7 +42,7 @@ _POINT_OPACITY = 0.65
 
 
 class RowPositions(NamedTuple):
-    """Heights of rows and headings.
+    """Vertical positions of rows and headings, in rows from the top.
 
     Attributes
     ----------
@@ -51,6 +51,7 @@ class RowPositions(NamedTuple):
     headings : list of float
         Middle of the heading of each group.
     total : float
+        Height of everything.
     """
 
     rows: list[float]
@@ -59,7 +60,7 @@ class RowPositions(NamedTuple):
 
 
 def arrange_rows(groups: Sequence[tuple[str, int]]) -> RowPositions:
-    """Arrange rows in groups.
+    """Compute the vertical positions of rows in groups, each below the heading of its group.
 
     Parameters
     ----------
@@ -88,12 +89,12 @@ def arrange_rows(groups: Sequence[tuple[str, int]]) -> RowPositions:
 def create_row_axes(
     height: float, names: Sequence[str], theme: Theme, *, width: int, scale: float
 ) -> tuple[Axes, list[str]]:
-    """Create axes on a page that is high enough for some rows.
+    """Create a page that is high enough for some rows, with axes that leave space for their names.
 
     Parameters
     ----------
     height : float
-        Number of rows.
+        Total height in rows, from `arrange_rows`.
     names : sequence of str
         Names of the rows.
     theme : Theme
@@ -108,6 +109,7 @@ def create_row_axes(
     short_names : list of str
         The names, shortened if they do not fit to the left of the axes.
     """
+    # A first page, of any height, serves to measure the names.
     page = FigurePage((width, 200), theme, scale)
     max_name_width = _MAX_NAME_FRACTION * width
     short_names = [shorten_text(name, page.measure_text, max_name_width, min_chars=1) for name in names]
@@ -129,7 +131,7 @@ def label_rows(
     theme: Theme,
     label: str,
 ) -> None:
-    """Write the names of rows, and the label of the horizontal axis."""
+    """Write the names of rows to the left of the axes, and the label of the horizontal axis."""
     axes.set_yticks(rows, names)
     style_axes(axes, theme, label, grid="x")
     axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT, pad=_NAME_GAP_PT)
@@ -152,7 +154,7 @@ def draw_row_marks(axes: Axes, rows: Sequence[float], styles: Sequence[CurveStyl
 
 
 def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, theme: Theme) -> None:
-    """Draw sorted values as points, scattered vertically so that few of them hide each other."""
+    """Draw sorted values as points in a row, scattered vertically so that few points hide others."""
     if len(values) > MAX_POINTS:
         ranks = np.rint(np.linspace(0, len(values) - 1, MAX_POINTS)).astype(int)
         values = values[ranks]
@@ -178,7 +180,11 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
 
 
 def _scatter(count: int) -> Array:
-    """Return vertical offsets of points from the van der Corput sequence, whose neighbors differ widely."""
+    """Return vertical offsets of points, (count,), from the van der Corput sequence.
+
+    Neighbors in the sequence differ widely.
+    Element k of the sequence is the number whose binary fraction has the digits of k in reverse order.
+    """
     bits = np.arange(1, MAX_POINTS.bit_length() + 1)
     digits = np.arange(1, count + 1)[:, None] >> (bits - 1) & 1
     fractions = digits @ 0.5**bits
@@ -186,7 +192,7 @@ def _scatter(count: int) -> Array:
 
 
 def draw_row_median(axes: Axes, value: float, row: float, theme: Theme) -> None:
-    """Draw a median as a vertical line."""
+    """Draw a median as a vertical line in a row."""
     axes.plot(
         [value, value],
         [row - HALF_BOX_HEIGHT, row + HALF_BOX_HEIGHT],

@@ -35,9 +35,9 @@ from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.panel_grid import choose_column_count
 
 MAX_MAPS = 60
-"""Maximum number of maps on a sheet. More would be too small to be seen."""
+"""Maximum number of maps on a sheet; more would be too small to recognize."""
 _MAP_SCALE = 1.3
-"""Scale of texts and lines on a page of the usual width: its legend is next to the scale bar."""
+"""Scale of texts and lines on a page of default width, on which the legend fits next to the scale bar."""
 _SHEET_WIDTH_PX = 1600
 _MAX_SHEET_HEIGHT_PX = 1600
 _SHEET_SCALE = 1.5
@@ -50,7 +50,7 @@ _ONE_LINE_CAPTION = 30
 _TWO_LINE_CAPTION = 54
 _CAPTION_GAP = 16
 _COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
-"""Space around the curves of a page for curves alone: its title is above them."""
+"""Space around the curves on a page without maps; the title is above them."""
 _MAP_HEAD = 58
 """Space above the map of a page at scale 1, px."""
 _METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=24, max_right_fraction=0.5)
@@ -138,14 +138,14 @@ def plot_trajectories(
 
 @dataclass(frozen=True)
 class _Captions:
-    """Lines above the panels of a comparison.
+    """Captions above the panels of a comparison.
 
     Attributes
     ----------
     shared : str
-        Facts that all runs have in common, for the title of the page.
+        Facts that all runs have in common, for the heading of the page.
     names, facts : list of str
-        Name of each run, and the facts in which it differs from others.
+        Name of each run, and the facts in which the runs differ.
     name_widths, facts_widths : list of float, px
         Widths of the names and of the facts.
     gap : float, px
@@ -161,12 +161,12 @@ class _Captions:
 
     @property
     def max_width(self) -> float:
-        """Width of the longest line if names and facts are below each other, px."""
+        """Width of the longest line if facts are written below names, px."""
         return max(*self.name_widths, *self.facts_widths)
 
     @property
     def max_joined_width(self) -> float:
-        """Width of the longest line if a name and its facts are in one, px."""
+        """Width of the longest line if facts are written in the same line as names, px."""
         widths = zip(self.name_widths, self.facts_widths, strict=True)
         return max(name_width + facts_width + self.gap for name_width, facts_width in widths)
 
@@ -259,7 +259,8 @@ class _ComparisonLayout:
     gap: float
 
     def compute_page_height(self, count: int, aspect: float, footer_height: float) -> int:
-        """Return the height of a page for a number of panels of an aspect."""
+        """Return the height of a page for a number of panels with an aspect, px."""
+        # Rounded up.
         rows = -(-count // self.columns)
         panels_height = rows * (self.caption_height + self.column_width / aspect + self.gap)
         height = self.top + panels_height + footer_height
@@ -267,7 +268,7 @@ class _ComparisonLayout:
 
 
 def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) -> _ComparisonLayout:
-    """Arrange panels of an aspect in columns, with their captions in one line if they fit."""
+    """Choose the layout of panels with an aspect; captions are in one line if they all fit."""
     scale = page.scale
     top = 8 * scale
     if captions.shared:
@@ -293,13 +294,13 @@ def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) ->
 
 
 def _widen_box(panel: PagePanel) -> PageBox:
-    """Return the box of a panel, at least as wide as its caption."""
+    """Return the box of a panel, widened to its caption if that is wider."""
     left, top, width, height = panel.box
     return left, top, max(width, panel.caption_width), height
 
 
 def _write_heading(page: FigurePage, text: str, first_box: PageBox, up: float) -> None:
-    """Write the heading of several panels some pixels above the first one, if there is one."""
+    """Write the heading `up` pixels above the first panel, unless it is empty."""
     if text:
         left, top, _, _ = first_box
         page.write(text, left, top - up, points=HEADING, bold=True, max_width=page.content_width)
@@ -311,7 +312,7 @@ def _build_captions(
     mean_distances: Sequence[float | None] | None,
     mean_times: Sequence[float | None] | None,
 ) -> _Captions:
-    """Build the lines above the panels. Facts that all runs have in common are not repeated."""
+    """Build the captions; facts that all runs have in common are only in the heading of the page."""
     unknown = [None] * len(records)
     costs = [
         _format_cost(record, distance, time)
@@ -337,7 +338,7 @@ def _build_captions(
 
 
 def _choose_columns(page: FigurePage, captions: _Captions, aspect: float, top: float) -> int:
-    """Return the number of columns that makes panels as large as possible, with space for their captions."""
+    """Return the number of columns for which panels are as large as possible and captions still fit."""
     space = (page.size[0], page.size[1] - 2 * top)
     best = choose_column_count(len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION * page.scale)
     max_columns = int((page.size[0] - page.margin) / (captions.max_width + page.margin))
@@ -347,7 +348,7 @@ def _choose_columns(page: FigurePage, captions: _Captions, aspect: float, top: f
 def _write_one_line(
     page: FigurePage, captions: _Captions, number: int, panel: PagePanel, width: float
 ) -> None:
-    """Write the name of a run at the left above its panel, and its facts at the right."""
+    """Write the name of a run above its panel on the left, and its facts on the right."""
     left, top, panel_width, _ = panel.box
     row = top - 16 * page.scale
     right = left + max(panel_width, min(panel.caption_width, width))
@@ -374,7 +375,7 @@ def plot_cost(
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
 ) -> Figure:
-    """Plot mean distances against time, each curve named with its final value at its end.
+    """Plot mean distances against time, each curve labeled at its end with its name and final value.
 
     Parameters
     ----------
@@ -407,7 +408,7 @@ def plot_cost(
 
 
 def _check_curve(curve: TimeCurve) -> None:
-    """Check that a curve has a value for each time and a finite one."""
+    """Raise a ParameterError unless a curve has a value for each time, at least one of them finite."""
     if len(curve.times) != len(curve.values) or not np.isfinite(curve.values).any():
         finite = int(np.isfinite(curve.values).sum())
         raise ParameterError(
@@ -417,7 +418,7 @@ def _check_curve(curve: TimeCurve) -> None:
 
 
 def _create_cost_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
-    """Create a page for curves alone, whose texts can be large."""
+    """Create a page with only curves, whose texts can be larger than on pages with maps."""
     width, height = size
     page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
     left = _COST_MARGINS.left * page.scale
@@ -454,7 +455,8 @@ def _create_map_page(
 
 
 def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]) -> tuple[int, int]:
-    """Return the width and height of a page that suits a map of an aspect, px."""
+    """Return the width and height of a page that suits a map with an aspect, px."""
+    # A page of the maximum width serves to measure the footer.
     page = FigurePage((1400, 1000), theme, _MAP_SCALE)
     surroundings = _MAP_HEAD * page.scale + page.measure_footer(handles)
     width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
@@ -465,7 +467,7 @@ def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]
 def _write_above_map(
     page: FigurePage, text: str, box: PageBox, *, up: float, points: float, is_title: bool
 ) -> None:
-    """Write a line above a map, centered if it is wider than the map."""
+    """Write a line `up` pixels, at scale 1, above a map; center it if it is wider than the map."""
     left, top, width, _ = box
     text_width = min(page.measure_text(text, points=points, bold=is_title), page.content_width)
     if text_width > width:
@@ -476,12 +478,12 @@ def _write_above_map(
 
 
 def _join_facts(facts: Sequence[str]) -> str:
-    """Join facts in one line, without empty ones."""
+    """Join facts to one line; empty facts are left out."""
     return "  ·  ".join(fact for fact in facts if fact)
 
 
 def _format_cost(record: Record, mean_distance: float | None, mean_time: float | None) -> str:
-    """Return the cost of the final positions as text; empty if it is not known."""
+    """Return the cost of the final positions as text; an empty text if it is unknown."""
     if mean_distance is None:
         return ""
     return format_cost(get_cost_name(record.environment), mean_distance, mean_time)
@@ -519,6 +521,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
     aspect = map_width / map_height
     handles = _list_different_handles(drawn, theme)
+    # A page of the maximum height serves to measure; its final height is chosen below.
     page = FigurePage((_SHEET_WIDTH_PX, _MAX_SHEET_HEIGHT_PX), theme, _SHEET_SCALE)
     scale = page.scale
     above = 26 * scale
@@ -554,7 +557,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
 
 
 def _list_different_handles(environments: Sequence[Environment], theme: Theme) -> list[Artist]:
-    """Return the entries of the legends of maps without duplicates."""
+    """Return the legend entries of several maps, each once."""
     handles: dict[str, Artist] = {}
     for environment in environments:
         for handle in arena.build_map_handles(environment, theme):
@@ -569,7 +572,7 @@ class MeasuredRun(NamedTuple):
     ----------
     label : str
     controller : str
-        Name of the controller, for the color.
+        Name of the controller, which decides the color.
     metrics : RunMetrics
     """
 
@@ -584,9 +587,9 @@ class MetricPanel(NamedTuple):
     Attributes
     ----------
     label, unit : str
-        Label and unit of the axis.
+        Label of the value axis, and unit of the final values.
     get_values : callable
-        Returns the values of a run.
+        Returns the plotted values of a run.
     """
 
     label: str
@@ -644,7 +647,7 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
 
 
 def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[TimeCurve], unit: str) -> Axes:
-    """Create the axes of one of four panels, with space for the labels of its curves."""
+    """Create the axes of a panel in a grid of 2 x 2, with space for the labels of its curves."""
     scale = page.scale
     width = 600.0
     height = 400.0 - 20 * scale

@@ -1,7 +1,7 @@
 """Estimates with intervals over runs, which are clustered by map.
 
-Runs on one map are alike: if they were resampled one by one, intervals would be too narrow. Therefore whole
-clusters are resampled (Field and Welsh, 2007). The limits of intervals are percentiles.
+Runs on the same map are correlated: if they were resampled one by one, intervals would be too narrow.
+Therefore whole clusters are resampled (Field and Welsh, 2007). The limits of intervals are percentiles.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 from robocov.arrays import Array, IntArray
 
 CONFIDENCE_LEVEL = 0.95
-"""Of all intervals."""
+"""Confidence level of all intervals."""
 RESAMPLES = 4000
-"""Number of bootstrap samples. The limits of an interval then vary by about a fortieth of its width."""
+"""Number of bootstrap samples, for which interval limits vary by about a fortieth of the interval width."""
 MIN_BOOTSTRAP_MAPS = 5
-"""Number of maps from which a bootstrap has enough different resamples, 126, for a 95 % interval."""
+"""Minimum number of maps: five have 126 different resamples, which are enough for a 95 % interval."""
 _MAX_BATCH_VALUES = 1_000_000
-"""Maximum number of values that are resampled at a time."""
+"""Maximum number of values that are resampled at once, which limits memory."""
 
 _Item = TypeVar("_Item")
 _Key = TypeVar("_Key")
@@ -51,7 +51,7 @@ class Interval:
     trials: int = field(default=0, compare=False, repr=False)
 
     def compute_p_value(self, low: float, high: float) -> float:
-        """Compute the p-value of the hypothesis that the true value is outside some bounds.
+        """Compute the p-value of the hypothesis that the true value is outside given bounds.
 
         Parameters
         ----------
@@ -61,14 +61,15 @@ class Interval:
         Returns
         -------
         float
-            From a binomial test of a fraction, otherwise the fraction of resamples that are outside. 1 if
-            there is no interval.
+            For a fraction, from binomial tests; otherwise the fraction of resamples that are outside the
+            bounds. 1 if there is no interval.
         """
         if self.trials:
             return self._compute_binomial_p_value(low, high)
         if self.resampled_values is None:
             return 1.0
         is_outside = ~((low <= self.resampled_values) & (self.resampled_values <= high))
+        # The estimate counts as one more resample, so that a p-value is never 0.
         return float(1 + np.count_nonzero(is_outside)) / (1 + self.resampled_values.size)
 
     def _compute_binomial_p_value(self, low: float, high: float) -> float:
@@ -77,6 +78,7 @@ class Interval:
 
         successes = self.estimate * self.trials
         failures = self.trials - successes
+        # The regularized incomplete beta function is the tail of the binomial distribution.
         if successes and low > 0.0:
             p_below = float(betainc(successes, failures + 1.0, low))
         else:
@@ -109,7 +111,7 @@ def bootstrap(
     Returns
     -------
     Interval
-        Without limits if there are fewer than two clusters. The same values give the same interval.
+        Without limits if there are fewer than two clusters. Deterministic: random numbers have a fixed seed.
     """
     sample = np.asarray(values, dtype=float)
     if clusters is None:
@@ -127,7 +129,7 @@ def bootstrap_statistic(
     Parameters
     ----------
     statistic : callable
-        Returns the value for row numbers, some of which may be repeated; nan if there is none.
+        Takes row numbers, which may be repeated, and returns a value; nan if there is none.
     clusters : sequence of object
         Cluster of each row.
     resamples : int
@@ -141,7 +143,7 @@ def bootstrap_statistic(
 
 
 def _bootstrap(statistic: _BatchStatistic, clusters: Sequence[object], resamples: int) -> Interval:
-    """Return the value of a statistic with its percentiles over resampled clusters."""
+    """Return a statistic of all rows, with its percentiles over resampled clusters as limits."""
     rows_by_cluster: dict[object, list[int]] = {}
     for row, cluster in enumerate(clusters):
         rows_by_cluster.setdefault(cluster, []).append(row)
@@ -151,7 +153,7 @@ def _bootstrap(statistic: _BatchStatistic, clusters: Sequence[object], resamples
     if len(members) < 2:
         return Interval(estimate, float("nan"), float("nan"))
     values = _resample(statistic, members, resamples)
-    # Some resamples may have no value. The percentiles are those of the others.
+    # Resamples without a value are ignored.
     low, high = _compute_limits(values[~np.isnan(values)])
     return Interval(estimate, low, high, values)
 
@@ -169,6 +171,7 @@ def _resample(statistic: _BatchStatistic, members: Sequence[IntArray], resamples
     count = len(members)
     choices = np.random.default_rng(0).integers(0, count, (resamples, count))
     sizes = {len(rows) for rows in members}
+    # Clusters of equal size fit into a table, so that many samples can be evaluated at once.
     if len(sizes) == 1:
         table = np.array(members)
         batches = np.array_split(choices, 1 + table.size * resamples // _MAX_BATCH_VALUES)
@@ -186,14 +189,14 @@ def _compute_limits(values: Array) -> tuple[float, float]:
     tail = (1.0 - CONFIDENCE_LEVEL) / 2.0
     method: Literal["linear", "inverted_cdf"] = "linear"
     if not np.isfinite(values).all():
-        # One cannot interpolate between a number and infinity.
+        # Interpolating between a number and infinity is impossible.
         method = "inverted_cdf"
     low, high = np.quantile(values, [tail, 1.0 - tail], method=method).tolist()
     return low, high
 
 
 def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval:
-    """Estimate a fraction, such as that of the runs in which an event happens.
+    """Estimate a fraction, such as that of runs in which an event occurs.
 
     Parameters
     ----------
@@ -205,9 +208,9 @@ def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval
     Returns
     -------
     Interval
-        The mean with the exact interval of Clopper and Pearson (1934), for as many trials as there are
-        clusters, since runs of one cluster may be alike. It is one-sided if the fraction is 0 or 1: if none
-        of 33 maps has an event, the fraction is at most 8.7 %.
+        The mean with the exact interval of Clopper and Pearson (1934). Each cluster counts as one trial,
+        since the runs of a cluster are correlated. The interval is one-sided if the fraction is 0 or 1: if
+        the event occurs on none of 33 maps, the fraction is at most 8.7 %.
     """
     from scipy.special import betaincinv
 
@@ -226,7 +229,7 @@ def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval
 
 
 def adjust_p_values(p_values: Mapping[str, float]) -> dict[str, float]:
-    """Adjust p-values for their number by the method of Holm (1979).
+    """Adjust p-values for multiple testing by the method of Holm (1979).
 
     Parameters
     ----------
@@ -235,7 +238,7 @@ def adjust_p_values(p_values: Mapping[str, float]) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Sorted by the p-value.
+        Adjusted p-values, sorted in ascending order.
 
     Examples
     --------
@@ -253,14 +256,14 @@ def estimate_median_time(ended: Sequence[float] | Array, censored: Sequence[floa
     Parameters
     ----------
     ended : sequence of float, s
-        Times of the events.
+        Times of the events, one for each run that has an event.
     censored : sequence of float, s
-        Times until which there was no event.
+        Durations of the runs without an event.
 
     Returns
     -------
     float, s
-        Infinite if most runs have no event.
+        Infinite if the event occurs in fewer than half of the runs.
     """
     from scipy.stats import CensoredData, ecdf
 
@@ -281,7 +284,7 @@ def estimate_mean(values: ArrayLike) -> Interval:
     Returns
     -------
     Interval
-        Without limits if all values are equal: they may then be the same value several times.
+        Without limits if all values are equal, as they may be copies of one value.
     """
     sample = np.asarray(values, dtype=float)
     mean = float(sample.mean())
@@ -301,9 +304,7 @@ def compute_coefficient_of_variation(values: ArrayLike) -> float:
 
 
 def group_by(items: Iterable[_Item], key: Callable[[_Item], _Key]) -> dict[_Key, list[_Item]]:
-    """Group items by a key.
-
-    Unlike `itertools.groupby`, items with the same key need not be adjacent.
+    """Group items by a key. Unlike in `itertools.groupby`, items of a group need not be adjacent.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The look of pictures: colors, axes, labels and legends, defined once for all back ends.
 
-`pygame` (windows and videos, in `render`), matplotlib (files, in `figures`) and JavaScript (the replay in
-`report`) draw pictures. All of them use these definitions, so that the same run looks the same everywhere.
-Nothing in this package draws.
+Pictures are drawn with pygame (windows and videos, in `render`), matplotlib (files, in `figures`) and
+JavaScript (the replay in `report`). All of them use these definitions, so that a run looks the same
+everywhere. Nothing in this package draws.
 
 - `colors`, `theme`: colors, their contrast, and the light and the dark theme.
 - `hues`: hues of robots and of their cells; colors of trajectories.

@@ -1,8 +1,8 @@
 """Limits and ticks of the axes of curves.
 
-One rule holds in windows, figures and replays. An value axis starts at zero if the curves then still use
-60 % of its height: proportions can be read off, and little space is lost. Otherwise it starts just below the
-lowest value, since controllers often differ by only a few percent.
+The same rule applies in windows, figures and replays. A value axis starts at zero if the curves then still
+use 60 % of its height: proportions can be read off, and little space is lost. Otherwise it starts just below
+the lowest value, since controllers often differ by only a few percent.
 """
 
 import math
@@ -14,25 +14,25 @@ from robocov.arrays import Array
 from robocov_app.look.lengths import round_down
 
 MAX_LOW_FRACTION = 0.4
-"""An axis starts at zero if its lowest value is below this fraction of its highest."""
+"""An axis starts at zero if the lowest value is below this fraction of the highest."""
 VALUE_MARGIN = 0.08
 """Free space above and below the values, as a fraction of their range."""
 GROWTH_FRACTION = 0.5
-"""Space for lower values below a curve that still grows, as a fraction of its range."""
+"""Space for lower values on the axis of a curve that is still growing, as a fraction of its range."""
 TICK_FACTORS = (1, 2, 5, 10)
 """Steps between ticks are one of these times a power of ten."""
 MAX_VALUE_INTERVALS = 6
-"""Maximum number of intervals between the ticks of an value axis."""
+"""Maximum number of intervals between the ticks of a value axis."""
 MAX_TIME_INTERVALS = 8
-"""Maximum number of intervals between the ticks of an time axis."""
+"""Maximum number of intervals between the ticks of a time axis."""
 MIN_TIME_LIMIT_S = 10.0
 """A growing time axis shows at least this many seconds."""
 _FREE_TIME_FRACTION = 0.03
-"""Free space behind the present on a growing time axis, as a fraction of the time so far."""
+"""Free space after the present on a growing time axis, as a fraction of the time so far."""
 _MIN_TIME_STEP_S = 5.0
 """A growing time axis ends at a multiple of at least this step."""
 _MIN_VALUE = 1e-3
-"""If all values are equal and nearer to zero than this, the axis is that of this value."""
+"""If all values are equal, the axis is chosen as if their absolute value were at least this."""
 
 
 class Axis(NamedTuple):
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
 def choose_value_limits(
     low: float, high: float, *, margin: float = VALUE_MARGIN, origin: float = 0.0
 ) -> tuple[float, float]:
-    """Choose the limits of an value axis.
+    """Choose the limits of a value axis.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def choose_value_limits(
     margin : float
         Free space on both sides as a fraction of the range.
     origin : float
-        Value from which proportions are read: 0 of distances, 1 of ratios.
+        Value that proportions refer to: 0 for distances, 1 for ratios.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def choose_value_limits(
 
 
 def choose_tick_step(span: float, max_intervals: float) -> float:
-    """Choose a round step that divides a span into few enough intervals.
+    """Choose the smallest round step that divides a span into at most a number of intervals.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def choose_tick_step(span: float, max_intervals: float) -> float:
     Returns
     -------
     float
-        The smallest of 1, 2 and 5 times a power of ten that is large enough.
+        1, 2 or 5 times a power of ten.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def choose_tick_step(span: float, max_intervals: float) -> float:
     """
     min_step = span / max(max_intervals, 1.0)
     power = 10.0 ** math.floor(math.log10(min_step))
-    # A step may be too small by a rounding error.
+    # Accept steps that are too small only by a rounding error.
     step = next(factor * power for factor in TICK_FACTORS if factor * power >= 0.999 * min_step)
     return float(f"{step:.12g}")
 
@@ -117,15 +117,15 @@ def list_ticks(start: float, end: float, step: float) -> Array:
 
 
 def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> Axis:
-    """Choose the axis of curves that grow while they are watched.
+    """Choose the value axis of curves that grow while the user watches them.
 
-    Costs fall at first. The axis has space for lower values, and starts at a multiple of the step, so that it
-    seldom changes.
+    Costs fall at first, so the axis has space for lower values. It starts at a multiple of the step, so that
+    it rarely changes.
 
     Parameters
     ----------
     low, high : float
-        Lowest and highest value so far; nan if there is none.
+        Lowest and highest value so far; nan without values.
     max_intervals : float
         Maximum number of intervals between ticks.
 
@@ -150,9 +150,9 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
 
 
 def choose_growing_time_limit(end_s: float) -> float:
-    """Choose the end of the time axis while time passes.
+    """Choose the end of the time axis of a running simulation, which has reached the time `end_s`.
 
-    It is a round time a little after the present, so that the axis seldom changes.
+    It is a round time a little after the present, so that the axis rarely changes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Colors as red, green and blue: mixing them, and their contrast."""
+"""RGB colors: conversion to and from hexadecimal codes, mixing and contrast."""
 
 from functools import lru_cache
 from typing import TypeAlias
@@ -11,7 +11,7 @@ _LIGHT_TEXT: Color = (255, 255, 255)
 
 
 def parse_hex_color(code: str) -> Color:
-    """Return the color of a hexadecimal code.
+    """Parse a hexadecimal color code of six digits.
 
     Examples
     --------
@@ -22,7 +22,7 @@ def parse_hex_color(code: str) -> Color:
 
 
 def format_hex_color(color: Color) -> str:
-    """Return a color as CSS and SVG write it.
+    """Return the hexadecimal code of a color, as in CSS and SVG.
 
     Examples
     --------
@@ -75,6 +75,6 @@ def compute_contrast(first: Color, second: Color) -> float:
 
 
 def choose_text_color(background: Color) -> Color:
-    """Return near-black or white, the one that is more legible on a background."""
+    """Return near-black or white, whichever is more legible on a background."""
     is_light_better = compute_contrast(background, _LIGHT_TEXT) >= compute_contrast(background, _DARK_TEXT)
     return _LIGHT_TEXT if is_light_better else _DARK_TEXT

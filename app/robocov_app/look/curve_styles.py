@@ -22,7 +22,7 @@ OTHER_SHAPES: tuple[Shape, ...] = (
     ((0, (2.5, 2.5)), "*"),
     ((0, (9, 1.4, 3, 1.4)), "X"),
 )
-"""Shapes of other controllers, and of the second, third, ... gains of one controller."""
+"""Shapes of other controllers, and of further curves of the same controller with other gains."""
 _SHAPES = (*_CONTROLLER_SHAPES.values(), *OTHER_SHAPES)
 
 MARKER_PATHS = {
@@ -35,7 +35,7 @@ MARKER_PATHS = {
     "*": "M0-6.6 1.8-2.1 6.6-1.8 2.9 1.3 4.1 6 0 3.4-4.1 6-2.9 1.3-6.6-1.8-1.8-2.1z",
     "X": "M-5.6-3-3-5.6 0-2.6 3-5.6 5.6-3 2.6 0 5.6 3 3 5.6 0 2.6-3 5.6-5.6 3-2.6 0z",
 }
-"""Markers as SVG paths around the origin, 10 to 13 across."""
+"""Markers as SVG paths around the origin, 10 to 13 units wide."""
 
 
 class CurveStyle(NamedTuple):
@@ -44,7 +44,7 @@ class CurveStyle(NamedTuple):
     Attributes
     ----------
     name : str
-        Name of the color: a controller with a color of its own, or ``other-k`` for `Theme.others[k]`.
+        Name of the color: that of a controller with its own color, or ``other-k`` for `Theme.others[k]`.
     dashes : object
         As in matplotlib's `linestyle`.
     mark : str
@@ -63,7 +63,7 @@ class CurveStyle(NamedTuple):
         return theme.get_controller_color(self.name)
 
     def list_dash_lengths(self) -> list[float]:
-        """Return the lengths of dashes and gaps in turn; empty for a solid curve."""
+        """Return the alternating lengths of dashes and gaps; an empty list for a solid curve."""
         if self.dashes == "-":
             return []
         _, lengths = self.dashes
@@ -71,7 +71,7 @@ class CurveStyle(NamedTuple):
 
 
 def choose_controller_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
-    """Choose a style for each controller.
+    """Choose a different style for each controller.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def choose_curve_styles(controllers: Sequence[str]) -> list[CurveStyle]:
     Parameters
     ----------
     controllers : sequence of str
-        Name of the controller of each curve. A name may occur several times, for several choices of gains.
+        Name of the controller of each curve. A name may occur several times, with different gains.
 
     Returns
     -------
     list of CurveStyle
-        The first curve of a controller has the style of that controller.
+        The first curve of each controller has the controller's own style, further ones have variants.
     """
     first_styles = _choose_first_styles(controllers)
     used = set(first_styles.values())
@@ -127,9 +127,9 @@ def _choose_first_styles(controllers: Sequence[str]) -> dict[str, CurveStyle]:
 
 
 def _iterate_other_styles() -> Iterator[CurveStyle]:
-    """Yield 25 different styles, over and over.
+    """Yield 25 different styles in an endless cycle.
 
-    After all colors have been used, each color is combined with the next shape, and so on.
+    After all colors have been used once, each is combined with the next shape, and so on.
     """
     count = len(OTHER_SHAPES)
     styles = []
@@ -140,7 +140,10 @@ def _iterate_other_styles() -> Iterator[CurveStyle]:
 
 
 def _choose_variant(first: CurveStyle, used: set[CurveStyle]) -> CurveStyle:
-    """Choose a style for other gains of a controller; the first style again if all are used."""
+    """Choose an unused style for a further curve of a controller; its first style if all are used.
+
+    Styles in other colors come first, then other shapes in the controller's color.
+    """
     other_colors = [CurveStyle(f"other-{k}", *shape) for k, shape in enumerate(OTHER_SHAPES)]
     other_shapes = [CurveStyle(first.name, *shape) for shape in _SHAPES]
     free = [style for style in (*other_colors, *other_shapes) if style not in used]

@@ -1,7 +1,7 @@
 """Hues of robots and of their cells, and the colors of trajectories.
 
-A small team has one hue for each robot. No eye tells more than nine hues apart, so the cells of a larger team
-are colored like a map: only cells that share an edge must differ.
+In a small team each robot has its own hue. Nobody can tell more than nine hues apart, so the cells of a
+larger team are colored like the countries of a map: only cells that share an edge must differ.
 """
 
 from heapq import heapify, heappop, heappush
@@ -16,15 +16,16 @@ from robocov_app.look.theme import Theme
 MAX_OWN_HUES = 9
 """Maximum number of robots that each have a hue of their own."""
 N_SHARED_HUES = 6
-"""Number of hues of a larger team."""
+"""Number of hues in a larger team."""
 MIN_TRAIL_CONTRAST = 2.4
-"""Minimum contrast of the trajectory of a robot with its cell."""
+"""Minimum contrast ratio between the trajectory of a robot and its cell."""
 
 ColorScheme: TypeAlias = Literal["paper", "robots"]
 """Colors of robots and trajectories.
 
-"paper" has those of the article: red trajectories, blue final positions and pale cells, legible in print and
-in small pictures. "robots" gives each robot its own hue, so that one can follow a single robot.
+"paper" uses the colors of the article: red trajectories, blue final positions and pale cells, which are
+legible in print and in small pictures. "robots" gives each robot its own hue, so that single robots can be
+followed.
 """
 
 
@@ -38,16 +39,15 @@ def choose_robot_hues(
     n : int
         Number of robots.
     adjacency : (m, 2) int array, optional
-        Pairs of robots whose cells share an edge. Their hues differ, unless all hues are taken by other
-        neighbors.
+        Pairs of robots whose cells share an edge. Their hues differ if possible.
     previous : (n,) int array, optional
-        Hues of the previous frame. They are changed as little as possible, so that cells do not flicker.
+        Hues in the previous frame, which change as little as possible, so that cells do not flicker.
 
     Returns
     -------
     (n,) int array
-        Indices into `Theme.robots`: a different one for each of up to `MAX_OWN_HUES` robots; below
-        `N_SHARED_HUES` in larger teams.
+        Indices into `Theme.robots`. Up to `MAX_OWN_HUES` robots have different ones; in larger teams, they
+        are below `N_SHARED_HUES`.
     """
     if n <= MAX_OWN_HUES:
         return np.arange(n, dtype=np.intp)
@@ -63,7 +63,10 @@ def choose_robot_hues(
 
 
 def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
-    """Change the hues of conflicting cells, and of few others; return None if that does not converge."""
+    """Change the hues of cells that have the same hue as a neighbor, and of few others.
+
+    `hues`, (n,), is changed in place and returned; None means that the repair did not converge.
+    """
     visits = np.zeros(len(hues), dtype=int)
     flat = adjacency.ravel()
     hue_pairs = hues[adjacency]
@@ -71,7 +74,7 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
     waiting = np.unique(adjacency[is_conflict]).tolist()
     while waiting:
         cell = waiting.pop()
-        # The two ends of an edge differ in the last bit of their index in the flat array.
+        # Flat indices 2 k and 2 k + 1 are the ends of edge k, so flipping the last bit gives the other end.
         neighbors = flat[np.flatnonzero(flat == cell) ^ 1]
         neighbor_hues = hues[neighbors].tolist()
         if hues[cell] not in neighbor_hues:
@@ -80,7 +83,7 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
         if visits[cell] > N_SHARED_HUES:
             return None
         offset = cell + int(visits[cell])
-        # Ties are broken differently at each visit. Otherwise two cells could swap hues forever.
+        # Break ties differently at each visit, otherwise two cells could swap hues forever.
         hues[cell] = min(
             range(N_SHARED_HUES),
             key=lambda hue: (neighbor_hues.count(hue), (hue + offset) % N_SHARED_HUES),
@@ -90,10 +93,10 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
 
 
 def _color_graph(n: int, adjacency: IntArray) -> IntArray:
-    """Color a graph by DSATUR, using all hues about equally often.
+    """Color the graph of adjacent cells by DSATUR, with all hues used about equally often.
 
-    DSATUR (Brelaz, 1979) next colors the vertex whose neighbors have the most different colors. If they have
-    all colors, the vertex gets the one that is rarest among them.
+    DSATUR (Brelaz, 1979) always colors the vertex next whose neighbors have the most different colors. If
+    they have all colors, the vertex gets the color that is rarest among them.
     """
     neighbors: list[list[int]] = [[] for _ in range(n)]
     for first, second in adjacency.tolist():
@@ -102,7 +105,7 @@ def _color_graph(n: int, adjacency: IntArray) -> IntArray:
     hues = [-1] * n
     uses = [0] * N_SHARED_HUES
     neighbor_hues: list[set[int]] = [set() for _ in range(n)]
-    # Entries of the heap become outdated when a neighbor is colored. They are skipped, not removed.
+    # Heap of (-saturation, -degree, vertex). Coloring a neighbor outdates an entry, which is skipped later.
     waiting = [(0, -len(neighbors[vertex]), vertex) for vertex in range(n)]
     heapify(waiting)
     while waiting:
@@ -123,8 +126,8 @@ def _color_graph(n: int, adjacency: IntArray) -> IntArray:
 def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> list[Color]:
     """Choose the color of the trajectory of each robot.
 
-    In a team that is too large for a hue of each robot, trajectories would have the colors of the cells that
-    they cross. Then all are red, as in the scheme of the paper, but paler, since there are many.
+    In a team that is too large for one hue per robot, trajectories could have the colors of the cells that
+    they cross. There all are red, as in the scheme of the paper, but paler, since there are many.
 
     Parameters
     ----------
@@ -145,7 +148,7 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
 
 
 def choose_trail_color(theme: Theme, hue: int) -> Color:
-    """Choose the color of a trajectory: its robot's hue, darkened until it contrasts with the cell."""
+    """Choose the color of a trajectory: the robot's hue, mixed with ink until it contrasts with the cell."""
     cell_color = theme.get_cell_color(hue)
     fraction = 0.12
     color = mix(theme.robots[hue], theme.ink, fraction)
@@ -156,12 +159,12 @@ def choose_trail_color(theme: Theme, hue: int) -> Color:
 
 
 def choose_curve_colors(controllers: list[str], theme: Theme) -> list[Color]:
-    """Choose a color for each curve: its controller's, or another one if that is taken.
+    """Choose a color for each curve: the color of its controller, or another one if that is taken.
 
     Parameters
     ----------
     controllers : list of str
-        Names of the controllers; several curves may have the same.
+        Name of the controller of each curve; may contain duplicates.
     theme : Theme
 
     Returns

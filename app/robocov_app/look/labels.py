@@ -4,24 +4,23 @@ from collections.abc import Callable, Sequence
 
 ELLIPSIS = "…"
 _WORD_TAIL_CHARS = 12
-"""Characters at the end of a long word that stay when it is shortened in its middle."""
+"""Number of characters at the end of a long word that are kept when it is shortened in the middle."""
 
 
 def spread_labels(positions: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Spread labels along a line so that they do not overlap.
+    """Move labels along a line so that they do not overlap.
 
-    The result minimizes the sum of squared shifts. Labels keep their order; labels at the same position are
-    in the order of the input.
+    The sum of squared shifts is minimal. Labels keep their order; labels with the same position stay in the
+    order of the input.
 
     Parameters
     ----------
     positions : (n,) sequence of float
-        Where the labels should be.
+        Desired positions.
     gap : float
         Minimum distance between neighbors.
     low, high : float
-        Limits of the positions. If there is too little space for all gaps, the last labels keep to `high`,
-        and the first ones are below `low`.
+        Limits of the positions. If there is not enough space for all gaps, the first labels are below `low`.
 
     Returns
     -------
@@ -33,7 +32,7 @@ def spread_labels(positions: Sequence[float], gap: float, low: float, high: floa
     [8.0, 13.0, 40.0]
     """
     order = sorted(range(len(positions)), key=lambda label: positions[label])
-    # Without the gaps, the sorted positions only have to ascend: an isotonic regression.
+    # With the gaps subtracted, the sorted positions only have to ascend, which is an isotonic regression.
     targets = [positions[label] - gap * rank for rank, label in enumerate(order)]
     last_rank = len(positions) - 1
     spread = [0.0] * len(positions)
@@ -44,7 +43,10 @@ def spread_labels(positions: Sequence[float], gap: float, low: float, high: floa
 
 
 def _fit_ascending(values: Sequence[float]) -> list[float]:
-    """Return the ascending sequence that is nearest to values (pool adjacent violators)."""
+    """Return the ascending sequence with the least squared distance from values.
+
+    Pool adjacent violators: each block of values that would descend is replaced by its mean.
+    """
     means: list[float] = []
     sizes: list[int] = []
     for value in values:
@@ -73,12 +75,12 @@ def shorten_text(text: str, measure: Callable[[str], float], width: float, *, mi
     width : float
         Maximum width, in the unit of `measure`.
     min_chars : int
-        Number of characters that stay even if they are too wide.
+        Number of characters that are kept even if they are too wide.
 
     Returns
     -------
     str
-        The text itself if it fits, an empty one if nothing does.
+        The whole text if it fits; an empty text if not even one character fits.
 
     Examples
     --------
@@ -87,6 +89,7 @@ def shorten_text(text: str, measure: Callable[[str], float], width: float, *, mi
     """
     if measure(text) <= width:
         return text
+    # Bisection: `fitting` characters fit, `too_long` do not.
     fitting = min(min_chars, len(text))
     too_long = len(text) + 1
     while too_long - fitting > 1:
@@ -101,7 +104,7 @@ def shorten_text(text: str, measure: Callable[[str], float], width: float, *, mi
 
 
 def shorten_word(word: str, max_chars: int) -> str:
-    """Shorten a word in its middle, since the ends of long names, such as those of files, tell them apart.
+    """Shorten a word in the middle, because long names such as file names often differ only at the end.
 
     Examples
     --------

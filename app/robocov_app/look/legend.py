@@ -29,13 +29,13 @@ def merge_legends(legends: Iterable[Sequence[_Entry]], key: Callable[[_Entry], H
     legends : iterable of sequences
         Entries of each picture.
     key : callable
-        Returns by what entries are the same, such as their text.
+        Returns a value that is the same for equal entries, such as their text.
 
     Returns
     -------
     list
-        Each entry once, in the order of the first legend. An entry that the first legend lacks follows the
-        one that precedes it in its own legend.
+        Each entry once, in the order of the first legend. An entry that earlier legends lack is inserted
+        after the entry that precedes it in its own legend.
 
     Examples
     --------

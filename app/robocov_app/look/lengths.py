@@ -1,4 +1,4 @@
-"""Round lengths, as of scale bars and grids, and their labels."""
+"""Round lengths for scale bars and grids, and their labels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _MIN_METERS = 0.1
 
 
 def round_down(number: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not above a positive number.
+    """Round a positive number down to 1, 2 or 5 times a power of ten.
 
     Examples
     --------
@@ -23,7 +23,7 @@ def round_down(number: float) -> float:
 
 
 def format_scale_length(meters: float) -> str:
-    """Return a length with its unit, as on a scale bar.
+    """Format a length for a scale bar, in centimeters, meters or kilometers.
 
     Examples
     --------

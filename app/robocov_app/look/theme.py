@@ -1,4 +1,4 @@
-"""The light and the dark theme: colors, line widths and text sizes of everything that is drawn."""
+"""The light and the dark theme: colors, line widths and text sizes of all pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from robocov.errors import ParameterError, describe_unknown_name
 from robocov_app.look.colors import Color, compute_luminance, mix, parse_hex_color
 
 HEAT_LEVELS = 12
-"""Number of colors of a grid of numbers."""
+"""Number of colors in a grid of numbers."""
 _QUIET_FRACTION = 0.55
-"""Fraction of the heat scale that grids of numbers use. On all of it, their text could not be read."""
+"""Fraction of the heat scale that grids of numbers use; on the rest, their text would be illegible."""
 _MIN_HUE_LUMINANCE = 0.16
-"""Luminance below which a hue would sink into the background of the dark theme."""
+"""Luminance below which a hue can hardly be told from the background of the dark theme."""
 
 
 @dataclass(frozen=True)
@@ -27,27 +27,27 @@ class Theme:
     name : str
         "light" or "dark".
     background, panel : Color
-        Behind maps and curves, and behind the controls of windows.
+        Colors behind maps and curves, and behind the controls of windows.
     ink, faint : Color
-        Colors of texts, and of secondary texts.
+        Colors of primary and of secondary texts.
     grid, boundary, obstacle, obstacle_edge, cell_edge, robot_ring, velocity, unreached : Color
         Colors of these elements. `unreached` is free space that no robot can reach.
     start, final, trajectory : Color
         The article's green, blue and red.
     controllers : dict of str to Color
-        Curves of the article's controllers.
+        Colors of the curves of the article's controllers.
     others : tuple of Color
-        Curves of other controllers.
+        Colors of the curves of other controllers.
     forces : dict of str to Color
-        Arrows of the terms of a controller.
+        Colors of the arrows of force terms, by the name of the term.
     robots : tuple of Color
         Hues of robots, see `hues`.
     heat : tuple of Color
-        Scale of distances, from near to far.
+        Color scale of distances, from near to far.
     density, density_strength : Color, float
         Color of the density, and its opacity where it is highest.
     tint, paper_tint : float
-        Fraction of the robot's hue in the color of a cell, and that in the scheme of the paper.
+        Fraction of the robot's hue in the color of its cell, by default and in the scheme of the paper.
     text, small_text, line, trajectory_line, boundary_line, arrow_line : float
         Sizes of texts and widths of lines.
     """
@@ -86,22 +86,23 @@ class Theme:
 
     @property
     def moving_obstacle(self) -> Color:
-        """Color of an obstacle that moves."""
+        """Color of moving obstacles."""
         return mix(self.obstacle, self.background, 0.5)
 
     @property
     def failed_robot(self) -> Color:
-        """Color of a robot that has failed."""
+        """Color of failed robots."""
         return mix(self.background, self.ink, 0.3)
 
     @property
     def geodesic_border(self) -> Color:
-        """Color of the borders of geodesic cells on a map of distances."""
+        """Color of the borders of geodesic cells on a distance map."""
         return mix(self.ink, self.background, 0.1)
 
     @property
     def quiet_heat(self) -> list[Color]:
         """Colors of a grid of numbers from low to high; text in `ink` is legible on all of them."""
+        # Evenly spaced rows of the first part of a table with 200 colors.
         rows = [round(_QUIET_FRACTION * 199 * level / (HEAT_LEVELS - 1)) for level in range(HEAT_LEVELS)]
         return [(int(red), int(green), int(blue)) for red, green, blue in self.build_heat_table(200)[rows]]
 
@@ -114,11 +115,11 @@ class Theme:
         return mix(self.background, self.robots[hue], self.paper_tint)
 
     def get_controller_color(self, name: str) -> Color:
-        """Return the color of the curves of a controller; those of other authors share one."""
+        """Return the color of the curves of a controller; all that are not from the article share one."""
         return self.controllers.get(name, self.others[0])
 
     def build_heat_table(self, count: int) -> NDArray[np.uint8]:
-        """Build the scale of distances with a number of colors.
+        """Interpolate the color scale of distances to a number of colors.
 
         Parameters
         ----------
@@ -135,7 +136,7 @@ class Theme:
         return np.asarray(np.rint(np.column_stack(channels)), dtype=np.uint8)
 
 
-# Each color has a code in the light theme and one in the dark theme.
+# Codes of each color in the light theme and in the dark theme.
 _COLORS = {
     "background": ("FFFFFF", "13181F"),
     "panel": ("F4F6FA", "1B212B"),
@@ -191,7 +192,7 @@ _DARK_CODES = 1
 
 
 def _build_theme(name: str, codes: int, robots: Sequence[Color], **numbers: Any) -> Theme:
-    """Build a theme from one of the two columns of codes."""
+    """Build a theme from the first or the second of each pair of codes."""
     return Theme(
         name=name,
         controllers=_select_named(_CONTROLLERS, codes),
@@ -205,12 +206,12 @@ def _build_theme(name: str, codes: int, robots: Sequence[Color], **numbers: Any)
 
 
 def _select_named(colors: dict[str, tuple[str, str]], codes: int) -> dict[str, Any]:
-    """Return the colors of one column by their names."""
+    """Return the first or the second of each pair of colors, by name."""
     return {name: parse_hex_color(pair[codes]) for name, pair in colors.items()}
 
 
 def _lighten(hue: Color) -> Color:
-    """Return a hue that is visible on the background of the dark theme."""
+    """Return a hue, lightened if it would hardly be visible on the background of the dark theme."""
     return mix(hue, (255, 255, 255), 0.38 if compute_luminance(hue) < _MIN_HUE_LUMINANCE else 0.0)
 
 
@@ -223,7 +224,7 @@ THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 
 
 def get_theme(name: str | Theme) -> Theme:
-    """Return the theme of a name, or the theme itself.
+    """Return the theme with a name; a theme is returned as it is.
 
     Raises
     ------

@@ -39,7 +39,7 @@ class Camera:
 
     @classmethod
     def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> Camera:
-        """Build the camera that shows a rectangle of the world as large as possible.
+        """Build the camera that shows a rectangle of the world as large as the view permits.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class Camera:
         Returns
         -------
         (..., 2) array, px
-            Drafts of maps may contain any number; coordinates are limited to `MAX_PIXEL`.
+            Limited to `MAX_PIXEL`, because maps that are being edited may contain huge coordinates.
         """
         scale = np.array([self.zoom, -self.zoom])
         with np.errstate(over="ignore", invalid="ignore"):
@@ -89,7 +89,7 @@ class Camera:
         return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))
 
     def zoom_at(self, factor: float, pixel: tuple[float, float]) -> Camera:
-        """Return the camera that magnifies by a factor; the position at a pixel stays there."""
+        """Return the camera zoomed by a factor, with the same position of the world at `pixel`."""
         zoom = _limit_zoom(self.zoom * factor)
         x, y = pixel
         middle_x, middle_y = self.middle

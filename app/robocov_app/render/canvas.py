@@ -38,7 +38,7 @@ TextAnchor: TypeAlias = Literal["left", "middle", "right"]
 
 
 def premultiply(color: Color, alpha: float) -> tuple[int, int, int, int]:
-    """Return a color with an opacity from 0 to 1 for drawing with ``BLEND_PREMULTIPLIED``."""
+    """Return the RGBA color, premultiplied by an opacity from 0 to 1, for ``BLEND_PREMULTIPLIED``."""
     red, green, blue = (round(channel * alpha) for channel in color)
     return red, green, blue, round(255 * alpha)
 
@@ -53,7 +53,7 @@ class LegendEntry:
     draw : Glyph
         Draws its symbol.
     style : str
-        Distinguishes entries that have the same text, but another symbol.
+        Distinguishes entries that have the same text but different symbols.
     """
 
     text: str
@@ -94,11 +94,11 @@ class Canvas:
     legend: Sequence[LegendEntry] = ()
 
     def scale_width(self, pixels: float) -> int:
-        """Return the width of a stroke, px at scale 1, in pixels of the surface: at least one."""
+        """Convert a stroke width, px at scale 1, to pixels of the surface: at least one."""
         return max(1, round(pixels * self.scale))
 
     def scale_text_size(self, pixels: float) -> int:
-        """Return a text size, px at scale 1, in pixels of the surface."""
+        """Convert a text size, px at scale 1, to pixels of the surface, but not below a readable size."""
         return max(_MIN_TEXT_PX, round(pixels * self.scale))
 
     def fill_polygon(self, corners: Array, fill: Color | tuple[int, int, int, int]) -> None:
@@ -120,8 +120,9 @@ class Canvas:
         fills : sequence of Color or None
             Color of each polygon; those with None are not filled.
         edge : Color, optional
-            Color of the outlines, which are not smooth.
+            Color of the outlines, which are not antialiased.
         """
+        # Coordinates beyond the limit of pygame are clipped, which takes longer.
         is_near = is_within_limit(corners)
         points = np.rint(corners).tolist()
         edge_width = self.scale_width(1.0)
@@ -139,7 +140,7 @@ class Canvas:
             start = end
 
     def draw_outline(self, corners: Array, color: Color, width: int = 1, *, is_closed: bool = True) -> None:
-        """Draw a smooth line through (k, 2) px, by default back to the first."""
+        """Draw an antialiased line through (k, 2) px, by default back to the first point."""
         points = corners.tolist()
         path = [*points, *points[:1]] if is_closed else points
         for start, end in pairwise(path):
@@ -151,21 +152,21 @@ class Canvas:
                 self.draw_sprite(dot, point)
 
     def draw_line(self, start: Pixel, end: Pixel, color: Color, width: int = 1) -> None:
-        """Draw a smooth line between two pixels."""
+        """Draw an antialiased line between two pixels."""
         ends = clip_segment(start, end)
         if ends:
             pygame.draw.aaline(self.surface, color, ends[0], ends[1], width)
 
     def draw_thin_path(self, points: Sequence[Pixel], color: Color, *, is_closed: bool = False) -> None:
-        """Draw a smooth line of one pixel through points within `clipping.MAX_DRAWN_PX`."""
+        """Draw an antialiased line, 1 px wide, through points within `clipping.MAX_DRAWN_PX`."""
         if len(points) == 2:
-            # With two points, aalines of pygame-ce 2.5 reads memory beyond them: frames would vary.
+            # With two points, aalines of pygame-ce 2.5 reads past their end, so that frames would vary.
             pygame.draw.aaline(self.surface, color, points[0], points[1])
         else:
             pygame.draw.aalines(self.surface, color, is_closed, points)
 
     def draw_segments(self, ends: Array, color: Color, width: int = 1) -> None:
-        """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
+        """Draw many antialiased lines, (k, 4) px: x and y of one end, then of the other."""
         is_near = is_within_limit(ends)
         for x1, y1, x2, y2 in ends.tolist():
             if is_near:
@@ -190,6 +191,7 @@ class Canvas:
 
     def draw_circle(self, center: Pixel, radius: float, color: Color, *, is_dashed: bool = False) -> None:
         """Draw a circle with a radius in pixels."""
+        # An even number of sides, so that dashes and gaps alternate all around.
         sides = int(min(max(radius, _MIN_CIRCLE_SIDES), _MAX_CIRCLE_SIDES)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
         corners = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -198,7 +200,7 @@ class Canvas:
             self.draw_line(start, end, color, self.scale_width(1.0))
 
     def get_symbol_line(self, x: float, y: float, half_length: float) -> tuple[Pixel, Pixel]:
-        """Return the ends of a horizontal line that is the symbol of lines in a legend.
+        """Return the ends of the horizontal line that stands for a line in the legend.
 
         Parameters
         ----------
@@ -214,7 +216,7 @@ class Canvas:
         return (x - half, y), (x + half, y)
 
     def draw_swatch(self, x: float, y: float, fill: Color | None, edge: Color) -> None:
-        """Draw a small square around a pixel, as the symbol of areas in a legend."""
+        """Draw the small square, around a pixel, that stands for an area in the legend."""
         size = _SWATCH_PX * self.scale
         box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
         if fill is not None:
@@ -259,7 +261,7 @@ class Canvas:
             return
         shaft_end = tip
         if head == "full":
-            # The shaft must not stick out of the tip.
+            # The shaft ends inside the head, so that its blunt end does not show at the tip.
             shaft_end = tip - 0.7 * head_length * along
         sketch.draw_path([tail.tolist(), shaft_end.tolist()], color, width)
         if head == "full":
@@ -293,11 +295,15 @@ class Canvas:
     def place_sprites(
         self, choices: Sequence[Sprite], centers: Array, indices: IntArray | None = None
     ) -> PlacedSprites:
-        """Return the pictures that `draw_sprites` draws, with their upper left corners, px."""
+        """Return the pictures that `draw_sprites` draws, with their upper left corners, px.
+
+        Centers far outside the surface are skipped. Each sprite is rendered once per shift, however many
+        centers it has.
+        """
         limit = np.add(self.surface.get_size(), _OUTSIDE_PX)
         is_near = ((centers > -_OUTSIDE_PX) & (centers < limit)).all(axis=1)
         rows = np.flatnonzero(is_near)
-        # As for lines, whole numbers are the middles of pixels.
+        # Whole coordinates are the middles of pixels, as in the lines of pygame.
         quarters = np.rint((centers[rows] + 0.5) * sprites.FINENESS).astype(int)
         pixels, shifts = np.divmod(quarters, sprites.FINENESS)
         chosen = np.zeros(len(rows), dtype=int)
@@ -331,9 +337,9 @@ class Canvas:
         ----------
         text : str
         position : (float, float), px
-            Its left end, middle or right end, depending on `anchor`; y is that of its middle.
+            Left end, middle or right end of the text, depending on `anchor`, at half its height.
         size : float, px at scale 1, optional
-            By default that of the theme.
+            By default the text size of the theme.
         color : Color, optional
             By default the ink of the theme.
         bold : bool

@@ -13,7 +13,7 @@ MAX_DRAWN_PX = 20000.0
 
 
 def limit_pixels(points: Array) -> Array:
-    """Limit coordinates to `MAX_DRAWN_PX`, for points outside the surface.
+    """Limit the coordinates of points to `MAX_DRAWN_PX`; only points far outside the surface move.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def clip_polygon(corners: Array) -> list[Array]:
     Returns
     -------
     list of (m, 2) arrays, px
-        Outlines of the pieces: mostly the polygon itself.
+        Outlines of the pieces; the polygon itself if nothing is clipped, none with under three corners.
     """
     if len(corners) < 3:
         return []
@@ -63,7 +63,7 @@ def clip_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
     Returns
     -------
     sequence of (float, float), px
-        Its two ends; none if the whole segment is outside.
+        The two ends of the visible part; empty if the whole segment is outside.
     """
     (x1, y1), (x2, y2) = start, end
     low, high = -MAX_DRAWN_PX, MAX_DRAWN_PX

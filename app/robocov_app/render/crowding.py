@@ -10,7 +10,7 @@ from robocov.arrays import Array
 _MAX_POINTS_WITHOUT_TREE = 120
 """With at most this many points, comparing all pairs is faster than building a tree."""
 _MAX_SAMPLED_POINTS = 250
-"""About the maximum number of points that are sampled for the size of marks."""
+"""Approximate maximum number of points whose distances decide on the size of marks."""
 _MAX_LINES_AT_FULL_WIDTH = 20
 _MIN_WIDTH_FACTOR = 0.5
 
@@ -22,7 +22,7 @@ def compute_nearest_distances(points: Array, step: int = 1) -> Array:
     ----------
     points : (n, 2) array
     step : int
-        If there are many points, only every `step`-th is evaluated.
+        Evaluate only every `step`-th point, if there are more than `_MAX_POINTS_WITHOUT_TREE`.
 
     Returns
     -------
@@ -36,22 +36,23 @@ def compute_nearest_distances(points: Array, step: int = 1) -> Array:
         squares = np.asarray(delta[..., 0] ** 2 + delta[..., 1] ** 2)
         np.fill_diagonal(squares, np.inf)
         return np.asarray(np.sqrt(squares.min(axis=1)))
+    # The nearest point in the tree is the point itself, so the second nearest is asked for.
     distances, _ = KDTree(points).query(points[::step], k=[2])
     return np.asarray(distances).ravel()
 
 
 def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Array:
-    """Choose radii of discs so that they overlap as little as possible.
+    """Choose the radii of discs so that they are well visible and do not overlap.
 
-    A disc has the largest radius that reaches at most halfway to its nearest neighbor.
+    Each disc reaches halfway to its nearest neighbor, within the limits.
 
     Parameters
     ----------
     centers : (n, 2) array
     true_radii : (n,) array
-        Discs are never smaller.
+        Discs are never smaller than this, even if they overlap.
     low, high : float
-        Smallest and largest radius.
+        Limits of the radii, unless the true radius is larger.
 
     Returns
     -------
@@ -62,7 +63,9 @@ def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Arr
 
 
 def fit_mark_size(points: Array, low: float, high: float) -> float:
-    """Choose one size for all marks at some points, at which about half of them do not overlap.
+    """Choose one size for all marks, such that about half of them do not overlap.
+
+    The size is the median distance to the nearest other mark, within limits.
 
     Parameters
     ----------
@@ -81,7 +84,7 @@ def fit_mark_size(points: Array, low: float, high: float) -> float:
 
 
 def choose_width_factor(n_lines: int) -> float:
-    """Return the factor of the width of lines, from 1 for a few lines to 0.5 for many."""
+    """Return the factor by which lines are thinner: from 1 for a few lines to 0.5 for many."""
     factor = np.sqrt(_MAX_LINES_AT_FULL_WIDTH / max(n_lines, 1))
     return float(np.clip(factor, _MIN_WIDTH_FACTOR, 1.0))
 

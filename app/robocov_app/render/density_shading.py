@@ -1,4 +1,4 @@
-"""The density as colors: the higher, the stronger."""
+"""The density as colors: the higher the density, the more opaque the color."""
 
 from functools import lru_cache
 from typing import TypeAlias
@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov_app.look.theme import Theme
 
 _RANGE_SAMPLES = 96
-"""Number of samples along the longer side of a map that decide on the range of a density."""
+"""Number of samples along the longer side of a map, of which the range of a density is taken."""
 Bounds: TypeAlias = tuple[float, float, float, float]
 """Low x, low y, high x and high y, m."""
 
@@ -67,13 +67,13 @@ def _divide_evenly(low: float, high: float, step: float) -> Array:
 
 
 def compute_density_fractions(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
-    """Return the position of the density within its range.
+    """Return the density at a grid of points, scaled to its range.
 
     Parameters
     ----------
     density : Density
     bounds : Bounds
-        Where the range of the density is measured.
+        Area in which the range of the density is measured.
     x : (w,) array, m
     y : (h,) array, m
 
@@ -90,7 +90,7 @@ def compute_density_fractions(density: Density, bounds: Bounds, x: Array, y: Arr
 
 
 def color_density(fractions: Array, theme: Theme) -> NDArray[np.uint8]:
-    """Return the colors of densities.
+    """Convert scaled densities to colors, all of one hue, from transparent to opaque.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def compute_density_range(environment: Environment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def measure_density_range(density: Density, bounds: Bounds) -> tuple[float, float]:
-    """Return the lowest and the highest density of samples within bounds."""
+    """Return the lowest and the highest density of a grid of samples within bounds."""
     low = np.array(bounds[:2])
     high = np.array(bounds[2:])
     step = (high - low).max() / _RANGE_SAMPLES
@@ -126,7 +126,7 @@ def measure_density_range(density: Density, bounds: Bounds) -> tuple[float, floa
     y = np.arange(low[1] + 0.5 * step, high[1], step)
     points = _build_grid(x, y)
     if isinstance(density, Gaussians):
-        # A narrow peak may be between samples.
+        # The grid may miss a narrow peak, so the centers of peaks are samples as well.
         centers = np.array([peak.center for peak in density.peaks]).reshape(-1, 2)
         is_inside = ((low <= centers) & (centers <= high)).all(axis=1)
         points = np.concatenate([points, centers[is_inside]])

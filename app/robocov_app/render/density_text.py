@@ -7,7 +7,7 @@ from robocov_app.render.density_shading import compute_density_range
 
 
 def describe_density(environment: Environment) -> str:
-    """Return the range of the density as text; empty if the density is uniform."""
+    """Return the range of the density as text; an empty text if the density is uniform."""
     density = environment.density
     if density is None or density.is_uniform:
         return ""
@@ -34,7 +34,7 @@ def get_density_kind(environment: Environment) -> str | None:
 
 
 def list_density_lines(environment: Environment) -> list[str]:
-    """Return the line below figures that are weighted by the density; none if the density is uniform."""
+    """Return the line that is written below values weighted by the density; [] if it is uniform."""
     density = environment.density
     if density is None or density.is_uniform:
         return []
@@ -52,12 +52,12 @@ def get_cost_name(environment: Environment) -> str:
 def format_cost(name: str, mean_distance: float, mean_time: float | None = None) -> str:
     """Return the coverage cost as text.
 
-    Values that are not finite are left out, as those of a team without a working robot.
+    Values that are not finite, such as those of a team without a working robot, are left out.
 
     Parameters
     ----------
     name : str
-        Name of the mean distance.
+        Name of the mean distance, from `get_cost_name`.
     mean_distance : float, m
     mean_time : float, s, optional
         Mean time until the first robot arrives.

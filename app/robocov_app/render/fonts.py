@@ -1,4 +1,4 @@
-"""Text in DejaVu Sans, the font of matplotlib: a bare Linux has no fonts."""
+"""Text in DejaVu Sans, which matplotlib ships, since minimal Linux systems have no fonts."""
 
 import importlib.util
 from functools import lru_cache
@@ -18,7 +18,7 @@ _CACHE_BYTES = 8_000_000
 def find_font_file(bold: bool = False) -> Path | None:
     """Return the path of the font in the installation of matplotlib; None if there is none.
 
-    Importing matplotlib would take long, so it is only located.
+    The package is only located, not imported, because importing it takes long.
     """
     matplotlib = importlib.util.find_spec("matplotlib")
     if matplotlib is None:
@@ -37,7 +37,7 @@ def _open_font(size: int, bold: bool) -> pygame.font.Font:
 
 
 def _get_font(size: int, bold: bool) -> pygame.font.Font:
-    """Return the font of a size, px. Fonts are opened again after pygame's font module was shut down."""
+    """Return the font of a size, px; open it again if pygame's font module was shut down since."""
     try:
         _open_font(size, bold).get_height()
     except pygame.error:
@@ -61,7 +61,7 @@ def render_text(text: str, size: int, color: Color, bold: bool = False) -> pygam
     Returns
     -------
     pygame.Surface
-        It is cached: do not draw on it.
+        The surface is cached, so callers must not draw on it.
     """
     return _get_font(size, bold).render(escape_controls(text, single_line=True), True, color)
 
@@ -72,5 +72,5 @@ def measure_text(text: str, size: int, bold: bool = False) -> int:
 
 
 def shorten_to_width(text: str, size: int, width: float, bold: bool = False) -> str:
-    """Shorten a text of a size, px, to a width, px; an ellipsis replaces its end."""
+    """Shorten a text, which is written at a size in px, to a width in px; an ellipsis replaces its end."""
     return shorten_text(text, lambda candidate: measure_text(candidate, size, bold), width)

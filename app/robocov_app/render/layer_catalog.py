@@ -31,7 +31,7 @@ FIELD_LAYERS = frozenset({"distances", "geodesic_cells"})
 
 
 def build_standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
-    """Build one of each layer, from the lowest to the topmost.
+    """Build all layers of a picture, from the lowest to the topmost.
 
     Parameters
     ----------
@@ -53,10 +53,10 @@ def build_standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
 
 
 def build_pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
-    """Build the layers of one picture among several, which has a caption instead of a legend of its own."""
+    """Build the layers of one pane among several, which has a caption instead of a legend of its own."""
 
     def draw_status(canvas: Canvas, scene: Scene) -> None:
-        # The caption contains the name of the controller and the cost.
+        # Controller and cost are already in the caption.
         captions.draw_status(canvas, replace(scene, label="", cost=""))
 
     shared = [layer for layer in build_standard_layers(trails) if layer.name not in ("legend", "status")]
@@ -66,7 +66,7 @@ def build_pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
 
 
 def check_layer_names(option: str, names: Iterable[str]) -> frozenset[str]:
-    """Check names of layers, which may have dashes instead of underscores.
+    """Check layer names that the user typed, with underscores or dashes.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def check_layer_names(option: str, names: Iterable[str]) -> frozenset[str]:
 
 
 def _build_map_layers() -> list[Layer]:
-    """Build the areas: heat maps, cells and the map."""
+    """Build the layers of areas: heat maps, cells and the map itself."""
     return [
         Layer(
             "distances",
@@ -138,7 +138,7 @@ def _build_map_layers() -> list[Layer]:
 
 
 def _build_perception_layers() -> list[Layer]:
-    """Build the perception of robots: known obstacles, scans, ranges and neighbors."""
+    """Build the layers of what robots perceive: known obstacles, scans, ranges and neighbors."""
     return [
         Layer(
             "sensed",
@@ -170,7 +170,7 @@ def _build_perception_layers() -> list[Layer]:
 
 
 def _build_mark_layers(trails: ColorScheme) -> list[Layer]:
-    """Build trajectories, starts, obstacle points, goals and centroids."""
+    """Build the layers of trajectories, starts, obstacle points, goals and centroids."""
     trajectories = TrajectoriesLayer(trails)
     return [
         Layer(
@@ -214,7 +214,7 @@ def _build_mark_layers(trails: ColorScheme) -> list[Layer]:
 
 
 def _build_arrow_layers() -> list[Layer]:
-    """Build velocities and force terms."""
+    """Build the layers of velocities and force terms."""
     return [
         arrows.build_velocity_layer(),
         arrows.build_force_layer("attraction", "Attraction", "full"),
@@ -226,7 +226,7 @@ def _build_arrow_layers() -> list[Layer]:
 
 
 def _build_robot_layers() -> list[Layer]:
-    """Build the robots, and the path from the cursor."""
+    """Build the layers of robots, and of the path from the cursor."""
     return [
         Layer(
             "path",
@@ -261,7 +261,7 @@ def _build_robot_layers() -> list[Layer]:
 
 
 def _build_strips() -> list[Layer]:
-    """Build the annotations around the arena."""
+    """Build the layers of annotations around the arena."""
     return [
         Layer("color_bar", "Color scale", draw_color_bar, needs=("field",), is_in_world=False),
         Layer("legend", "Legend", LegendLayer().draw, is_in_world=False),

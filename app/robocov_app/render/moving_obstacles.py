@@ -1,4 +1,4 @@
-"""Moving obstacles at one moment."""
+"""Moving obstacles at one time."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 
 _HEADING_STEP = 1e-3
-"""Time over which a heading is measured, as a fraction of the path's period, and at most in seconds."""
+"""Time over which a heading is measured: a fraction of the path's period, at most this many seconds."""
 _MIN_DISPLACEMENT_M = 1e-12
 
 
 class MovingObstacle(NamedTuple):
-    """A moving obstacle at one moment."""
+    """A moving obstacle at one time."""
 
     polygon: shapely.Polygon
     middle: Array
@@ -29,7 +29,7 @@ class MovingObstacle(NamedTuple):
 
 
 def list_moving_obstacles(environment: Environment, time: float) -> list[MovingObstacle]:
-    """List the moving obstacles of an environment at a time, s."""
+    """List the moving obstacles of an environment, with their positions and headings at a time, s."""
     moving = []
     for obstacle in environment.obstacles:
         path = obstacle.path

@@ -36,7 +36,7 @@ _MAX_SCALE = 6.0
 
 
 def choose_scale(size: tuple[int, int]) -> float:
-    """Return the scale of text and lines of films: 1.25 for 1280 x 720 pixels, in steps of 1/8."""
+    """Return the scale of text and lines for a picture size, px, in steps of 1/8: 1.25 for 1280 x 720."""
     width, height = size
     exact = min(width / _UNIT_WIDTH_PX, height / _UNIT_HEIGHT_PX)
     rounded = round(exact / _SCALE_STEP) * _SCALE_STEP
@@ -44,7 +44,10 @@ def choose_scale(size: tuple[int, int]) -> float:
 
 
 class _Margins(NamedTuple):
-    """Space that strips and the color scale have needed with some layers, size and scale."""
+    """Space that the legend and the color scale have needed so far.
+
+    `key` holds the size, the scale and the visible layers for which it was measured.
+    """
 
     key: object
     legend_rows: int
@@ -63,7 +66,7 @@ class Painter:
     layers : sequence of Layer, optional
         From the lowest to the topmost; by default those of `build_standard_layers`.
     scale : float, optional
-        Scale of text and lines; by default that of films.
+        Scale of text and lines; by default `choose_scale` of the size.
 
     Attributes
     ----------
@@ -96,7 +99,7 @@ class Painter:
         self._margins = _Margins(None, 0, 0.0)
 
     def show_only(self, names: Iterable[str]) -> None:
-        """Show these layers, and no others; raise ParameterError if one is unknown."""
+        """Show only the given layers; raise ParameterError if one is unknown."""
         visible = set(names)
         known = {layer.name for layer in self.layers}
         unknown = visible - known
@@ -116,12 +119,16 @@ class Painter:
 
     @property
     def camera(self) -> Camera:
-        """The camera, with the view that is left by strips and the color scale. Set it to zoom and pan."""
+        """The camera; set it to zoom and pan.
+
+        Its view is what the strips above and below and the color scale leave of the picture.
+        """
         view = self._compute_view()
         if self._camera is not None:
             return self._camera.with_view(view)
         left, top, width, height = view
         side = MARGIN_PX * self.scale
+        # The color scale takes the place of the right margin.
         sides = 1 if self._margins.color_bar_width else 2
         inner = (left + side, top, max(width - sides * side, 1.0), height)
         fitted = Camera.fit(self.environment.region.bounds, inner, margin=2 * self.scale)
@@ -132,7 +139,7 @@ class Painter:
         self._camera = camera
 
     def _compute_view(self) -> tuple[float, float, float, float]:
-        """Return left, top, width and height of the area for the world, px."""
+        """Return left, top, width and height of the area in which the world is drawn, px."""
         width, height = self.size
         rows = self._margins.legend_rows
         top = MARGIN_PX
@@ -147,11 +154,11 @@ class Painter:
         return 0.0, top * self.scale, view_width, view_height
 
     def fit(self) -> None:
-        """Show the whole region, also after changes of the size."""
+        """Show the whole region, also after the size of the picture changes."""
         self._camera = None
 
     def list_legend_entries(self, scene: Scene) -> list[LegendEntry]:
-        """Return the entries of the legend, those of the layers that draw something of a scene."""
+        """Return the legend entries of all visible layers that have something to draw in a scene."""
         entries = []
         for layer in self._list_visible():
             if layer.can_draw(scene):
@@ -159,11 +166,14 @@ class Painter:
         return entries
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
-        """Draw a scene on the whole of a surface, whose size becomes that of the painter.
+        """Draw a scene on a surface, which it fills.
+
+        Adjacent static layers are drawn together on a page, which is kept until it changes.
 
         Parameters
         ----------
         surface : pygame.Surface
+            The painter takes over its size.
         scene : Scene
         """
         self.size = surface.get_size()
@@ -177,6 +187,7 @@ class Painter:
             frozenset(self.visible),
             self.list_legend_entries(scene),
         )
+        # The margins need a canvas to measure texts, and the camera depends on the margins.
         self._update_margins(canvas, scene)
         canvas = replace(canvas, camera=self.camera)
         clip = pygame.Rect([round(side) for side in canvas.camera.view])
@@ -193,7 +204,11 @@ class Painter:
         surface.set_clip(None)
 
     def _update_hues(self, scene: Scene) -> None:
-        """Choose the hues of the robots. In small teams each robot keeps the hue of its number."""
+        """Choose the hues of the robots.
+
+        In small teams each number has its own hue. In large ones adjacent cells differ, and robots keep
+        their hues if possible.
+        """
         numbers = scene.numbers
         if numbers is not None and max(numbers, default=1) <= MAX_OWN_HUES:
             self._hues = np.array(numbers, dtype=np.intp) - 1
@@ -201,9 +216,10 @@ class Painter:
             self._hues = choose_robot_hues(len(scene.team), scene.adjacency, self._hues)
 
     def _update_margins(self, canvas: Canvas, scene: Scene) -> None:
-        """Measure the legend and the color scale; with the same layers and size, margins only grow.
+        """Measure the legend and the color scale.
 
-        Otherwise the map would jump whenever the legend changes.
+        While the layers and the size stay the same, margins only grow, so that the map does not jump whenever
+        the legend changes.
         """
         names = {layer.name for layer in self._list_visible()}
         rows = 0
@@ -219,7 +235,7 @@ class Painter:
         self._margins = _Margins(key, rows, color_bar_width)
 
     def render_frame(self, scene: Scene) -> NDArray[np.uint8]:
-        """Render a scene without a display.
+        """Render a scene as an array, without a display.
 
         Parameters
         ----------
@@ -243,8 +259,8 @@ class Painter:
     def _get_static_page(
         self, canvas: Canvas, scene: Scene, layers: list[Layer], clip: pygame.Rect
     ) -> pygame.Surface:
-        """Return a page with neighboring static layers, which is drawn again after a change."""
-        # The density is not drawn below a distance map.
+        """Return a page with adjacent static layers, which is drawn again only if something has changed."""
+        # The density, a static layer, is hidden below a distance map.
         has_distances = scene.field is not None and "distances" in canvas.visible_layers
         names = [layer.name for layer in layers]
         key = (names, canvas.camera, self.theme.name, self.scale, self.size, has_distances)

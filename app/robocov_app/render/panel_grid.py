@@ -11,7 +11,7 @@ def choose_column_count(
     row_margin: float = 0.0,
     column_margin: float = 0.0,
 ) -> int:
-    """Choose the number of columns that makes panels as large as possible.
+    """Choose the number of columns of a grid of panels such that the panels are as large as possible.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ def choose_column_count(
     """
 
     def rate(columns: int) -> tuple[float, int]:
-        """Rate a number of columns; among equally good ones, more columns win."""
+        """Return a rating of a number of columns: the panel width, then, among equal ones, the columns."""
         rows = math.ceil(count / columns)
         panel_width = size[0] / columns - column_margin
         panel_height = size[1] / rows - row_margin
         width = min(panel_width, panel_height * aspect)
-        # Gaps in the last row count as well: they look as if something were missing.
+        # Empty places in the last row count as panels of width 0, because they look as if one were missing.
         mean_width = width * count / (rows * columns)
         return round(mean_width, 6), columns
 

@@ -9,7 +9,7 @@ from robocov_app.render.camera import Camera
 
 
 def build_surface(colors: NDArray[np.uint8]) -> pygame.Surface:
-    """Build a surface from colors.
+    """Build a surface from an array of colors.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def build_surface(colors: NDArray[np.uint8]) -> pygame.Surface:
 
 
 def build_palette_surface(indices: NDArray[np.uint8], palette: NDArray[np.uint8]) -> pygame.Surface:
-    """Build a surface with 8 bits per pixel.
+    """Build a surface with 8 bits per pixel from indices into a palette.
 
     Parameters
     ----------

@@ -19,16 +19,19 @@ from robocov_app.render.scene import Scene
 def build_record_scene(
     record: Record, row: int, *, cost: str = "", fields: DistanceFields | None = None
 ) -> Scene:
-    """Build the scene of a row of a record; failed robots are marked.
+    """Build the scene at one time of a recorded run.
+
+    Robots that have failed by then are marked; those that have not joined yet are left out.
 
     Parameters
     ----------
     record : Record
     row : int
+        Index of the time in the record.
     cost : str
         The coverage cost as text.
     fields : DistanceFields, optional
-        Computes the distances to the nearest robot.
+        Computes the distances to the nearest robot; without it, the scene has none.
 
     Returns
     -------
@@ -41,6 +44,7 @@ def build_record_scene(
     starts = record.positions[0]
     trail = record.positions[: row + 1]
     attributes: dict[str, Any] = {"label": record.label, "cost": cost}
+    # Numbers of robots start at 1, rows at 0.
     if snapshot.working is not None:
         robots = np.flatnonzero(snapshot.working)
         failed = np.flatnonzero(record.present[row] & ~record.working[row]).tolist()
@@ -53,7 +57,7 @@ def build_record_scene(
         team = team[robots]
         first_rows = np.argmax(record.present, axis=0)
         starts = record.positions[first_rows, np.arange(len(first_rows))][robots]
-        # A robot has no trail before it joins.
+        # Before a robot joins, its trail stays at its start.
         is_present = record.present[: row + 1, robots, None]
         trail = np.where(is_present, trail[:, robots], starts)
     if fields is not None:
@@ -71,7 +75,7 @@ def build_record_scene(
 
 
 def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
-    """Return a snapshot with only some of its robots.
+    """Return a snapshot that contains only the selected robots.
 
     Parameters
     ----------
@@ -81,10 +85,11 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
     Returns
     -------
     Snapshot
-        Its cells are still those of all robots.
+        Its cells are still those of all robots. Scans are dropped.
     """
     seen = snapshot.seen
     decision = snapshot.decision
+    # The row of each robot among the selected ones; -1 for the others.
     new_row = np.full(len(seen.positions), -1, dtype=np.intp)
     new_row[robots] = np.arange(len(robots))
     robot, neighbor = seen.neighbors.list_pairs()
@@ -112,6 +117,6 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
 
 
 def _select_rows(source: object, names: tuple[str, ...], rows: Any) -> dict[str, Any]:
-    """Return some rows of those attributes of an object that are not None."""
+    """Return the given rows of the named attributes of an object, except for attributes that are None."""
     values = {name: getattr(source, name) for name in names}
     return {name: value[rows] for name, value in values.items() if value is not None}

@@ -1,4 +1,4 @@
-"""The scene: the content of a picture at one moment of a run."""
+"""The scene: the content of a picture at one time of a run."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obst
 from robocov_app.render.sensed_points import SensedPoints
 
 CENTROID_TOLERANCE_M = 0.05
-"""Distance within which a goal counts as the centroid: in a record, goals are a moment older than cells."""
+"""Distance within which a goal counts as the centroid: in records, goals are a step older than cells."""
 
 
 def are_centroids(goals: Array, centroids: Array) -> bool:
-    """Return whether all goals are the centroids of the cells.
+    """Return whether all goals are at the centroids of the robots' cells, within a tolerance.
 
     Parameters
     ----------
@@ -42,23 +42,23 @@ def are_centroids(goals: Array, centroids: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The content of a picture at one time. Attributes that are None or empty are left out.
+    """The content of a picture at one time; what is None or empty is not drawn.
 
     Attributes
     ----------
     environment : Environment
-        The map at this moment.
+        The map, with moving obstacles at their positions.
     team : Team
     snapshot : Snapshot or None
         State and knowledge of the robots; without it, only the map is drawn.
     starts : (n, 2) array or None, m
     trail : (k, n + f, 2) array or None, m
-        Positions until now, the oldest first: of the robots, then of f robots that have failed, if their
-        trajectories are known; nan where a robot does not work.
+        Positions so far, the oldest first. The n robots of the scene come before f robots that have failed
+        and whose trajectories are known. Positions are nan at times when a robot is not working.
     trail_time : (k,) array or None, s
         Times of the trail, for trajectories that fade.
     trail_fade : float or None, s
-        Length of the drawn end of the trail, which fades into the past.
+        Time after which a trail has faded away; by default the whole trail is drawn.
     cells : sequence of (m, 2) arrays or None, m
         Outlines of the Voronoi cells.
     centroids : (n, 2) array or None, m
@@ -73,7 +73,7 @@ class Scene:
     field_limit : float, m
         End of the color scale of these distances.
     numbers : sequence of int or None
-        Numbers by which users know the robots; by default 1, 2, 3, ...
+        Numbers of the robots as shown to users; by default 1, 2, 3, ...
     failed : mapping of int to (float, float), m
         Positions of failed robots, by their numbers.
     selected : int or None
@@ -81,12 +81,13 @@ class Scene:
     scans : sequence of (array, array), m
         Position (2,) and ends of the rays (r, 2) of range sensors.
     sensed : SensedPoints or None
-        Points of obstacles that were sensed until now.
+        Points of obstacles that have been sensed so far.
     path : (w, 2) array or None, m
         The shortest path from a position to its nearest robot.
     cell_owners : (c,) int array or None
-        The robot of each cell. By default each robot has one. If robots differ in speed, a robot may have
-        several outlines; those of fast robots come first, and those of slow ones are holes in them.
+        Row of the robot that owns each cell; by default cell i belongs to robot i. If robots differ in
+        speed, a robot may own several outlines. Those of fast robots come first, so that the cells of slower
+        robots inside them are drawn on top.
     moving : sequence of MovingObstacle
     failed_radii : mapping of int to float, m
         Radii of failed robots, by their numbers.
@@ -117,17 +118,17 @@ class Scene:
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
 
     def get_failed_radius(self, number: int) -> float:
-        """Return the radius of a failed robot, m."""
+        """Return the radius of a failed robot, m; without an entry, that of the first working robot."""
         return self.failed_radii.get(number, float(self.team.radius[0]))
 
     def get_number(self, row: int) -> int:
-        """Return the number of a robot, given by its row."""
+        """Return the number that users see for the robot in a row."""
         if self.numbers is None:
             return row + 1
         return self.numbers[row]
 
     def has_content(self, name: str) -> bool:
-        """Return whether an attribute, given by its name, is neither None nor an empty collection."""
+        """Return whether the named attribute is neither None nor an empty collection."""
         value = getattr(self, name)
         if isinstance(value, Sequence | Mapping):
             return len(value) > 0
@@ -148,7 +149,7 @@ class Scene:
         Parameters
         ----------
         environment : Environment
-            The map; obstacles are moved to their positions at the time of the snapshot.
+            The map; its moving obstacles are placed where they are at the time of the snapshot.
         team : Team
         snapshot : Snapshot
         **attributes
@@ -174,9 +175,10 @@ class Scene:
 
 
 def _find_cells(environment: Environment, team: Team, snapshot: Snapshot) -> VoronoiPartition | WeightedCells:
-    """Return the cells of the controller, or compute those of all robots at their true positions.
+    """Return the cells of the controller if they partition the map, or compute cells that do.
 
-    With limited, late or lost messages, the cells of the controller overlap.
+    If communication is limited, or messages are late or lost, the cells of the controller may overlap. Then
+    the cells of all robots at their true positions are computed.
     """
     cells = snapshot.decision.cells
     positions = snapshot.positions

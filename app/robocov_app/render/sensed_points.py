@@ -10,14 +10,14 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 
 CELL_SIZE_M = 0.05
-"""Points that a robot senses within the same square of this size count once."""
+"""Of the points that a robot senses within the same square of this size, only the first is stored."""
 MAX_POINTS = 20_000
-"""Maximum number of points. Further ones are ignored."""
+"""Maximum number of stored points; further ones are ignored."""
 _TIME_TOLERANCE_S = 1e-6
 
 
 class SensedPoints:
-    """A growing set of points, each with its robot and the time at which it was sensed first."""
+    """A growing set of points, each with the robot that sensed it and the time at which it first did."""
 
     def __init__(self) -> None:
         self._times = np.empty(0)
@@ -34,11 +34,11 @@ class SensedPoints:
         Parameters
         ----------
         time : float, s
-            Not before that of earlier points.
+            Not earlier than in the previous call.
         numbers : sequence of int
             Numbers of the robots.
         points : (n, 2) array, m
-            A point of each robot; nan if it senses nothing.
+            The point that each robot senses; nan if it senses nothing.
         """
         if len(self) + len(numbers) > MAX_POINTS:
             return
@@ -54,7 +54,7 @@ class SensedPoints:
         self._points = np.concatenate([self._points, points[new_rows]])
 
     def get_until(self, time: float) -> tuple[Array, IntArray]:
-        """Return the points that were known at a time, s.
+        """Return the points that had been sensed by a time, s.
 
         Returns
         -------
@@ -67,13 +67,13 @@ class SensedPoints:
 
     def copy(self) -> SensedPoints:
         """Return an independent copy."""
-        # The arrays are replaced, never changed.
+        # Arrays are never changed in place, so both copies can share them.
         twin = copy(self)
         twin._known = set(self._known)
         return twin
 
     def remove_after(self, time: float) -> None:
-        """Remove the points that were not known at a time, s."""
+        """Remove the points that were first sensed after a time, s."""
         self._points, self._robots = self.get_until(time)
         self._times = self._times[: len(self._points)]
         x, y = np.floor(self._points / CELL_SIZE_M).T.tolist()

@@ -1,4 +1,4 @@
-"""Smooth shapes: sketches, which are drawn larger and shrunk, and sprites, small cached pictures of marks.
+"""Antialiased shapes: sketches, which are drawn enlarged and shrunk, and sprites, small cached marks.
 
 Sprites are cached for each quarter of a pixel, so that slow robots glide in videos instead of hopping. All
 colors are premultiplied: blit with ``pygame.BLEND_PREMULTIPLIED``.
@@ -17,11 +17,11 @@ from robocov_app.render.fonts import render_text
 from robocov_app.render.surface_cache import cache_surfaces
 
 FINENESS = 4
-"""Sprites are drawn this many times larger, and there are as many shifts within a pixel."""
+"""Factor by which sprites are drawn larger before they are shrunk; also the shifts within a pixel."""
 SKETCH_FINENESS = 3
-"""The same for sketches, which may be as large as the whole picture."""
+"""Factor for sketches, which may be as large as the whole picture."""
 MAX_FINE_RADIUS_PX = 60.0
-"""Larger sprites have invisible shifts and take megabytes, so they have no shift and half the fineness."""
+"""Larger sprites take megabytes, so they have half the fineness, and no shift, which would be invisible."""
 NOSE_LENGTH = 1.65
 """Distance of the tip of a nose from the center of its disc, in radii."""
 N_NOSE_DIRECTIONS = 96
@@ -32,7 +32,7 @@ _EDGE_PX = 0.6
 _CROSS_HALO_PX = 1.6
 """Additional width of the halo of a cross."""
 _DIAGONAL_ARM = 0.75
-"""Length of the arms of a times sign, as a fraction of those of a plus."""
+"""Length of the arms of an x along each axis, as a fraction of those of a plus sign."""
 _DIGIT_SIZES = (1.5, 1.22, 0.92, 0.72)
 """Text sizes of numbers with 1, 2, 3 and 4 digits in a disc of radius 1."""
 _AXIS_DIRECTIONS = ((1, 0), (0, 1))
@@ -46,7 +46,7 @@ Pixel: TypeAlias = Sequence[float]
 
 
 def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
-    """Return the visible part of the box around points.
+    """Return the box around points with a margin, clipped to the visible part of a surface.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> p
 
 
 class Sketch:
-    """A rectangle of a surface that is drawn larger and then shrunk: overlapping strokes show no seams.
+    """A drawing of a rectangle of a surface, made larger and then shrunk: overlapping strokes show no seams.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Sketch:
         Returns
         -------
         Sketch or None
-            None if it would be huge.
+            None if a side would exceed `_MAX_SKETCH_PX`.
         """
         xs = [point[0] for point in points]
         ys = [point[1] for point in points]
@@ -118,14 +118,14 @@ class Sketch:
 
     def to_large(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
         """Convert pixels of the surface to pixels of the enlarged drawing."""
-        # Pixels are squares around whole numbers, so their middles are not at corners of the large ones.
+        # Whole coordinates are the middles of pixels, so the first pixel starts half a pixel earlier.
         left = self.box.x - 0.5
         top = self.box.y - 0.5
         fineness = self._fineness
         return [((point[0] - left) * fineness, (point[1] - top) * fineness) for point in points]
 
     def draw_path(self, points: Sequence[Pixel], color: Color, width: float) -> None:
-        """Draw a line of a width, px, with round joints and ends."""
+        """Draw a line through points, with a width in px and round joints and ends."""
         large_width = max(width * self._fineness, 1.0)
         large_points = self.to_large(points)
         pygame.draw.lines(self.large, color, False, large_points, round(large_width))
@@ -142,13 +142,13 @@ class Sketch:
         pygame.draw.circle(self.large, color, large_center, radius * self._fineness)
 
     def draw_on(self, surface: pygame.Surface) -> None:
-        """Shrink the drawing, and draw it on the surface."""
+        """Shrink the drawing, and blit it on a surface at its box."""
         picture = pygame.transform.smoothscale(self.large, self.box.size)
         surface.blit(picture, self.box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _create_large(radius: float, shift: Shift, fineness: int) -> tuple[pygame.Surface, tuple[int, int]]:
-    """Return a transparent square for a sprite with a radius, px, and its center, both enlarged."""
+    """Create an enlarged transparent square for a sprite with a radius, px; return it with its center."""
     half = (int(radius) + 2) * fineness
     surface = pygame.Surface((2 * half, 2 * half), pygame.SRCALPHA, 32)
     return surface, (half + shift[0], half + shift[1])
@@ -194,7 +194,7 @@ def render_disc(
     edge: Color,
     text: str = "",
 ) -> pygame.Surface:
-    """Render a disc.
+    """Render a robot: a disc with a ring, a thin edge and a number.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def _render_disc(
     if text:
         size = choose_number_size(radius - ring_width, min(len(text), len(_DIGIT_SIZES)))
         number = render_text(text, round(size * fineness), choose_text_color(fill), True)
-        # The ink of the digits is centered, without the space for ascenders and descenders.
+        # Center the visible part of the digits; the font leaves space for ascenders and descenders.
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
     return _shrink(large, fineness)
@@ -251,7 +251,7 @@ def _render_disc(
 
 @cache_surfaces(12_000_000)
 def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: Shift) -> pygame.Surface:
-    """Render the tip that shows the heading of a disc; it is drawn below the disc.
+    """Render the nose of a robot, a triangle that shows its heading and is drawn below its disc.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: 
         Radius of the disc.
     fill, edge : Color
     direction : int
-        Counterclockwise from the right, in steps of 2 pi / `N_NOSE_DIRECTIONS`.
+        Heading, counterclockwise from the right, in steps of 2 pi / `N_NOSE_DIRECTIONS`.
     shift : Shift
 
     Returns
@@ -271,7 +271,7 @@ def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: 
     heading = 2 * math.pi * direction / N_NOSE_DIRECTIONS
     for color, margin in ((edge, _EDGE_PX), (fill, 0.0)):
         base = radius + margin
-        # The tip is sharp, so a uniform edge reaches farther there.
+        # An edge of uniform width extends farther at the sharp tip.
         tip = NOSE_LENGTH * radius + 1.5 * margin
         corners = []
         for distance, angle in ((tip, 0.0), (base, _NOSE_HALF_ANGLE), (base, -_NOSE_HALF_ANGLE)):
@@ -321,17 +321,17 @@ def render_dot(radius: float, color: Color, shift: Shift) -> pygame.Surface:
 def render_cross(
     arm: float, shift: Shift, *, color: Color, halo: Color, width: float, is_diagonal: bool
 ) -> pygame.Surface:
-    """Render a plus or a times sign, with a thin halo that keeps it readable on any background.
+    """Render a plus sign or an x, with a thin halo that keeps it readable on any background.
 
     Parameters
     ----------
     arm : float, px
-        Length of the arms of a plus; those of a times sign are a little shorter.
+        Length of the arms of a plus sign; an x has a slightly smaller size.
     shift : Shift
     color, halo : Color
     width : float, px
     is_diagonal : bool
-        Whether it is a times sign.
+        Whether it is an x.
 
     Returns
     -------
@@ -354,7 +354,7 @@ def render_cross(
 def _build_bar(
     center: tuple[int, int], direction: tuple[int, int], reach: float, width: float
 ) -> list[tuple[float, float]]:
-    """Return the corners of a bar whose ends are at the center plus and minus `reach` times a direction."""
+    """Return the corners of a bar from `center - reach * direction` to `center + reach * direction`."""
     x, y = center
     dx, dy = direction
     half_width = width / 2 / (dx * dx + dy * dy) ** 0.5

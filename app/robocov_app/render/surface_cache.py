@@ -11,14 +11,14 @@ _Value = TypeVar("_Value")
 
 
 class CachedRenderer(Generic[Arguments]):
-    """A function that renders surfaces, and returns those it has rendered before.
+    """A function that renders surfaces and caches them.
 
-    The surfaces that have not been used for the longest time are dropped first.
+    When the cache is full, the least recently used surfaces are dropped.
 
     Parameters
     ----------
     render : callable
-        Returns a surface; its arguments must be hashable.
+        Renders a surface; its arguments must be hashable.
     max_bytes : int
         Maximum memory of all cached surfaces.
 
@@ -35,7 +35,7 @@ class CachedRenderer(Generic[Arguments]):
         self._used_bytes = 0
 
     def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> pygame.Surface:
-        """Return the surface for some arguments."""
+        """Return the surface for the given arguments, from the cache if possible."""
         key = (args, tuple(kwargs.items())) if kwargs else args
         cached = self.surfaces.get(key)
         if cached is not None:
@@ -46,6 +46,7 @@ class CachedRenderer(Generic[Arguments]):
         return surface
 
     def _add(self, key: object, surface: pygame.Surface) -> None:
+        """Cache a surface unless it is larger than the whole cache; drop others to make room."""
         size = _count_bytes(surface)
         if size > self._max_bytes:
             return
@@ -86,13 +87,13 @@ def _count_bytes(surface: pygame.Surface) -> int:
 
 
 class LatestValue(Generic[_Value]):
-    """Cache of one value, which is computed again when its source or its key changes."""
+    """A cache for one value, which is computed again when its source or its key changes."""
 
     def __init__(self) -> None:
         self._cached: tuple[object, object, _Value] | None = None
 
     def get(self, source: object, key: object, compute: Callable[[], _Value]) -> _Value:
-        """Return the value, computed again if needed.
+        """Return the cached value, or compute it if the source or the key has changed.
 
         Parameters
         ----------

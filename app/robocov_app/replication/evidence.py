@@ -23,11 +23,11 @@ _MAX_WORST_MAPS = 3
 """Number of maps that are named as the worst of a controller."""
 _MEDIAN_MEASURES = ("final", "over_run", "path", "work")
 _MIN_REPORTED_FRACTION = 0.05
-"""A failure is reported if it happens in more than this fraction of the runs."""
+"""A failure is reported if it occurs in more than this fraction of the runs."""
 
 
 class ControllerProfile(NamedTuple):
-    """Name, source and information of a controller."""
+    """Name, source and behavior of a controller, and the information that it uses."""
 
     controller: str
     label: str
@@ -57,7 +57,7 @@ class ContenderSummary:
     rest_fraction : float
         Fraction of runs that come to rest.
     rest_time : float
-        Median time until rest by Kaplan and Meier, s; inf if most runs do not come to rest.
+        Kaplan-Meier estimate of the median time until rest, s; inf if most runs do not come to rest.
     medians : Mapping
         Medians of J at the end (``final``) and over the run (``over_run``), of the path length of a robot, m
         (``path``), and of the work of the team, J (``work``).
@@ -90,14 +90,14 @@ class ControllerEvidence:
     ----------
     profile : ControllerProfile
     summaries : sequence of ContenderSummary
-        Summaries of its contenders. Everything else is of the first, the best.
+        Summaries of its contenders, the best one first. Everything else is about the best one.
     medians_by_map : Mapping
         Median gap on each map.
     duels : sequence of Duel
     failures : str
-        Where it fails, in sentences.
+        Sentences on where it fails.
     tuning : str
-        How its gains were tuned, in a sentence; empty if they were not.
+        Sentence on how its gains were tuned; empty if they were not.
     """
 
     profile: ControllerProfile
@@ -110,7 +110,7 @@ class ControllerEvidence:
 
 @cache
 def load_profile(controller: str) -> ControllerProfile:
-    """Return the profile of a controller. Without an entry in the file it is its own summary."""
+    """Return the profile of a controller; without an entry in the file, its summary describes it."""
     controller_class = load_controller_class(controller)
     profiles = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8"))
     entry = profiles.get(controller, {})
@@ -137,7 +137,7 @@ def summarize_contenders(
     ----------
     outcomes : Outcomes
     contenders : iterable of Contender
-        Those without any gap are left out.
+        Contenders without runs that have a gap are left out.
     duration : float
         Duration of the runs, s.
 
@@ -173,7 +173,7 @@ def summarize_contenders(
 
 
 def rank_contenders(results: BeyondResults) -> list[ContenderSummary]:
-    """Return the summaries of all contenders, the lowest median gap first."""
+    """Return the summaries of all contenders by ascending median gap."""
     summaries = summarize_contenders(results.outcomes, results.contenders, results.plan.duration)
     return sorted(summaries, key=lambda summary: summary.gap.estimate)
 
@@ -201,7 +201,7 @@ def collect_evidence(
 
 
 def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -> list[Duel]:
-    """List the comparisons of the own controllers with all other contenders."""
+    """List the comparisons of our own controllers with the contenders in the summaries."""
     duels = []
     for own in OWN:
         for summary in summaries:
@@ -217,13 +217,13 @@ def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -
 def collect_degradations(
     results: BeyondResults, summaries: Iterable[ContenderSummary]
 ) -> dict[str, list[Degradation]]:
-    """Return the degradations of each controller: without any disturbance, then with strong ones.
+    """Return the degradations of each controller: without disturbances, then with each strong one.
 
     Parameters
     ----------
     results : BeyondResults
     summaries : iterable of ContenderSummary
-        They give the order of the controllers.
+        Determine the order of the controllers.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def collect_degradations(
 
 
 def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
-    """Return sentences about the worst cases of a contender and the fraction of its failed runs."""
+    """Return sentences about the worst maps and runs of a contender, and the failures that it often has."""
     key = summary.contender.key
     medians = outcomes.compute_medians_by_map(key)
     worst_maps = sorted(medians.items(), key=lambda item: -item[1])[:_MAX_WORST_MAPS]
@@ -256,6 +256,7 @@ def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
 
 
 def _list_failures(summary: ContenderSummary) -> str:
+    """Return a sentence with the failures that are frequent enough to report; empty if there are none."""
     failures = (
         (summary.contact_fraction, "robots touch a wall or each other"),
         (summary.stuck_fraction, "a robot is stuck away from its goal"),
@@ -271,7 +272,7 @@ def _list_failures(summary: ContenderSummary) -> str:
 
 
 def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
-    """Return in a sentence which gains of a controller were the best, and their advantage over others."""
+    """Return a sentence on the best gains of a controller, and their advantage over other sets."""
     grid = outcomes.select_complete()
     if not grid.instances:
         return "Gains: its defaults; in every scenario of the tuning some run failed."

@@ -11,7 +11,7 @@ NO_VALUE = "–"
 
 
 def format_amount(value: float, unit: str = "") -> str:
-    """Return a number with its unit, with about three digits.
+    """Format a number with about three significant digits and its unit.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def format_amount(value: float, unit: str = "") -> str:
 
 
 def format_interval(interval: Interval, unit: str = "") -> str:
-    """Return an estimate with its interval: "5.2 % (3.1 % to 8 %)"."""
+    """Format an estimate with its interval, for example "5.2 % (3.1 % to 8 %)"."""
     estimate = format_amount(interval.estimate, unit)
     if math.isnan(interval.low):
         return estimate
@@ -53,12 +53,12 @@ def format_interval(interval: Interval, unit: str = "") -> str:
 
 
 def format_median(values: Array, unit: str = "") -> str:
-    """Return the median of (m,) values with its unit; a dash if there are none."""
+    """Format the median of values, (m,), with its unit; a dash without values."""
     if not len(values):
         return NO_VALUE
     return format_amount(float(np.median(values)), unit)
 
 
 def capitalize(text: str) -> str:
-    """Return a text with a capital first letter. Unlike `str.capitalize`, it does not change the rest."""
+    """Capitalize the first letter of a text; unlike `str.capitalize`, leave the rest unchanged."""
     return text[:1].upper() + text[1:]

@@ -1,1 +1,1 @@
-"""Sweeps: many runs in parallel, each done once, and their table."""
+"""Sweeps: many runs in parallel, each executed only once, and a table of their results."""

@@ -19,17 +19,17 @@ from robocov_app.sweep.worker import Outcome, perform
 
 CONNECTION_TIMEOUT_S = 10.0
 _MIN_CAPACITY = 4
-"""Number of tasks that are submitted to a cluster without workers."""
+"""Minimum number of submitted tasks, also for a cluster that has no workers yet."""
 _TASKS_PER_THREAD = 2
 """Sending a task to a worker takes time, so each thread has another task waiting."""
 _THREAD_COUNT_INTERVAL_S = 2.0
 """Time between two queries of the number of threads; workers may come and go."""
 _LOCAL_ADDRESS = "inproc://"
-"""Beginning of the address of a scheduler in this process."""
+"""Beginning of the address of a scheduler that runs in this process."""
 
 
 class Cluster(Executor):
-    """The workers of a Dask cluster. They need robocov, but no shared disk.
+    """The workers of a Dask cluster, which need an installation of robocov, but no shared disk.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Cluster(Executor):
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
         self._threads = 0
         self._threads_counted_at = -math.inf
-        # Dask logs the end of a scheduler in many lines. Here it becomes an error in one line.
+        # Dask logs many lines when a scheduler ends. They are silenced, because it becomes a one-line error.
         self._logger = logging.getLogger("distributed.client")
         self._previous_level = self._logger.level
         self._logger.setLevel(logging.CRITICAL)
@@ -72,7 +72,7 @@ class Cluster(Executor):
 
     @property
     def capacity(self) -> int:
-        """Number of tasks to submit so that no thread of a worker is idle."""
+        """Number of tasks to submit at once so that no thread of a worker is idle."""
         return max(_MIN_CAPACITY, _TASKS_PER_THREAD * self.threads)
 
     @property
@@ -105,7 +105,7 @@ class Cluster(Executor):
             return super()._get_result(future)
         except Exception as error:
             if isinstance(error, self._killed_worker_error):
-                # Tasks that only waited for the same worker end in this way as well.
+                # Tasks that were only waiting on the same worker get this error as well.
                 return LostWorker("the process of its worker ended", str(error), is_caused_by_task=False)
             reason = getattr(error, "reason", None) or f"{type(error).__name__}: {error}"
             reason = " ".join(str(reason).split())
@@ -113,7 +113,7 @@ class Cluster(Executor):
 
 
 def _check_connection(dask: Any, address: str) -> None:
-    """Connect to a scheduler for a moment, because Dask's client would wait forever for an answer."""
+    """Connect to a scheduler and disconnect; unlike Dask's client, this does not wait forever."""
 
     async def connect() -> None:
         arguments = dask.Security().get_connection_args("client")
@@ -121,6 +121,6 @@ def _check_connection(dask: Any, address: str) -> None:
         connection = await asyncio.wait_for(connecting, CONNECTION_TIMEOUT_S)
         await connection.close()
 
-    # This thread may already have an event loop, as in a notebook.
+    # A new thread, because this one may already run an event loop, as in a notebook.
     with ThreadPoolExecutor(1) as thread:
         thread.submit(lambda: asyncio.run(connect())).result()

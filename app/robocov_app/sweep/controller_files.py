@@ -1,4 +1,4 @@
-"""Controllers in files of the user: a study contains their text, so that workers need no such files."""
+"""Controllers in files of the user. A study contains their source text, so workers need no such files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robocov.errors import ParameterError, quote
 
 
 def load_study_controller(name: str, folder: Path) -> tuple[type[Any], ControllerSource | None]:
-    """Load the class of a controller, and the text of its file.
+    """Load the class of a controller, and the source text of its file.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ def load_study_controller(name: str, folder: Path) -> tuple[type[Any], Controlle
     source = _read_source(name, folder)
     controller_class = load_controller_class(name, source=source)
     if source is not None:
-        # Loading the class may have added folders to sys.path, where its modules are.
+        # Only now: loading the class may have added the folders of its modules to sys.path.
         source = source._replace(modules=find_own_modules(source.text))
     return controller_class, source
 
 
 def _read_source(name: str, folder: Path) -> ControllerSource | None:
-    """Read the file of a controller; None if the name is not that of a file."""
+    """Read the file of a controller named ``file.py:Class``; None for other names."""
     file_name, _, class_name = name.rpartition(":")
     if not class_name or not file_name.endswith(".py"):
         return None
@@ -53,7 +53,7 @@ def _read_source(name: str, folder: Path) -> ControllerSource | None:
 
 
 def source_to_json(source: ControllerSource | None) -> dict[str, Any]:
-    """Return the entries of a JSON file that contain the text of a controller.
+    """Return the JSON entries that contain the source text of a controller.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def source_to_json(source: ControllerSource | None) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``source``, and ``modules`` if its file imports other files of the user. Empty without a source.
+        ``source`` and, if the file imports other files of the user, ``modules``. Empty without a source.
     """
     if source is None:
         return {}

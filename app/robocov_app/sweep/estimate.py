@@ -1,4 +1,4 @@
-"""Estimate of the time and space that a sweep needs, from one of its runs."""
+"""Estimate of the computing time and disk space that a sweep needs, from one of its runs."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ class SweepEstimate:
     runs : int
         Number of all runs.
     left : int
-        Number of runs that are still to be done.
+        Number of runs that remain to be executed.
     axes : dict of str to int
         Number of values of each parameter.
     run : str
         Name of the trial run.
     error : str or None
-        Reason why it failed.
+        Reason why the trial run failed; None if it did not.
     seconds_a_run : float, s
         Computing time of the trial run.
     bytes_a_run : int
-        Size of its files.
+        Size of the files of the trial run.
     seconds : float, s
-        Estimated time for all runs that are left.
+        Estimated time for all remaining runs.
     bytes : int
         Estimated size of the files of all runs.
     notes : list of str
-        Remarks on runs that were done before.
+        Remarks on runs that were executed earlier.
     """
 
     runs: int
@@ -56,7 +56,7 @@ class SweepEstimate:
 def estimate_sweep(
     study: Study, folder: Path, *, workers: int, retry_failed: bool = False, keep_versions: bool = False
 ) -> SweepEstimate:
-    """Estimate a sweep from its first run that is left, without writing anything.
+    """Estimate a sweep from its first remaining run, without writing anything.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def estimate_sweep(
     folder : Path
         Folder of the sweep; it need not exist.
     workers : int
-        Number of runs at the same time.
+        Number of runs that are executed at the same time.
     retry_failed, keep_versions : bool
         See `robocov_app.sweep.sweeping.sweep`.
 
@@ -76,9 +76,9 @@ def estimate_sweep(
         generate_tasks(study), retry_failed=retry_failed, keep_versions=keep_versions
     )
     left = sum(survey.is_left)
-    # If no run is left, the first one of all shows the time and space.
+    # If no run remains, the very first one is measured.
     task = next(compress(generate_tasks(study), survey.is_left), None) or next(generate_tasks(study))
-    # The cost is prepared once for all runs on a map.
+    # Not timed: the coverage cost is prepared only once for all runs on a map.
     prepare_cost(task)
     started = time.perf_counter()
     outcome = perform(task)

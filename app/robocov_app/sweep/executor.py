@@ -1,4 +1,4 @@
-"""The interface of executors of tasks, and their recovery when a worker ends in the middle of a task."""
+"""The interface of executors of tasks, and their recovery if a worker ends in the middle of a task."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, build_failure
 
 _MAX_ENDS_PER_TASK = 2
-"""Number of workers that a task may end before it counts as failed."""
+"""A task counts as failed once it has ended this many workers."""
 _MAX_CONSECUTIVE_ENDS = 20
-"""Number of workers that may end consecutively, without a finished task between them."""
+"""Maximum number of workers that may end in a row, without any finished task in between."""
 _MAX_CONSECUTIVE_ENDS_PER_TASK = 4
-"""The same for each task that is executed at the same time."""
+"""The same maximum, per task that is executed at the same time; the larger of both applies."""
 
 
 class LostWorker(NamedTuple):
@@ -27,9 +27,9 @@ class LostWorker(NamedTuple):
     cause: str
     """Description of the reason."""
     details: str
-    """Last output of the worker."""
+    """End of the worker's output."""
     is_caused_by_task: bool
-    """Whether the task itself certainly ended the worker."""
+    """Whether it is certain that the task itself ended the worker."""
 
 
 Result: TypeAlias = tuple[Task, Outcome | LostWorker]
@@ -37,11 +37,11 @@ Result: TypeAlias = tuple[Task, Outcome | LostWorker]
 
 
 class Executor(ABC):
-    """Executes tasks; a context manager, whose end stops all of them.
+    """Executes tasks; leaving its context stops all of them.
 
-    A task whose worker has ended is repeated, without other tasks at the same time if one of them may have
-    caused the end. If workers have ended twice because of it, the task has failed. If workers end again and
-    again, an OutputError is raised.
+    If a worker ends during a task, the task is repeated. If another task may have been the cause, it is
+    repeated in isolation, which means that no other task runs at the same time. A task that has ended two
+    workers counts as failed. If too many workers end in a row, an OutputError is raised.
 
     Attributes
     ----------
@@ -68,20 +68,20 @@ class Executor(ABC):
     @property
     @abstractmethod
     def capacity(self) -> int:
-        """Number of tasks to start at the same time so that no worker is idle."""
+        """Number of tasks to run at the same time so that no worker is idle."""
 
     @property
     def waiting_reason(self) -> str:
-        """Reason why no worker is running; empty if one is."""
+        """Reason why no worker is running; empty if a worker is running."""
         return ""
 
     @property
     def unfinished_tasks(self) -> int:
-        """Number of tasks that have been submitted and not returned."""
+        """Number of tasks that were submitted and have not been returned yet."""
         return self._running + len(self._waiting) + len(self._waiting_for_isolation)
 
     def submit(self, task: Task) -> None:
-        """Add a task.
+        """Submit a task, which starts as soon as there is capacity.
 
         Parameters
         ----------
@@ -91,27 +91,29 @@ class Executor(ABC):
         self._start_tasks()
 
     def wait_for_next(self, timeout: float) -> tuple[Task, Outcome] | None:
-        """Return a finished task and its outcome, in any order.
+        """Wait for the next task to finish, and return it with its outcome.
 
         Parameters
         ----------
         timeout : float, s
+            Maximum waiting time.
 
         Returns
         -------
         (Task, Outcome) or None
-            None if no task finishes in this time.
+            None if no task finishes within this time, or if its worker has ended and it will be repeated.
 
         Raises
         ------
         OutputError
-            If workers end repeatedly.
+            If too many workers end in a row.
         """
         self._start_tasks()
         result = self._wait_for_result(timeout)
         if result is None:
             return None
         task, outcome = result
+        # Whether another task may have ended the worker. A task in isolation has no others.
         had_others = self._running > 1
         self._is_isolated = False
         self._running -= 1
@@ -130,7 +132,7 @@ class Executor(ABC):
         """Start a task."""
 
     def _add_future(self, task: Task, future: Future[Any]) -> None:
-        """Report a task as finished once its future is done."""
+        """Arrange that a task is reported as finished once its future is done."""
         future.add_done_callback(lambda done: self._finished.put((task, done)))
 
     def _wait_for_result(self, timeout: float) -> Result | None:
@@ -145,7 +147,10 @@ class Executor(ABC):
         return future.result()  # type: ignore[no-any-return]
 
     def _start_tasks(self) -> None:
-        """Start waiting tasks while there is capacity; an isolated one only if no other is running."""
+        """Start waiting tasks while there is capacity; a task that needs isolation starts if none is running.
+
+        While a task waits for isolation, no others are started, so that the running ones can finish.
+        """
         must_isolate = self._is_isolated or bool(self._waiting_for_isolation)
         while self._waiting and not must_isolate and self._running < self.capacity:
             self._start(self._waiting.popleft())
@@ -156,7 +161,16 @@ class Executor(ABC):
             self._start(self._waiting_for_isolation.popleft())
 
     def _handle_lost_worker(self, task: Task, lost: LostWorker, *, had_others: bool) -> Outcome | None:
-        """Let the task be repeated, and return None; or return its failure."""
+        """Schedule the task again and return None, or return its failure if it has ended too many workers.
+
+        Parameters
+        ----------
+        task : Task
+            The task whose worker ended.
+        lost : LostWorker
+        had_others : bool
+            Whether other tasks were running at the same time.
+        """
         self.lost_workers += 1
         self._consecutive_ends += 1
         max_ends = max(_MAX_CONSECUTIVE_ENDS, _MAX_CONSECUTIVE_ENDS_PER_TASK * self.capacity)

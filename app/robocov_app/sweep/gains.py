@@ -1,4 +1,4 @@
-"""Gains in a study: every combination that is tried of one controller."""
+"""Gains in a study: all combinations that are tried for a controller."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Gains:
     choices : tuple of dict of str to float, str or None
         The sets of gains that are tried, each with a value for every gain.
     ranges : mapping of str to Range
-        The ranges that were sampled.
+        The ranges from which gains were sampled.
     """
 
     choices: tuple[Mapping[str, Value], ...]
@@ -36,7 +36,7 @@ class Gains:
 
 
 GainsSpecification: TypeAlias = Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]
-"""Gains of a controller as a study defines them; see `build_gains`."""
+"""Gains of a controller as given in a study; see `build_gains`."""
 
 
 def build_gains(
@@ -45,14 +45,14 @@ def build_gains(
     sampling: Sampling | None,
     path: JsonPath = (),
 ) -> Gains:
-    """Build the sets of gains that a study tries of one controller.
+    """Build the sets of gains that a study tries for a controller.
 
     Parameters
     ----------
     controller_class : type
     specification : mapping, sequence of mapping, or Gains
-        A mapping of each gain to a value, to a list of values, or to a `Range`: every combination is tried.
-        Or a list of sets of gains. Gains that are not named have their defaults.
+        Either a mapping of gains to a value, a list of values or a `Range`, of which every combination is
+        tried; or a list of sets of gains. Gains that are not mentioned have their defaults.
     sampling : Sampling or None
         How ranges are sampled.
     path : tuple of str and int
@@ -104,7 +104,7 @@ def _combine_gains(
     for listed_values, sampled_values in product(product(*lists.values()), samples):
         values = dict(zip(names, (*listed_values, *sampled_values), strict=True))
         choices.append(_complete_gains(controller_class, values))
-    # Samples of a range that is narrower than their digits are equal.
+    # Samples are rounded, so those from a very narrow range may be equal.
     require_distinct(choices, (*path, "samples"))
     return Gains(tuple(choices), ranges)
 
@@ -112,7 +112,7 @@ def _combine_gains(
 def _draw_samples(
     ranges: Mapping[str, Range], sampling: Sampling | None, path: JsonPath
 ) -> list[tuple[float, ...]]:
-    """Draw joint samples of ranges; a single empty one if there are no ranges."""
+    """Draw joint samples of ranges, each a value per range; a single empty sample if there are no ranges."""
     if not ranges:
         return [()]
     if sampling is None:
@@ -124,7 +124,7 @@ def _draw_samples(
 
 
 def _complete_gains(controller_class: type[Any], values: Mapping[str, Value]) -> Mapping[str, Value]:
-    """Return a value for every gain of a controller, after the controller itself has checked them."""
+    """Return a value for every gain, with defaults filled in, after the controller has checked them."""
     return get_gain_values(instantiate_controller(controller_class, values))
 
 
@@ -137,7 +137,7 @@ def _parse_value(known: Mapping[str, Gain | Option], name: str, value: object, p
 
 
 def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) -> Gain | Option:
-    """Return a gain by its name."""
+    """Return a gain by its name; raise ParameterError if the controller has no such gain."""
     if name in known:
         return known[name]
     # The path leads to the value of the gain, or to an item in a list of values.
@@ -150,7 +150,7 @@ def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) ->
 
 
 def _parse_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: JsonPath) -> Range:
-    """Check a range against the limits of its gain."""
+    """Check a range against the limits of its gain, and return it with parsed ends."""
     gain = _find_gain(known, name, path)
     if isinstance(gain, Option):
         choices = ", ".join(gain.choices)
@@ -172,7 +172,7 @@ def _parse_range(known: Mapping[str, Gain | Option], name: str, given: Range, pa
 
 
 def _parse_range_end(gain: Gain, value: float | None, path: JsonPath) -> float:
-    """Check one end of a range, which must be finite even if the gain itself may be unlimited."""
+    """Check one end of a range, which must be finite even if the gain may be unlimited."""
     if value is None:
         raise ParameterError(f"{format_path(path)}: expected a number, got {quote(None)}")
     return validate_at(path, partial(gain.validate, value, "")) or 0.0

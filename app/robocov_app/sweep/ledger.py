@@ -1,10 +1,11 @@
-"""The folder of a sweep: each run in a folder of its own, complete or absent, with checksums.
+"""The folder of a sweep: each run has its own folder, which is complete or absent, with checksums.
 
-There is no database next to the folders. An SQLite index of 2000 runs saved 0.1 ms a run when a sweep was
-resumed (0.07 instead of 0.17 ms, as the checksums must be verified in any case), but each of its transactions
-took 4 ms in addition to the 6 ms for the folder of the run. It would be a second description of the runs that
-may contradict the first one after a crash or after a user has removed a folder, and its write-ahead log does
-not work on network file systems, where sweeps of clusters are written.
+There is no database in addition to the folders. An SQLite index of 2000 runs saved 0.1 ms per run when a
+sweep was resumed (0.07 instead of 0.17 ms, since checksums must be verified in any case), but each
+transaction took 4 ms in addition to the 6 ms for the folder of the run. The index would be a second
+description of the runs, which may contradict the first one after a crash or after a user has removed a
+folder. Moreover, its write-ahead log does not work on network file systems, to which sweeps on clusters are
+written.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from robocov_app.sweep.worker import FIGURES, Outcome, list_result_versions
 from robocov_app.terminal.output import write_json
 
 _ROW_FILE = "row.json"
-"""File in the folder of a run with its figures in the table and the checksums of its other files."""
+"""File in the folder of a run with its figures for the table and the checksums of its other files."""
 _ROW_FORMAT = "robocov-row"
 _ROW_VERSION = 2
 _CHECKSUM_BYTES = 16
@@ -40,20 +41,20 @@ _TEMPORARY_NAME = re.compile(
 )
 """Names of incomplete files and folders, which a killed sweep leaves behind."""
 _MAX_NAMED_RUNS = 5
-"""Maximum number of damaged runs that are named."""
+"""Maximum number of damaged runs that a message names."""
 
 
 class Entry(NamedTuple):
     """The ledger's entry of a run."""
 
     figures: Mapping[str, float | int | None]
-    """Figures in the table; none if the run failed."""
+    """Figures in the table; empty if the run failed."""
     error: str | None
-    """Reason why it failed."""
+    """Reason why the run failed; None if it did not."""
     versions: Mapping[str, str] = {}
-    """Versions on which the results depend, by package."""
+    """Versions of the packages on which the results depend."""
     has_checksums: bool = True
-    """Whether its files were written with checksums."""
+    """Whether the files of the run have checksums."""
 
 
 class DamagedRunError(ValueError):
@@ -67,15 +68,15 @@ class Survey:
     Attributes
     ----------
     is_left : bytearray
-        1 for each run that is to be done, 0 for the others, in the order of the tasks.
+        1 for each run that remains to be executed, 0 for the others, in the order of the tasks.
     damaged : list of str
         Names of damaged runs.
     outdated : Counter
-        Number of runs of other versions, by the differences.
+        Number of runs with other versions, by the description of the differences.
     without_checksums : int
-        Number of used runs without checksums.
+        Number of reused runs without checksums.
     failed : int
-        Number of used runs that failed.
+        Number of reused runs that failed.
     """
 
     is_left: bytearray = field(default_factory=bytearray)
@@ -86,16 +87,16 @@ class Survey:
 
     @property
     def remaining(self) -> int:
-        """Number of runs that are to be done."""
+        """Number of runs that remain to be executed."""
         return sum(self.is_left)
 
     @property
     def reused(self) -> int:
-        """Number of runs that are used without repeating them."""
+        """Number of runs that are used without being repeated."""
         return len(self.is_left) - self.remaining
 
     def describe(self, *, keep_versions: bool) -> list[str]:
-        """Return remarks on damaged and earlier runs, one per line.
+        """Return remarks on damaged runs and on runs of other versions, one per line.
 
         Parameters
         ----------
@@ -139,7 +140,7 @@ class Ledger:
         self.runs_folder = folder / RUNS_FOLDER
 
     def read_entry(self, task: Task) -> Entry | None:
-        """Return the entry of a task; None if there is none, or if it is damaged."""
+        """Return the entry of a task; None if it is missing or damaged."""
         with suppress(DamagedRunError):
             return self._read_entry(task, checks_files=False)
         return None
@@ -147,7 +148,7 @@ class Ledger:
     def survey(
         self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
     ) -> Survey:
-        """Find the runs that are left.
+        """Find out which runs remain to be executed.
 
         Parameters
         ----------
@@ -168,7 +169,7 @@ class Ledger:
         return survey
 
     def _survey_task(self, survey: Survey, task: Task, *, retry_failed: bool, keep_versions: bool) -> bool:
-        """Add a task to the counts of a survey; return whether it is left."""
+        """Count a task in a survey; return whether it remains to be executed."""
         try:
             entry = self._read_entry(task, checks_files=True)
         except DamagedRunError:
@@ -193,7 +194,7 @@ class Ledger:
         Raises
         ------
         DamagedRunError
-            If the entry, or with `checks_files` any file of the run, has changed since it was written.
+            If the entry has changed since it was written or, with `checks_files`, any other file of the run.
         """
         folder = self.runs_folder / task.name
         if not os.path.lexists(folder):
@@ -216,7 +217,7 @@ class Ledger:
             raise DamagedRunError from fault
 
     def store(self, task: Task, outcome: Outcome) -> None:
-        """Write the folder of a run, completely or not at all; an earlier one is replaced.
+        """Write the folder of a run atomically; an earlier folder is replaced.
 
         Parameters
         ----------
@@ -226,7 +227,7 @@ class Ledger:
         Raises
         ------
         OutputError
-            If it cannot be written.
+            If the folder cannot be written.
         """
         target = self.runs_folder / task.name
         temporary = self.runs_folder / f".{task.name}.part"
@@ -257,17 +258,17 @@ class Ledger:
 
 
 def describe_version_differences(versions: Mapping[str, str]) -> str:
-    """Return the differences of versions from those of this process.
+    """Describe how versions differ from those of this process.
 
     Parameters
     ----------
     versions : mapping of str to str
-        Versions by package; a missing one does not count as different.
+        Versions by package; missing packages do not count as different.
 
     Returns
     -------
     str
-        As in ``numpy 2.0.1 instead of 2.1.0``; empty without differences.
+        Such as ``numpy 2.0.1 instead of 2.1.0``; empty if there are no differences.
     """
     differences = []
     for name, current in list_result_versions().items():
@@ -278,12 +279,12 @@ def describe_version_differences(versions: Mapping[str, str]) -> str:
 
 @contextmanager
 def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
-    """Open the ledger of a sweep, for one process at a time.
+    """Open the ledger of a sweep, locked so that only one process uses it at a time.
 
     Parameters
     ----------
     folder : Path
-        Folder of the sweep; it is created.
+        Folder of the sweep; it is created if necessary.
     study : mapping
         Content of ``study.json``.
 
@@ -294,9 +295,9 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     Raises
     ------
     InputError
-        If the folder contains anything but a sweep.
+        If the folder contains anything other than a sweep.
     OutputError
-        If it cannot be written to.
+        If the folder is not writable.
     """
     with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -311,7 +312,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
             for path in (*ledger.runs_folder.glob(".*"), *folder.glob(".*")):
                 if _TEMPORARY_NAME.fullmatch(path.name):
                     _remove(path)
-            # This file is written first, because it marks the folder as that of a sweep.
+            # This file comes first, because it marks the folder as the folder of a sweep.
             if not has_all_rows(folder):
                 write_json(folder / STUDY_FILE, study)
             ledger.runs_folder.mkdir(exist_ok=True)
@@ -322,7 +323,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
 
 
 def count_rows(folder: Path) -> int:
-    """Return the number of rows in the table of a sweep, 0 if there is no table."""
+    """Return the number of rows in the table of a sweep; 0 if there is no table."""
     with suppress(OSError), (folder / SWEEP_TABLE_FILE).open("rb") as file:
         return max(0, sum(1 for _ in file) - 1)
     return 0
@@ -337,7 +338,7 @@ def has_all_rows(folder: Path) -> bool:
 
 
 def is_sweep(folder: Path) -> bool:
-    """Return whether a folder is that of a sweep, even if its ``study.json`` is damaged."""
+    """Return whether a folder contains a sweep, even one with a damaged ``study.json``."""
     try:
         content = json.loads(_read_file(folder / STUDY_FILE))
     except OSError:
@@ -348,7 +349,10 @@ def is_sweep(folder: Path) -> bool:
 
 
 def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
-    """Read the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
+    """Read the versions of a run in format 1; raise DamagedRunError if its files contradict its row.
+
+    `figures` and `error` are those of the row. Failed runs have no versions.
+    """
     file_name = RUN_FILE if error is None else ERROR_FILE
     run = json.loads(_read_file(folder / file_name))
     if error is not None:
@@ -356,13 +360,14 @@ def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str
         return {}
     for name in FIGURES:
         value = run["summary"][name]
+        # The table contains the mean of values for each robot.
         expected = sum(value) / len(value) if isinstance(value, list) else value
         _require(figures[name] == expected)
     return dict(run["versions"])
 
 
 def _check_files(folder: Path, files: Mapping[str, tuple[int, str]]) -> None:
-    """Raise DamagedRunError if a file does not have its size and checksum."""
+    """Raise DamagedRunError unless each file has its recorded size and checksum."""
     for name, (size, checksum) in files.items():
         content = _read_file(folder / name)
         _require(len(content) == size and _compute_file_checksum(content) == checksum)
@@ -379,7 +384,7 @@ def _require(is_valid: bool) -> None:
 
 
 def _read_file(path: Path) -> bytes:
-    # A pipe, for example, may have no end.
+    # Reading something else, such as a pipe, might never end.
     if not path.is_file():
         raise FileNotFoundError(path)
     return path.read_bytes()

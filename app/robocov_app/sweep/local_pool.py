@@ -20,13 +20,13 @@ from robocov_app.terminal.supervision import describe_status
 _MAX_STARTS = 3
 """Number of attempts to start a process."""
 _MAX_OUTPUT_CHARS = 4000
-"""Length of the end of a process's error output that is kept."""
+"""Number of characters at the end of a process's error output that are kept."""
 _KILLED_STATUS = -getattr(signal, "SIGKILL", 9)
-"""Exit status of a process that a user, or the system when memory ran out, has ended."""
+"""Exit status of a process that was killed by a user, or by the system because memory ran out."""
 
 
 class LocalPool(Executor):
-    """Processes on this machine. Each executes one task at a time, and is replaced when it ends.
+    """Processes on this machine, each of which executes one task at a time and is replaced when it ends.
 
     Parameters
     ----------
@@ -49,14 +49,17 @@ class LocalPool(Executor):
 
     @property
     def capacity(self) -> int:
-        """One more than there are processes, so that the first idle one finds a task at once."""
+        """One more than the number of processes, so that the next idle one finds a task immediately."""
         return len(self._workers) + 1
 
     def _start(self, task: Task) -> None:
         self._add_future(task, self._threads.submit(self._execute, task))
 
     def _execute(self, task: Task) -> Outcome | LostWorker:
-        """Execute a task in an idle process. Called in a thread."""
+        """Execute a task in an idle process; called in a thread of the pool.
+
+        There are as many threads as processes, so that an idle process always exists.
+        """
         worker = self._idle_workers.pop()
         try:
             return worker.execute(task)
@@ -65,17 +68,17 @@ class LocalPool(Executor):
 
 
 class _WorkerProcess:
-    """A process that executes tasks; another one is started when it has ended."""
+    """A process that executes tasks; when it has ended, the next task starts another one."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        # Opened for appending, so that it can be emptied while the process writes to it.
+        # In append mode, the file can be emptied while the process has it open.
         self._error_output = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - see `close`
         self._is_stopped = False
         self._start_lock = threading.Lock()
 
     def kill(self) -> None:
-        """Kill the process; no other one is started."""
+        """Kill the process, and start no other one from now on."""
         with self._start_lock:
             self._is_stopped = True
             if self._process is not None:
@@ -91,7 +94,7 @@ class _WorkerProcess:
         process = self._process
         if process is None or process.poll() is not None:
             process = self._start()
-        # Only the output of this task is of interest, and the file must not grow forever.
+        # Keep only the output of this task, so that the file does not grow forever.
         self._error_output.truncate(0)
         reply = ask_process(process, task)
         if reply is not None and isinstance(reply.answer, Outcome):
@@ -99,7 +102,7 @@ class _WorkerProcess:
         status, output = self._end()
         cause = f"its process ended ({describe_status(status)})"
         if task.source is not None:
-            # The controller in a file of the user may have ended it.
+            # The controller of the user may have ended the process.
             cause = f"controller {task.controller!r}: {cause}"
         return LostWorker(cause, output, is_caused_by_task=status != _KILLED_STATUS)
 
@@ -124,7 +127,7 @@ class _WorkerProcess:
         raise OutputError(f"a worker process cannot be started: {reason}")
 
     def _end(self) -> tuple[int, str]:
-        """Make sure that the process has ended; return its exit status and the end of its error output."""
+        """End the process if it is running; return its exit status and the end of its error output."""
         status = 0
         if self._process is not None:
             status = end_process(self._process)

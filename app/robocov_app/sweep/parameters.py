@@ -1,4 +1,4 @@
-"""Parameters of the robots and of the conditions that a study may vary: values, units, names of columns."""
+"""Parameters of robots and conditions that a study may vary: their values, units and table columns."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ TEAM_PARAMETERS = (
     "sensing_range",
     "communication_range",
 )
-"""Parameters of the robots that a study may vary, and that each task contains."""
+"""Parameters of the robots that a study may vary and that every task contains."""
 KINEMATIC_DEFAULTS = {
     "kinematics": "point",
     "track_width": 0.0,
     "turning_rate": DEFAULT_TURNING_RATE_RAD_S,
 }
-"""Further parameters of the robots. A task contains only those that differ from these defaults."""
+"""Further parameters of the robots with their defaults; a task contains only those that differ."""
 EVENT_TYPES = {"fail": Failure, "join": Join}
-"""Conditions that are texts: ``3@20 5@40`` are two events in one run."""
+"""Conditions that are given as text, for example ``3@20 5@40`` for two events in the same run."""
 CONDITIONS = (*PARAMETERS, *EVENT_TYPES)
 """Conditions that a study may vary."""
 TEXT_PARAMETERS = (*EVENT_TYPES, "kinematics")
-"""Parameters whose values are texts."""
+"""Parameters whose values are text."""
 GROUPS = "groups"
-"""Parameter of a team of different robots: the groups of a team file, as JSON."""
+"""Parameter for a team of different robots: the groups as in a team file, as JSON text."""
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*TEXT_PARAMETERS, GROUPS), "")}
 """Units of the parameters."""
 _MAX_NUMBER = 1e300
@@ -53,11 +53,11 @@ _NO_LIMIT_VALUES: dict[str, tuple[object, ...]] = {
     "sensing_range": (None, NO_LIMIT, math.inf),
     "communication_range": (None, NO_LIMIT, math.inf),
 }
-"""Values that mean no limit, of the parameters that need not have one."""
+"""Values that mean "no limit", for parameters that may be unlimited."""
 
 
 def name_parameter_column(name: str) -> str:
-    """Return the name of the column of a parameter, with its unit.
+    """Return the name of a parameter's column, which includes the unit.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def name_parameter_column(name: str) -> str:
 
 
 def format_parameter(name: str, value: ParameterValue) -> str:
-    """Format a value with its unit.
+    """Format the value of a parameter with its unit.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def format_parameter(name: str, value: ParameterValue) -> str:
 
 
 def _format_group(group: Mapping[str, Any]) -> str:
-    """Format the size of a group, and what distinguishes it."""
+    """Format the number of robots in a group, and the parameters in which they differ from the rest."""
     differences = []
     for name, value in group.items():
         if name != "count":
@@ -115,16 +115,17 @@ def parse_condition_axes(conditions: Mapping[str, Any]) -> dict[str, list[Parame
     Parameters
     ----------
     conditions : mapping of str to object
-        By the name of a condition, a value or a list of values.
+        A value or a list of values by the name of the condition.
 
     Returns
     -------
     dict of str to list
+        Values by the name of the condition.
 
     Raises
     ------
     ParameterError
-        If a condition is unknown, or a value cannot be used.
+        If a condition is unknown or a value is invalid.
     """
     axes: dict[str, list[ParameterValue]] = {}
     for name, given in conditions.items():
@@ -135,7 +136,7 @@ def parse_condition_axes(conditions: Mapping[str, Any]) -> dict[str, list[Parame
 
 
 def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
-    """Parse one value of a parameter of the team, or of a condition.
+    """Parse one value of a parameter of the robots, or of a condition.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
     Raises
     ------
     ParameterError
-        If the value cannot be used.
+        If the value is invalid.
     """
     if name == "kinematics":
         return _parse_kinematics(value, path)
@@ -172,7 +173,7 @@ def _parse_kinematics(value: object, path: JsonPath) -> str:
 
 
 def _parse_events(name: str, value: object, path: JsonPath) -> str:
-    """Parse failures or joins, and write them in one form."""
+    """Parse failures or joins, and return them in a uniform notation."""
     require_type(format_path(path), value, str, 'a string, as in "3@20"')
     try:
         events: list[Failure | Join] = [parse_event(EVENT_TYPES[name], word) for word in str(value).split()]
@@ -183,7 +184,7 @@ def _parse_events(name: str, value: object, path: JsonPath) -> str:
 
 def _parse_condition(name: str, value: object, path: JsonPath) -> ParameterValue:
     """Check a number against the range of its condition."""
-    # A long memory is compatible with all values of the other conditions.
+    # Conditions are checked together; with a long memory, all values of the others are valid.
     values: dict[str, Any] = {"forget_after": 1e6, name: value}
     conditions = validate_at(path, lambda: Conditions(**values))
     parsed: float | None = getattr(conditions, name)
@@ -206,7 +207,7 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
     Parameters
     ----------
     parameters : mapping of str to float, str or None
-        Values of parameters. Only the conditions are used.
+        Values of parameters, of which only the conditions are used.
     seed : int
         Seed of noise, message loss and failures.
     robots : int
@@ -215,7 +216,7 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
     Returns
     -------
     Conditions or None
-        None if they are ideal.
+        None if the conditions are ideal.
 
     Raises
     ------
@@ -245,12 +246,12 @@ def build_swept_team(robots: int, parameters: Mapping[str, ParameterValue]) -> T
     robots : int
         Number of robots.
     parameters : mapping of str to float, str or None
-        Values of parameters. Conditions are ignored.
+        Values of parameters; conditions are ignored.
 
     Returns
     -------
     Team
-        Equal robots, unless the parameters define groups.
+        A team of equal robots, unless the parameters define groups.
     """
     values: dict[str, Any] = {}
     for name in TEAM_PARAMETERS:

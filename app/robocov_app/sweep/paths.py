@@ -1,4 +1,4 @@
-"""Values of a study at their paths, which begin every message, as in ``gains.rapf.k_rep[1]: ...``."""
+"""Parsing values of a study; error messages begin with their path, as in ``gains.rapf.k_rep[1]: ...``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ T = TypeVar("T")
 
 
 def validate_at(path: JsonPath, validate: Callable[[], T]) -> T:
-    """Validate a value, and report errors with the path of the value.
+    """Validate a value; errors are reported with the path of the value.
 
     Parameters
     ----------
     path : tuple of str and int
     validate : callable
-        Returns the valid value. Raises ParameterError with a message that begins with a name and a colon,
-        which the path replaces.
+        Returns the valid value, or raises ParameterError. The name before the first colon of its message is
+        replaced by the path.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def validate_at(path: JsonPath, validate: Callable[[], T]) -> T:
 
 
 def parse_values(given: Any, path: JsonPath, parse: Callable[[Any, JsonPath], T]) -> list[T]:
-    """Parse a single value, or a list of values.
+    """Parse a single value or a list of values.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ def parse_values(given: Any, path: JsonPath, parse: Callable[[Any, JsonPath], T]
     Returns
     -------
     list
-        The parsed values; one if a single value was given.
+        The parsed values, as a list even if a single value is given.
 
     Raises
     ------
     ParameterError
-        If there is no value, or a value occurs twice.
+        If the list is empty or contains a value twice.
     """
     if not isinstance(given, Sequence) or isinstance(given, str):
         return [parse(given, path)]

@@ -17,31 +17,31 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 LINE_INTERVAL_S = 10.0
-"""Time between two lines if there is no terminal."""
+"""Time between two lines of progress if there is no terminal."""
 _MIN_WHOLE_RATE_PER_S = 10.0
-"""Higher rates are printed as whole numbers."""
+"""Rates from this one on are printed as whole numbers."""
 _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
-"""Length of a unit in seconds and its name, and those of the next smaller unit."""
+"""For each unit: its length in seconds and its name, and those of the next smaller unit."""
 
 
 @dataclass
 class SweepProgress:
-    """Number of runs of a sweep, and of those that are finished.
+    """Numbers of all runs and of finished runs of a sweep.
 
     Attributes
     ----------
     total : int
         Number of all runs.
     done : int
-        Number of runs that were done now.
+        Number of runs that were completed in this call.
     failed : int
-        Number of runs that have failed now.
+        Number of runs that failed in this call.
     reused : int
-        Number of runs that were done or had failed before.
+        Number of runs that were completed or failed in earlier calls.
     lost_workers : int
-        Number of workers that have ended during a run.
+        Number of workers that ended during a run.
     waiting_reason : str
-        Reason why no worker is running; empty if one is.
+        Reason why no worker is running; empty if a worker is running.
     start_time : float
         Time at which the first run was started, on the clock of `time.perf_counter`, s.
     """
@@ -61,7 +61,7 @@ class SweepProgress:
 
     @property
     def rate(self) -> float:
-        """Runs per second; 0 before the first one."""
+        """Number of runs per second in this call; 0 before the first one."""
         seconds = time.perf_counter() - self.start_time
         if seconds <= 0:
             return 0.0
@@ -69,13 +69,13 @@ class SweepProgress:
 
     @property
     def remaining_time(self) -> float | None:
-        """Estimate of the time to the end, s; None before the first run."""
+        """Estimated remaining time, s; None before the first run."""
         if not self.rate:
             return None
         return (self.total - self.finished) / self.rate
 
     def describe_outlook(self) -> str:
-        """Return the remaining time as text, or the reason why all runs wait; empty if neither is known."""
+        """Return the reason why all runs wait, or the remaining time, as text; empty if neither is known."""
         if self.waiting_reason:
             return self.waiting_reason
         if not self.remaining_time:
@@ -123,7 +123,7 @@ class ProgressReporter:
         self._reported_reason = ""
 
     def update(self, progress: SweepProgress) -> None:
-        """Show the progress: in the bar at once, in a line if it is time for one."""
+        """Show the progress: in the bar immediately, as a line only when the next one is due."""
         if self._bar is not None:
             task = self._bar.task_ids[0]
             self._bar.update(
@@ -158,7 +158,7 @@ def report_progress(title: str, progress: SweepProgress, *, quiet: bool) -> Iter
     title : str
         Title of the bar, or beginning of each line.
     progress : SweepProgress
-        The progress. Without a terminal, its last state is printed at the end.
+        The progress, whose final state is printed at the end if there is no terminal.
     quiet : bool
         Whether nothing is printed.
 
@@ -188,7 +188,7 @@ def report_progress(title: str, progress: SweepProgress, *, quiet: bool) -> Iter
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration in its two largest units.
+    """Format a duration in its two largest units.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ranges of gains, and quasi-random samples of them."""
+"""Ranges of gains, and quasi-random samples from them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SamplingMethod: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 MAX_SAMPLES = 100_000
 MAX_SEED = 2**63 - 1
 _SAMPLE_DIGITS = 6
-"""Significant digits of a sampled gain. Further digits would differ between processors."""
+"""Number of significant digits of a sampled gain; further digits could differ between processors."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Range:
     low, high : float
         Ends of the range, both included, in the unit of the gain.
     scale : {"linear", "log"}
-        Whether samples are evenly distributed by value, or by logarithm.
+        Whether the values or their logarithms are uniformly distributed.
     """
 
     low: float
@@ -41,7 +41,7 @@ class Range:
         Parameters
         ----------
         fractions : (m,) array
-            From 0, the lower end, to 1, the upper end.
+            From 0 for the lower end to 1 for the upper end.
 
         Returns
         -------
@@ -56,14 +56,14 @@ class Range:
         values = []
         for value in exact.tolist():
             rounded = float(f"{value:.{_SAMPLE_DIGITS}g}")
-            # Rounding may lead out of the range.
+            # Rounded values may be outside the range.
             values.append(min(max(rounded, self.low), self.high))
         return values
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Joint sampling of the ranges of a controller, by a scrambled sequence of `scipy.stats.qmc`.
+    """Joint sampling of the ranges of a controller, with a scrambled sequence from `scipy.stats.qmc`.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Sampling:
     Raises
     ------
     ParameterError
-        If a value cannot be used.
+        If a value is invalid.
     """
 
     method: SamplingMethod = "sobol"

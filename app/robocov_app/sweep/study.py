@@ -1,4 +1,4 @@
-"""A study: the definition of a sweep, with all combinations that it tries."""
+"""A study: the definition of a sweep, with all combinations to try."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _MAX_LATTICE = 2048
 _MAX_NUMBERS = {"duration": 1e6, "dt": 1.0, "cost_hz": 1e4, "record_hz": 1e4}
 """Maximum values of a study's numbers, in s and Hz."""
 Swept: TypeAlias = float | Sequence[float | None] | None
-"""One value, or a list of values that are all tried."""
+"""A single value, or a list of values that are all tried."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class StudyMap:
     Attributes
     ----------
     name : str
-        Its name in the table.
+        Name of the map in the table.
     environment : Environment
     """
 
@@ -93,12 +93,13 @@ class Study:
     controllers : sequence of str
         Names of controllers, or ``file.py:Class``.
     gains : mapping of str to Gains
-        Sets of gains that are tried of each controller. Given as `build_gains` accepts it; controllers that
-        are not named have their default gains.
+        Sets of gains to try for each controller, in any form that `build_gains` accepts. Controllers that are
+        not mentioned have their default gains.
     robots : sequence of int
         Numbers of robots.
     starts : sequence of str
-        Names of starts of every map; by default the first of each map, ``("*",)`` for all of each map.
+        Names of starts, which every map must have. By default the first start of each map is used;
+        ``("*",)`` selects all starts of each map.
     seeds : sequence of int
         Seeds of the starting positions and of the conditions.
     duration, dt : float, s
@@ -107,34 +108,34 @@ class Study:
         Parameters of the robots in SI units, see `robocov.Team`: a value, or a list of values that are all
         tried. None means no limit.
     kinematics, track_width, turning_rate
-        Further parameters of the robots, likewise.
+        Further parameters of the robots, with one or several values as above.
     conditions : mapping of str to object
-        By the name of a condition, a value or a list of values.
+        A value or a list of values by the name of the condition.
     group : sequence of mapping
         Groups of different robots, as in a team file.
     lattice : int
-        The cost is computed on this number of sites along each side of the map.
+        Number of sites along each side of the map at which the cost is computed.
     cost_hz : float, Hz
-        Rate at which the cost is evaluated; 0 for the first and the last step only.
+        Rate at which the cost is evaluated; 0 means only at the first and last step.
     record_hz : float, Hz
-        Rate at which trajectories are saved; 0 for the first and the last step only.
+        Rate at which trajectories are saved; 0 means only the first and last step.
     metrics : bool
         Whether the table also contains the metrics of `robocov.metrics.run_metrics`.
     sampling : Sampling or None
         How ranges of gains are sampled.
     max_runs : int
-        A study with more runs is rejected.
+        Maximum number of runs; larger studies are rejected.
     folder : Path
         Folder to which relative paths of controllers refer.
     sources : mapping of str to ControllerSource
-        Texts of the controllers in files of the user, read when the study is built.
+        Source texts of controllers in files of the user, which are read when the study is built.
     teams : tuple of dict of str to float, str or None
         All combinations of the parameters of the robots and the conditions.
 
     Raises
     ------
     InputError
-        If a value cannot be used. The message begins with its path, as in ``gains.rapf.k_rep[1]``.
+        If a value is invalid. The message begins with its path, as in ``gains.rapf.k_rep[1]``.
     """
 
     maps: tuple[StudyMap, ...]
@@ -180,11 +181,11 @@ class Study:
         self._check_record_size()
 
     def _set(self, name: str, value: object) -> None:
-        """Replace a given value by its resolved form, while the study is built."""
+        """Replace a given value by its resolved form while the frozen study is being built."""
         object.__setattr__(self, name, value)
 
     def _check_size(self) -> None:
-        """Raise an error if there are too many runs, before anything is combined."""
+        """Raise an error if there are too many runs, before combinations are built."""
         require_number("max_runs", self.max_runs, 1, MAX_MAX_RUNS, whole=True)
         names = ("maps", "robots", "seeds", *TEAM_PARAMETERS, *KINEMATIC_DEFAULTS)
         counts = {name: count_values(getattr(self, name)) for name in names}
@@ -196,7 +197,7 @@ class Study:
         require_few_runs(counts, self.controllers, self.gains, self.sampling, self.max_runs)
 
     def _resolve_group_size(self) -> None:
-        """Take the number of robots from the groups, if there are groups."""
+        """Set the number of robots to that of the groups, if there are groups."""
         if not self.group:
             return
         size = len(build_team(list(self.group), ("team", "group")))
@@ -207,7 +208,7 @@ class Study:
         self._set("robots", (size,))
 
     def _check_names(self) -> None:
-        """Raise an error if a controller or a map has no proper name."""
+        """Raise an error if the name of a controller or a map is invalid."""
         for index, controller in enumerate(self.controllers):
             require_type(f"controllers[{index}]", controller, str, "a string")
         for index, study_map in enumerate(self.maps):
@@ -259,7 +260,7 @@ class Study:
                     raise type(error)(f"starts[{index}]: {error}") from None
 
     def _resolve_teams(self) -> None:
-        """Combine the parameters of the robots and the conditions."""
+        """Set `teams` to all combinations of the parameters of the robots and the conditions."""
         names = list(TEAM_PARAMETERS)
         # Defaults are left out, so that tasks without these parameters keep their hashes.
         names += [name for name, default in KINEMATIC_DEFAULTS.items() if getattr(self, name) != default]
@@ -274,7 +275,7 @@ class Study:
         self._set("teams", tuple(_combine(axes | condition_axes)))
 
     def _check_conditions(self, combinations: Sequence[Mapping[str, ParameterValue]]) -> None:
-        """Raise an error if conditions are impossible with a number of robots, or on a map."""
+        """Raise an error if conditions are impossible with one of the numbers of robots, or on a map."""
         for values in combinations:
             for robots in self.robots:
                 conditions = build_conditions(values, seed=0, robots=robots)
@@ -282,7 +283,7 @@ class Study:
                     check_joins(study_map.environment, conditions)
 
     def _resolve_controllers(self) -> None:
-        """Load all controllers, and build the sets of their gains."""
+        """Load all controllers, and build their sets of gains."""
         for name in self.gains:
             if name not in self.controllers:
                 unknown = describe_unknown_name("controller of the study", name, self.controllers)
@@ -325,30 +326,30 @@ class Study:
 
     @property
     def has_mixed_speeds(self) -> bool:
-        """Whether some robots are faster than others in a run."""
+        """Whether the robots of a run differ in maximum speed."""
         if not self.group:
             return False
         return any(build_swept_team(self.robots[0], team).has_mixed_speeds for team in self.teams)
 
     def get_gains(self, controller: str) -> Gains:
-        """Return the sets of gains that are tried of a controller."""
+        """Return the sets of gains that are tried for a controller."""
         return cast("Gains", self.gains[controller])
 
     def list_starts(self, study_map: StudyMap) -> tuple[str, ...]:
-        """Return the names of the starts of a map that are used."""
+        """Return the names of the starts of a map that the study uses."""
         environment = study_map.environment
         starts = tuple(self.starts)
         if starts == (ALL_STARTS,):
             starts = tuple(environment.starts)
-        # A map without starts has one by default.
+        # A map without starts has a default one.
         return starts or (environment.start().name,)
 
     def load_controller_class(self, controller: str) -> type[Any]:
-        """Return the class of a controller, from the text that the study contains."""
+        """Return the class of a controller, built from the source text in the study if there is one."""
         return load_controller_class(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of ``study.json``, except for the columns of the table."""
+        """Return the content of ``study.json``, apart from the columns of the table."""
         controllers = [{"name": name, **source_to_json(self.sources.get(name))} for name in self.controllers]
         return {
             "format": "robocov-study",
@@ -374,5 +375,5 @@ class Study:
 
 
 def _combine(axes: Mapping[str, Sequence[ParameterValue]]) -> list[dict[str, ParameterValue]]:
-    """Return every combination of values; those of the last axis vary fastest."""
+    """Return all combinations of values, by the names of the axes; the last axis varies fastest."""
     return [dict(zip(axes, values, strict=True)) for values in product(*axes.values())]

@@ -43,7 +43,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
 
 
 def _list_shorter_costs(cost: str) -> list[str]:
-    """Return a cost as text, without its name, and without the mean time."""
+    """Return ever shorter texts of a cost: all of it, without the name, and without name and mean time."""
     without_name = cost.replace("mean distance by φ ", "").replace("mean distance ", "")
     return [cost, without_name, without_name.partition(",")[0]]
 
@@ -66,7 +66,9 @@ def draw_status(canvas: Canvas, scene: Scene) -> None:
 
 
 def fit_status(scene: Scene, size: int, width: float) -> str:
-    """Return the status without the name of the controller; the least important facts are left out.
+    """Return the longest status text that fits into a width, without the name of the controller.
+
+    The facts are the time, the cost and the map; those at the end are dropped first.
 
     Parameters
     ----------

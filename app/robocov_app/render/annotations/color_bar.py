@@ -22,7 +22,7 @@ _TOLERANCE = 1e-9
 
 
 def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
-    """Draw the color scale, if the distance map is visible."""
+    """Draw the color scale of the distance map, with labeled ticks, at the right of the view."""
     if "distances" not in canvas.visible_layers:
         return
     theme = canvas.theme
@@ -41,7 +41,7 @@ def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
 
 
 def _find_box(canvas: Canvas, scene: Scene) -> pygame.Rect:
-    """Return the box of the colors."""
+    """Return the box that the colors fill: at the right edge, vertically centered in the view."""
     scale = canvas.scale
     surface_width, surface_height = canvas.surface.get_size()
     _, top, _, view_height = canvas.camera.view
@@ -53,7 +53,7 @@ def _find_box(canvas: Canvas, scene: Scene) -> pygame.Rect:
 
 
 def measure_color_bar(canvas: Canvas, scene: Scene) -> float:
-    """Return the width that the color scale needs at the right, px; 0 if it is not visible."""
+    """Return the width to reserve for the color scale at the right edge, px; 0 if it is not visible."""
     is_visible = {"distances", "color_bar"} <= canvas.visible_layers
     if scene.field is None or not is_visible:
         return 0.0
@@ -67,6 +67,7 @@ def _list_labels(scene: Scene) -> list[tuple[float, str]]:
     assert scene.field is not None
     ticks = list_color_ticks(scene.field_limit)
     texts = ["0", *(format_scale_length(tick) for tick in ticks[1:])]
+    # The last color also stands for all distances beyond the end of the scale.
     if scene.field.max_distance > scene.field_limit * (1.0 + _TOLERANCE):
         texts[-1] = f"≥ {texts[-1]}"
     return list(zip(ticks, texts, strict=True))

@@ -34,6 +34,7 @@ class LegendLayer:
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         """Draw the legend at the top of the surface."""
+        # All that the strip depends on; symbols have the color of the first robot.
         key = (
             tuple(entry.key for entry in canvas.legend),
             canvas.surface.get_width(),
@@ -82,7 +83,7 @@ def render_legend_image(
     scale: float,
     visible_layers: Set[str] = frozenset(),
 ) -> NDArray[np.uint8]:
-    """Render a legend without a picture.
+    """Render a legend as a picture of its own.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def render_legend_image(
 
 
 def arrange_legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:
-    """Distribute entries over the rows that they need on a canvas.
+    """Break the entries of a legend into rows that fit into the width of a canvas.
 
     Parameters
     ----------

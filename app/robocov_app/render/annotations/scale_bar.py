@@ -21,7 +21,9 @@ BAR_TEXT_GAP_PX = 8
 
 
 def is_low_pane(height: float, scale: float, visible_layers: Set[str]) -> bool:
-    """Return whether a pane is too low for a strip below the arena; its scale bar is in the caption.
+    """Return whether a pane is too low for a strip below the arena.
+
+    The scale bar of such a pane is drawn in its caption.
 
     Parameters
     ----------

@@ -25,12 +25,12 @@ def choose_color_limit(distance: float) -> float:
     Parameters
     ----------
     distance : float, m
-        The largest distance to show.
+        Largest distance to show.
 
     Returns
     -------
     float, m
-        A round length that is not shorter; 1 m if the distance is not positive and finite.
+        The next round length from `distance` upwards; 1 m if the distance is not positive and finite.
 
     Examples
     --------
@@ -42,6 +42,7 @@ def choose_color_limit(distance: float) -> float:
     power = 10.0 ** np.floor(np.log10(distance))
     min_limit = distance * (1.0 - _TOLERANCE)
     limit = min(factor * power for factor in _LIMIT_FACTORS if factor * power >= min_limit)
+    # Formatting removes the rounding error of the multiplication.
     return float(f"{limit:.12g}")
 
 
@@ -56,7 +57,7 @@ def list_color_ticks(limit: float) -> list[float]:
     Returns
     -------
     list of float, m
-        From 0 to the limit.
+        Equally spaced round lengths from 0 to the limit.
 
     Examples
     --------
@@ -77,7 +78,7 @@ def list_color_ticks(limit: float) -> list[float]:
 
 
 def build_palette(theme: Theme) -> NDArray[np.uint8]:
-    """Build the palette of distances.
+    """Build the palette of the distance map, for the indices of `compute_color_levels`.
 
     Parameters
     ----------
@@ -86,7 +87,8 @@ def build_palette(theme: Theme) -> NDArray[np.uint8]:
     Returns
     -------
     (256, 3) array of uint8
-        RGB values from the nearest to the farthest, and two of points that no robot can reach.
+        RGB values: 254 from the nearest to the farthest distance, then the background and the hatching of
+        points that no robot can reach.
     """
     unreached = np.array([theme.unreached, theme.obstacle_edge], dtype=np.uint8)
     return np.concatenate([theme.build_heat_table(MAX_LEVEL + 1), unreached])
@@ -95,7 +97,7 @@ def build_palette(theme: Theme) -> NDArray[np.uint8]:
 def compute_color_levels(
     field: DistanceField, x: Array, y: Array, limit: float, hatch_px: int
 ) -> NDArray[np.uint8]:
-    """Compute the colors of the distances of a grid of points.
+    """Compute the palette indices of a grid of points by their distance to the nearest robot.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ def compute_color_levels(
     Returns
     -------
     (h, w) array of uint8
-        Indices in the palette.
+        Indices into the palette of `build_palette`.
     """
     distances = field.compute_distances(x, y)
     is_reached = np.isfinite(distances)

@@ -1,8 +1,9 @@
 """Distances to the nearest robot at every pixel of a picture, and the borders of geodesic cells.
 
-The coverage cost knows the exact distance of each site of a lattice and the last corner of the path to it. A
-pixel in a square between four sites is reached by one of their paths, from the same last corner or directly
-from the robot, so that its distance is nearly always exact.
+The coverage cost provides the exact distance of each site of a lattice, and the last corner at which the path
+to it bends. The shortest path to a pixel in a square between four sites nearly always comes from the last
+corner, or directly from the robot, of one of these sites. Each such path is a candidate: its length up to the
+last corner plus the straight line from there to the pixel. The shortest candidate gives the distance.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov_app.render.distance_map.lattice import FieldLattice
 
 _MIN_BORDER_ANGLE = 0.05
-"""Minimum angle between the directions to two robots, rad, so that borders stay thin."""
+"""Minimum growth of the difference of two distances per meter, so that the division below stays finite.
+
+For small angles it is the angle between the directions of the paths, rad.
+"""
 _BLOCK_PX = 4
 """Side of the blocks of pixels that are evaluated at their middle first."""
 _MAX_CANDIDATES = 5
@@ -56,11 +60,12 @@ class _Candidates(NamedTuple):
     Attributes
     ----------
     indices : (s, s) int array
-        Row of `sites` for each square; -1 for squares without a choice.
+        Row of each square in `sites` and `is_free`; -1 for squares without candidates.
     sites : (k, r) int array
+        The candidates of each such square.
     is_free : (k, 4, r) bool array
-        Whether no wall is between the last corner of each path and each corner of the square: through a
-        wall, the path would be shorter than the shortest one.
+        Whether the straight line from the last bend of each candidate to each corner of the square is free.
+        Through a wall, the candidate would be shorter than the exact distance of the corner.
     """
 
     indices: IntArray
@@ -69,12 +74,12 @@ class _Candidates(NamedTuple):
 
 
 class DistanceField:
-    """The distance to the nearest robot, and its number, for one set of positions.
+    """The distance to the nearest robot, and the row of this robot, for one set of positions.
 
     Parameters
     ----------
     lattice : FieldLattice
-        That of the sites of the result.
+        Built from the sites of the same coverage cost as the result.
     result : CoverageResult
 
     Attributes
@@ -92,12 +97,14 @@ class DistanceField:
         bends = result.positions[owners]
         is_bent = last_corners >= 0
         bends[is_bent] = result.corners[last_corners[is_bent]]
+        # The length of the path up to the last bend: 0 for straight paths.
         lengths = np.maximum(result.distances - np.hypot(*(result.points - bends).T), 0.0)
         lengths[~is_bent & (owners >= 0)] = 0.0
         self._bend_x, self._bend_y = np.ascontiguousarray(bends.T)
         self._lengths_to_bend = lengths
         self._owners = owners
-        # Sites whose paths have the same last bend and the same robot give the same distances.
+        # Sites whose paths come from the same corner (0 and above) or straight from the same robot (-2 and
+        # below; -1 without a robot) give the same distances.
         sources = np.where(last_corners >= 0, last_corners, -2 - owners)
         corner_sites = lattice.corner_sites
         is_mixed = _has_differences(sources[corner_sites])
@@ -109,7 +116,14 @@ class DistanceField:
         )
 
     def _build_candidates(self, is_selected: BoolArray, sites: IntArray) -> _Candidates:
-        """Build the candidates of selected squares, (s, s); `sites` are theirs, (k, r)."""
+        """Build the candidates of the selected squares of the lattice.
+
+        Parameters
+        ----------
+        is_selected : (s, s) bool array
+        sites : (k, r) int array
+            Candidates of each selected square, row by row.
+        """
         indices = np.full(is_selected.shape, -1, dtype=np.intp)
         indices[is_selected] = np.arange(len(sites))
         corner_sites = self.lattice.corner_sites[is_selected]
@@ -120,41 +134,42 @@ class DistanceField:
         return _Candidates(indices, sites, is_free)
 
     def _compute_distances(self, sites: IntArray, x: Array, y: Array) -> Array:
-        """Return the lengths of the paths of sites if they ended at other points instead, m."""
+        """Return the lengths of the paths to sites, m, if each led from its last bend to (x, y) instead."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._lengths_to_bend[sites])
 
     def _compare_candidates(self, candidates: _Candidates, indices: IntArray, x: Array, y: Array) -> Array:
-        """Return the distances of points by each candidate of their squares.
+        """Return the distance of each point along each candidate of its square.
 
         Parameters
         ----------
         candidates : _Candidates
         indices : (k,) int array
-            Rows of the candidates.
+            Row of the square of each point in `candidates.sites`.
         x, y : (k,) array, m
 
         Returns
         -------
         (k, r) array, m
-            inf behind a wall.
+            inf for candidates that a wall separates from the corner nearest to the point.
         """
         distances = self._compute_distances(candidates.sites[indices], x[:, None], y[:, None])
         x_steps, y_steps = self.lattice.to_steps(x, y)
+        # Corners 0 to 3: lower left, lower right, upper left, upper right.
         nearest_corners = 2 * _is_in_upper_half(y_steps) + _is_in_upper_half(x_steps)
         return np.where(candidates.is_free[indices, nearest_corners], distances, np.inf)
 
     @property
     def max_distance(self) -> float:
-        """The largest distance of a site that a robot can reach, m; nan if there is none."""
+        """The largest distance among the sites that a robot can reach, m; nan if there is no such site."""
         reached = self.result.distances[self._owners >= 0]
         if not len(reached):
             return float("nan")
         return float(reached.max())
 
     def compute_distances(self, x: Array, y: Array) -> Array:
-        """Compute the distances of a grid of points.
+        """Compute the distance to the nearest robot for a grid of points.
 
         Parameters
         ----------
@@ -167,6 +182,7 @@ class DistanceField:
             inf if no robot can reach the point.
         """
         columns, rows = self.lattice.find_squares(x, y)
+        # Most squares have a single candidate, which is that of their first corner.
         sites = self.lattice.corner_sites[..., 0][rows[:, None], columns]
         distances = self._compute_distances(sites, np.broadcast_to(x, sites.shape), y[:, None])
         indices = self._distance_candidates.indices[rows[:, None], columns]
@@ -181,7 +197,7 @@ class DistanceField:
         return distances
 
     def compute_cells(self, x: Array, y: Array, max_distance: float) -> tuple[IntArray, BorderPixels]:
-        """Compute the geodesic cells of a grid of points.
+        """Compute the nearest robot for a grid of points, and the points near a border between robots.
 
         Parameters
         ----------
@@ -207,19 +223,19 @@ class DistanceField:
         return owners, fine.select_within(max_distance)
 
     def compute_borders(self, x: Array, y: Array, max_distance: float) -> BorderPixels:
-        """Compute the pixels near borders of geodesic cells; for the arguments see `compute_cells`."""
+        """Compute only the pixels near borders of geodesic cells; see `compute_cells` for the parameters."""
         _, fine = self._evaluate_borders(x, y, max_distance)
         return fine.select_within(max_distance)
 
     def _evaluate_borders(self, x: Array, y: Array, max_distance: float) -> tuple[BorderPixels, BorderPixels]:
-        """Evaluate the pixels of squares with candidates.
+        """Evaluate the pixels of squares with candidates: coarsely in blocks, then finely near borders.
 
         Returns
         -------
         coarse : BorderPixels
-            Pixels with the values at the middle of their block.
+            All pixels of these squares, with the values at the middle of their block.
         fine : BorderPixels
-            Pixels with their own values: those that may be within the maximum distance, m, of a border.
+            Pixels that may be within the maximum distance, m, of a border, with their own values.
         """
         block_rows, block_columns = self._find_blocks(x, y)
         middle_x = compute_block_middles(x, _BLOCK_PX)
@@ -239,7 +255,7 @@ class DistanceField:
         return _spread_over_pixels(blocks, len(y), len(x)), fine
 
     def _find_blocks(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
-        """Return rows and columns of the blocks with a corner in a square that has candidates."""
+        """Return rows and columns of the blocks of pixels with a corner in a square that has candidates."""
         columns, rows = self.lattice.find_squares(x, y)
         has_candidates = self._border_candidates.indices >= 0
         has_corner = [
@@ -251,7 +267,19 @@ class DistanceField:
         return block_rows, block_columns
 
     def _evaluate_pixels(self, rows: IntArray, columns: IntArray, x: Array, y: Array) -> BorderPixels:
-        """Evaluate pixels at some rows and columns of a grid; those without candidates are left out."""
+        """Return the nearest robot of pixels, and their distance to the border with the second nearest.
+
+        Parameters
+        ----------
+        rows, columns : (k,) int array
+            Pixels of the grid. Those in squares without candidates are left out.
+        x : (w,) array, m
+        y : (h,) array, m
+
+        Returns
+        -------
+        BorderPixels
+        """
         square_columns, square_rows = self.lattice.find_squares(x, y)
         indices = self._border_candidates.indices[square_rows[rows], square_columns[columns]]
         chosen = (indices >= 0).nonzero()[0]
@@ -270,16 +298,16 @@ class DistanceField:
         second = other_distances.argmin(axis=1)
         nearest_dx, nearest_dy = self._compute_directions(sites[points, nearest], pixel_x, pixel_y)
         second_dx, second_dy = self._compute_directions(sites[points, second], pixel_x, pixel_y)
-        # The difference of two distances grows by this much per meter across the border.
+        # Away from the border, the difference of the two distances grows by this much per meter.
         growth = np.maximum(np.hypot(nearest_dx - second_dx, nearest_dy - second_dy), _MIN_BORDER_ANGLE)
-        # Between points that robots reach and points that no robot reaches, there is a wall.
+        # inf - inf is nan: without a second robot, or without any, there is no border.
         with np.errstate(invalid="ignore"):
             gaps = (other_distances[points, second] - distances[points, nearest]) / growth
         gaps = np.nan_to_num(gaps, nan=np.inf, posinf=np.inf)
         return BorderPixels(rows, columns, nearest_owners, gaps)
 
     def _compute_directions(self, sites: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the unit vectors, dx and dy, of the last segments of paths to points."""
+        """Return dx and dy of the unit vectors from the last bends of the paths of sites to points."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
         lengths = np.maximum(np.hypot(dx, dy), _MIN_LENGTH_M)
@@ -287,7 +315,7 @@ class DistanceField:
 
 
 class DistanceFields:
-    """Computes the distance fields of one map at any positions and times.
+    """Computes the distance fields of a map for any positions and times.
 
     Parameters
     ----------
@@ -307,7 +335,7 @@ class DistanceFields:
         self._lattice = FieldLattice(cost.sites)
 
     def compute_at(self, positions: Array, time: float = 0.0) -> DistanceField | None:
-        """Compute the distance field of robots.
+        """Compute the distance field of robots at given positions.
 
         Parameters
         ----------
@@ -336,7 +364,7 @@ class DistanceFields:
 
 
 def compute_block_middles(coordinates: Array, size: int) -> Array:
-    """Return the middles of blocks of pixels along an axis.
+    """Return the middles of blocks of adjacent pixels along an axis.
 
     Parameters
     ----------
@@ -354,12 +382,12 @@ def compute_block_middles(coordinates: Array, size: int) -> Array:
 
 
 def _has_differences(values: IntArray) -> BoolArray:
-    """Return which rows, (..., k), contain different values."""
+    """Return which rows of an array, (..., k), contain different values."""
     return np.asarray((values[..., 1:] != values[..., :1]).any(axis=-1))
 
 
 def _is_in_upper_half(steps: Array) -> IntArray:
-    """Return 1 for coordinates, in lattice steps, that are nearer to the next lattice point, else 0."""
+    """Return 1 for coordinates, in lattice steps, that round up to the next whole number, else 0."""
     return (np.floor(steps - 0.5) - np.floor(steps)).astype(np.intp) + 1
 
 
@@ -389,13 +417,24 @@ def _list_block_pixels(
 
 
 def _spread_over_pixels(blocks: BorderPixels, height: int, width: int) -> BorderPixels:
-    """Return the pixels of blocks that are inside a picture, with the values of their blocks."""
+    """Return the pixels of blocks, as far as they are inside a picture, with the values of their block."""
     rows, columns, block_indices = _list_block_pixels(blocks.rows, blocks.columns, height, width)
     return BorderPixels(rows, columns, blocks.owners[block_indices], blocks.distances[block_indices])
 
 
 def _select_different(sites: IntArray, sources: IntArray) -> IntArray:
-    """Return the first few sites of each row, (k, m), with different sources; others repeat the first one."""
+    """Return the sites of each row with different sources, at most `_MAX_CANDIDATES`.
+
+    Parameters
+    ----------
+    sites, sources : (k, m) int array
+        Sites of each square, and the last bend or robot that each of them is reached from.
+
+    Returns
+    -------
+    (k, r) int array
+        Rows with fewer different sources are filled with their first site.
+    """
     is_new = np.ones(sites.shape, dtype=bool)
     for column in range(1, sites.shape[1]):
         is_new[:, column] = (sources[:, column, None] != sources[:, :column]).all(axis=1)

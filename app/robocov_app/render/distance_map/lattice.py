@@ -12,12 +12,12 @@ from robocov.cost import Sites
 
 
 class _Side(NamedTuple):
-    """A side of a square.
+    """A side of a square of the lattice.
 
     Attributes
     ----------
     row_step, column_step : int
-        From the square to its neighbor across the side.
+        Steps from the square to its neighbor across the side.
     corners : (int, int)
         Indices of the corners at the ends of the side.
     """
@@ -36,10 +36,10 @@ _SIDES = (
 
 
 class FieldLattice:
-    """Squares between the sites of a coverage cost; the same for all fields of a map.
+    """Squares between the sites of a coverage cost, which all distance fields of a map share.
 
     The corners of a square are the centers of four lattice cells: lower left, lower right, upper left, upper
-    right. The squares of the first and last rows and columns reach beyond the lattice.
+    right. The squares of the first and last rows and columns extend beyond the lattice.
 
     Parameters
     ----------
@@ -52,9 +52,10 @@ class FieldLattice:
     origin : (2,) array, m
         Center of the lower left cell.
     corner_sites : (s, s, 4) int array
-        Site at each corner of each square. A corner that is not free has another site of the square or, if
+        Site at each corner of each square. A corner in an obstacle takes the site of another corner or, if
         no corner is free, the nearest site.
     is_corner_free : (s, s, 4) bool array
+        Whether a site is at each corner.
     """
 
     def __init__(self, sites: Sites) -> None:
@@ -62,6 +63,7 @@ class FieldLattice:
         self.spacing = sites.spacing
         first_row, first_column = divmod(int(sites.cells[0]), side)
         self.origin = sites.points[0] - np.array([first_column, first_row]) * sites.spacing
+        # The site in each lattice cell; negative for cells without one.
         site_image = sites.to_grid(np.arange(len(sites.points)))
         rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
         lower = rows[:-1]
@@ -79,7 +81,7 @@ class FieldLattice:
         return (x - self.origin[0]) / self.spacing, (y - self.origin[1]) / self.spacing
 
     def find_squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
-        """Return the squares that contain coordinates.
+        """Find the rows and columns of squares that contain coordinates.
 
         Parameters
         ----------
@@ -99,10 +101,10 @@ class FieldLattice:
         return np.asarray(np.clip(np.floor(steps) + 1, 0, last).astype(np.intp))
 
     def collect_sites(self, is_divided: BoolArray) -> tuple[BoolArray, IntArray]:
-        """Collect the sites around divided squares.
+        """Collect the sites of squares that a border between geodesic cells may cross.
 
-        A border may cut off a corner of a square whose own sites all have the same owner, so neighbors of
-        divided squares count as well, if both ends of the side between the squares are free.
+        A border may also cut off a corner of a square whose own sites all have the same owner. So neighbors
+        of divided squares are selected as well, if both ends of the side between the squares are free.
 
         Parameters
         ----------
@@ -114,7 +116,8 @@ class FieldLattice:
         is_selected : (s, s) bool array
             Divided squares and their neighbors.
         sites : (k, 20) int array
-            For each selected square its own four sites, and those of the divided neighbors.
+            For each selected square its own four sites, then four for each side: those of the neighbor if it
+            is divided, otherwise its own again.
         """
         is_selected = is_divided.copy()
         site_groups = [self.corner_sites]
@@ -132,11 +135,11 @@ class FieldLattice:
 
 
 def _list_pairs(lower: IntArray, upper: IntArray) -> list[tuple[IntArray, IntArray]]:
-    """Return rows and columns of the cells at each corner of the squares."""
+    """Return rows and columns of the lattice cells at the four corners of the squares, in their order."""
     return [(lower, lower), (lower, upper), (upper, lower), (upper, upper)]
 
 
 def _find_nearest_sites(site_image: IntArray) -> IntArray:
-    """Return the nearest site of each cell of the lattice."""
+    """Return the site nearest to each cell of the lattice; `site_image` is negative in cells without one."""
     rows, columns = distance_transform_edt(site_image < 0, return_distances=False, return_indices=True)
     return np.asarray(site_image[rows, columns])

@@ -17,7 +17,7 @@ from robocov_app.render.sprites import Pixel
 
 # Lengths in pixels at scale 1.
 MAX_FORCE_ARROW_PX = 46.0
-"""Length that arrows of ever larger forces approach."""
+"""Length that the arrow approaches as the force grows."""
 MAX_VELOCITY_ARROW_PX = 34.0
 """Length of the arrow of a robot at its maximum speed."""
 _MIN_ARROW_PX = 3.0
@@ -56,7 +56,17 @@ class _ArrowStyle:
 def _build_arrow_layer(
     name: str, title: str, text: str, compute_vectors: VectorFunction, style: _ArrowStyle
 ) -> Layer:
-    """Build a layer of arrows that start at the edges of the robots; `text` is for the legend."""
+    """Build a layer of arrows that start at the edges of the robots.
+
+    Parameters
+    ----------
+    name, title : str
+        Identifier, and name in the window.
+    text : str
+        Text in the legend.
+    compute_vectors : VectorFunction
+    style : _ArrowStyle
+    """
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         vectors = compute_vectors(scene, canvas.scale)
@@ -79,12 +89,12 @@ def _build_arrow_layer(
 
 
 def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
-    """Build the layer of a term of the force.
+    """Build the layer that shows one term of the forces on robots.
 
     Parameters
     ----------
     term : str
-        Name of the term, "viscosity" or "resultant".
+        Name of a term of the controller's decision, or "viscosity", or "resultant".
     title : str
         Name in the window and, in lower case, in the legend.
     head : ArrowHead
@@ -92,7 +102,8 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
     Returns
     -------
     Layer
-        Its arrows have 63 % of the maximum length for the force of the maximum acceleration.
+        Arrow lengths saturate: 63 % of the maximum length (1 - 1/e) at the force that gives a robot its
+        maximum acceleration.
     """
 
     def compute_vectors(scene: Scene, scale: float) -> Array | None:
@@ -105,6 +116,7 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
         with np.errstate(invalid="ignore"):
             unit_vectors = forces / np.maximum(sizes, _MIN_FORCE_N)[:, None]
             directions = np.where(sizes[:, None] > 0.0, unit_vectors, 0.0)
+        # Pixels run downwards.
         return np.asarray(np.nan_to_num(directions * lengths[:, None]) * np.array([1.0, -1.0]))
 
     style = _ArrowStyle(
@@ -130,6 +142,7 @@ def build_velocity_layer() -> Layer:
 
     def compute_vectors(scene: Scene, scale: float) -> Array:
         fractions = scene.now.velocities / scene.team.max_speed[:, None]
+        # Pixels run downwards.
         return np.asarray(fractions * np.array([1.0, -1.0]) * MAX_VELOCITY_ARROW_PX * scale)
 
     style = _ArrowStyle(

@@ -8,18 +8,18 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.scene import Scene
 
 _MIN_SMOOTH_WIDTH_PX = 20.0
-"""Mean width of cells at scale 1 below which their edges are not smooth, which hardly shows."""
+"""Mean width of cells, at scale 1, below which edges are not antialiased: the difference hardly shows."""
 _EDGE_STEPS_PER_PX = 16.0
-"""Corners are equal if they are equal after rounding to this fineness."""
+"""Corners count as equal if they are equal after rounding to this fraction of a pixel."""
 
 
 def _is_colored_by_distance(canvas: Canvas, scene: Scene) -> bool:
-    """Return whether the colors on the map mean distances, so that cells have none."""
+    """Return whether another layer colors the map by distance, so that cells must not be filled."""
     return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.visible_layers)
 
 
 def draw_cells(canvas: Canvas, scene: Scene) -> None:
-    """Draw the cells in the colors of their robots."""
+    """Draw the cells in the colors of their robots, and each edge once."""
     assert scene.cells is not None
     sizes = np.array([len(cell) for cell in scene.cells])
     ends = np.cumsum(sizes)
@@ -52,7 +52,19 @@ def _choose_fills(canvas: Canvas, scene: Scene) -> list[Color | None]:
 
 
 def _find_next_corners(sizes: IntArray, ends: IntArray) -> IntArray:
-    """Return the row of the next corner of the same cell for each corner; `ends` are those of the cells."""
+    """Return, for the corners of all cells in one array, the row of the next corner of the same cell.
+
+    Parameters
+    ----------
+    sizes : (n,) int array
+        Number of corners of each cell.
+    ends : (n,) int array
+        Row after the last corner of each cell.
+
+    Returns
+    -------
+    (k,) int array
+    """
     next_rows = np.arange(1, int(ends[-1]) + 1)
     has_corners = sizes > 0
     next_rows[ends[has_corners] - 1] = (ends - sizes)[has_corners]
@@ -62,15 +74,15 @@ def _find_next_corners(sizes: IntArray, ends: IntArray) -> IntArray:
 def _select_one_direction(edges: Array) -> Array:
     """Return the edges, (k, 4) px, that go to the right or straight down.
 
-    An edge between two cells is in the list in both directions, and would not be smooth if drawn twice.
-    Edges on the boundary may be missing in the result: the boundary is drawn over them.
+    An edge between two cells is in the list in both directions; drawn twice, it would lose its antialiasing.
+    Edges on the boundary are in the list once and may be dropped, because the boundary is drawn over them.
     """
     x1, y1, x2, y2 = np.rint(edges * _EDGE_STEPS_PER_PX).T
     return np.asarray(edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))])
 
 
 def _remove_duplicates(edges: Array) -> Array:
-    """Return each edge, (k, 4) px, once, without regard to its direction."""
+    """Return each edge, (k, 4) px, once, regardless of its direction."""
     x1, y1, x2, y2 = edges.T
     is_backward = (x1 > x2) | ((x1 == x2) & (y1 > y2))
     directed = np.where(is_backward[:, None], edges[:, [2, 3, 0, 1]], edges)
@@ -79,7 +91,7 @@ def _remove_duplicates(edges: Array) -> Array:
 
 
 def build_cells_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of the cells, whose symbol has a color only if the cells have."""
+    """Build the legend of the cells, with a symbol that is filled only if the cells are."""
 
     def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
         fill = None if _is_colored_by_distance(canvas, scene) else canvas.theme.get_cell_color(0)

@@ -24,14 +24,14 @@ _TAG_GAP_PX = 6
 _TAG_GAP_AT_ARROW_PX = 14
 """Gap between the tag and the position of the cursor on the side of its arrow."""
 _TAG_SIDES = ((1, -1), (-1, -1), (-1, 1), (1, 1))
-"""Positions of the tag, right and down, the best one first: the arrow of the cursor is at the lower right."""
+"""Sides of the cursor, right and down, on which the tag may be, the best first: the arrow is lower right."""
 _HIDDEN_PATH_COST = 4
-"""Hiding a section of the path, or leaving the preferred position, is as bad as hiding this many robots."""
+"""Hiding a section of the path, or moving a tag into the view, is as bad as hiding this many robots."""
 _MAX_LENGTH_WITH_CENTIMETERS_M = 100
 
 
 def draw_cursor_path(canvas: Canvas, scene: Scene) -> None:
-    """Draw the path with its length in a tag next to the cursor."""
+    """Draw the path, and a tag with its length next to the cursor."""
     path = scene.path
     assert path is not None
     if len(path) < 2:
@@ -58,7 +58,16 @@ def _format_length(length: float) -> str:
 
 
 def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) -> pygame.Rect:
-    """Return the box next to the cursor that hides least of the path, (w, 2) px, and the robots."""
+    """Choose the box of the tag next to the cursor that hides the least of the path and the robots.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    scene : Scene
+    corners : (w, 2) array, px
+        Path, from the cursor on.
+    text_width : int, px
+    """
     scale = canvas.scale
     x, y = corners[0].tolist()
     box = pygame.Rect(0, 0, text_width + round(_TAG_PADDING_PX * scale), round(_TAG_HEIGHT_PX * scale))
@@ -80,7 +89,7 @@ def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) ->
 
 
 def _rate_hidden(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect) -> int:
-    """Rate a box by the sections of the path, (w, 2) px, and the robots that it hides; lower is better."""
+    """Return a cost that counts the sections of the path, (w, 2) px, and the robots that a box would hide."""
     path = limit_pixels(corners).tolist()
     n_sections = sum(bool(box.clipline(start, end)) for start, end in pairwise(path))
     cost = _HIDDEN_PATH_COST * n_sections

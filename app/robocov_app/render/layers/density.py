@@ -17,7 +17,7 @@ from robocov_app.render.pixel_arrays import build_surface, convert_axes_to_world
 from robocov_app.render.scene import Scene
 
 _MAX_SAMPLES = 60_000
-"""Maximum number of samples of the density on a surface; between them it is interpolated."""
+"""Maximum number of density samples on a surface; values between samples are interpolated."""
 _MAX_PIXEL = 30_000
 """Coordinates are limited to what pygame can fill."""
 _SYMBOL_WIDTH_PX = 20
@@ -35,7 +35,7 @@ def draw_density(canvas: Canvas, scene: Scene) -> None:
 def draw_density_shading(canvas: Canvas, density: Density, outline: Array) -> None:
     """Draw a density within an outline.
 
-    The samples do not depend on the clip of the surface, so that a picture may be drawn in parts.
+    The samples do not depend on the clip of the surface, so that parts drawn one by one fit together.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def draw_density_shading(canvas: Canvas, density: Density, outline: Array) -> No
 
 
 def _find_box(canvas: Canvas, bounds: Bounds) -> pygame.Rect:
-    """Return the visible part of bounds, px."""
+    """Return the part of bounds, m, that is inside the clip of the surface, px."""
     low_x, low_y, high_x, high_y = bounds
     ends = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     limited = np.clip(ends, -_MAX_PIXEL, _MAX_PIXEL).astype(int).tolist()
@@ -72,7 +72,7 @@ def _find_box(canvas: Canvas, bounds: Bounds) -> pygame.Rect:
 def _interpolate_fractions(
     canvas: Canvas, density: Density, bounds: Bounds, box: pygame.Rect
 ) -> NDArray[np.uint8]:
-    """Return the density of each pixel of a box, (h, w), from 0 for the lowest to 255 for the highest."""
+    """Return the density at each pixel of a box, (h, w), from 0 for the lowest to 255 for the highest."""
     width, height = canvas.surface.get_size()
     step = max(1, math.ceil(math.sqrt(width * height / _MAX_SAMPLES)))
     columns, interpolate_columns = _place_samples(box.left, box.width, step)
@@ -96,8 +96,9 @@ def _place_samples(start: int, count: int, step: int) -> tuple[Array, Callable[[
     -------
     samples : (d,) array, px
     interpolate : callable
-        Turns values at the samples, (d, k), into values at the pixels, (count, k).
+        Interpolates values at the samples, (d, k), linearly to values at the pixels, (count, k).
     """
+    # Sample i is at the pixel coordinate (i + 0.5) * step.
     sample_units = (start + np.arange(count) + 0.5) / step - 0.5
     before = np.floor(sample_units).astype(np.intp)
     weights = (sample_units - before)[:, None]
@@ -113,14 +114,14 @@ def _place_samples(start: int, count: int, step: int) -> tuple[Array, Callable[[
 
 
 def _build_premultiplied_table(theme: Theme) -> NDArray[np.uint8]:
-    """Return the premultiplied colors of densities from the lowest to the highest, (256, 4)."""
+    """Return the premultiplied RGBA colors, (256, 4), from the lowest density to the highest."""
     table = color_density(np.arange(256) / 255.0, theme).astype(np.uint16)
     table[:, :3] = table[:, :3] * table[:, 3:] // 255
     return table.astype(np.uint8)
 
 
 def build_density_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of a density that is not uniform."""
+    """Build the legend of the density; empty if the density is uniform."""
     text = describe_density(scene.environment)
     if not text:
         return []
@@ -143,7 +144,7 @@ def build_gradient_entry(text: str, color_row: Callable[[Theme, int], NDArray[np
     ----------
     text : str
     color_row : callable
-        Returns a number of colors of a theme, (count, 3) or (count, 4), from low to high.
+        Called with a theme and a count; returns as many colors, (count, 3) or (count, 4), from low to high.
 
     Returns
     -------

@@ -21,7 +21,7 @@ from robocov_app.render.surface_cache import LatestValue
 _BORDER_WIDTH_PX = 1.6
 """Width of the borders of geodesic cells, at scale 1."""
 _COARSE_PX = 2
-"""Pixels of a distance map are computed at this distance: distances are smooth."""
+"""Distance between the computed pixels of a distance map, which is smooth enough to be enlarged."""
 _HATCH_PX = 5
 """Coarse pixels between the lines that hatch unreachable areas."""
 _MIN_LENGTH_PX = 1e-9
@@ -71,7 +71,7 @@ class FieldLayer:
 
 
 def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[Array, Array]:
-    """Return the first pixel that shows the region, (2,) px, and the one after the last."""
+    """Return the upper left pixel that shows the region, (2,) px, and the one after the lower right."""
     low_x, low_y, high_x, high_y = scene.environment.region.bounds
     corner, end = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     view_corner = np.array(canvas.camera.view[:2])
@@ -84,6 +84,7 @@ def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[Array, Array]:
 def _cover_outside(canvas: Canvas, vertices: Array) -> None:
     """Cover the outside of a convex outline, (k, 2) m, with the background, one side after the other."""
     corners = canvas.camera.to_pixels(vertices)
+    # Long enough for a rectangle on any side to cover the whole surface beyond it.
     length = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = length * (end - start) / max(float(np.hypot(*(end - start))), _MIN_LENGTH_PX)
@@ -96,7 +97,7 @@ def _cover_outside(canvas: Canvas, vertices: Array) -> None:
 def render_distances(
     canvas: Canvas, scene: Scene, field: DistanceField, x: Array, y: Array
 ) -> pygame.Surface:
-    """Render the distances to the nearest robot."""
+    """Render the distance map at columns x, (w,) m, and rows y, (h,) m, as a `FieldRenderer`."""
     coarse_x = compute_block_middles(x, _COARSE_PX)
     coarse_y = compute_block_middles(y, _COARSE_PX)
     levels = compute_color_levels(field, coarse_x, coarse_y, scene.field_limit, _HATCH_PX)
@@ -108,7 +109,10 @@ def render_distances(
 def render_geodesic_cells(
     canvas: Canvas, scene: Scene, field: DistanceField, x: Array, y: Array
 ) -> pygame.Surface:
-    """Render the cells around obstacles over which the coverage cost sums; above distances, only borders."""
+    """Render the geodesic cells, or only their borders if the distance map is visible, as a `FieldRenderer`.
+
+    Geodesic cells are the cells of the coverage cost: their points are nearest along paths around obstacles.
+    """
     if "distances" in canvas.visible_layers:
         return _render_borders(canvas, field, x, y)
     theme = canvas.theme
@@ -120,6 +124,7 @@ def render_geodesic_cells(
     colors = [*(theme.get_cell_color(hue) for hue in range(n_hues)), theme.unreached]
     color_indices = np.append(canvas.hues, n_hues).astype(np.uint8)
     palette = np.array(colors, dtype=np.uint8)
+    # Wrapping turns -1 into the last index.
     indices = color_indices.take(owners, mode="wrap")
     cells = build_palette_surface(indices, palette).convert(canvas.surface)
     pixels = pygame.surfarray.pixels3d(cells)
@@ -127,7 +132,7 @@ def render_geodesic_cells(
     opacities = compute_line_opacities(borders, zoom, width)[:, None]
     border_color = np.array(theme.geodesic_border)
     pixels[border_pixels] = np.rint((1.0 - opacities) * pixels[border_pixels] + opacities * border_color)
-    # The array keeps the surface locked.
+    # The surface stays locked until the array is deleted.
     del pixels
     return cells
 

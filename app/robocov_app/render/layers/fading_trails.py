@@ -13,11 +13,11 @@ from robocov_app.render.clipping import limit_pixels
 from robocov_app.render.sprites import Sketch, find_visible_box
 
 FADE_STEPS = 24
-"""Number of shades; a fading trajectory is drawn again this many times while it fades."""
+"""Number of shades, and of times that a section is drawn again until it has faded away."""
 FADE_PIECE_PX = 4.0
-"""Distance that the fastest robot covers between two corners, at scale 1."""
+"""Distance that the fastest robot covers between two drawn corners, at scale 1."""
 _FINENESS = 2
-"""Trajectories are drawn this many times larger, and shrunk."""
+"""Trajectories are drawn this many times larger and then shrunk, for antialiasing."""
 _FADE_EXPONENT = 0.7
 """Below 1, trajectories fade slowly at first, so that older parts can still be followed."""
 _MIN_ROUNDED_WIDTH_PX = 2.5
@@ -44,7 +44,7 @@ class Pen(NamedTuple):
 def draw_fading_trails(
     page: pygame.Surface, canvas: Canvas, trail: Array, times: Array, *, fade: float, pen: Pen
 ) -> None:
-    """Draw the last part of trajectories, the more transparent the older.
+    """Draw the most recent part of trajectories: the older, the more transparent.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def draw_fading_trails(
         nan for absent robots.
     times : (k,) array, s
     fade : float, s
-        Length of the drawn part.
+        Time after which a section has faded away.
     pen : Pen
     """
     first_row = int(np.searchsorted(times, times[-1] - fade))
@@ -65,41 +65,43 @@ def draw_fading_trails(
     if box is None:
         return
     ages = np.ceil((times[-1] - times[first_row:]) / fade * FADE_STEPS)
-    # Rounding errors may give one more step.
+    # Rounding errors may give one step too many.
     steps = np.minimum(ages, FADE_STEPS).astype(int)
     rows = _select_corners(pixels, steps, FADE_PIECE_PX * canvas.scale)
     steps = steps[rows]
     sketch = Sketch(box, _FINENESS)
     points = (pixels[rows] - np.array(box.topleft) + 0.5) * _FINENESS
-    # Where paths cross, the newer one is on top.
+    # All robots' sections of one shade are drawn before newer ones, so that these are on top at crossings.
     bounds = [0, *(np.flatnonzero(np.diff(steps)) + 1).tolist(), len(rows) - 1]
     tips = np.full((len(pen.colors), 2), np.nan)
     for start, end in pairwise(bounds):
+        # Each shade has the opacity of the middle of its step.
         opacity = (1.0 - max(float(steps[start]) - 0.5, 0.0) / FADE_STEPS) ** _FADE_EXPONENT
         tips = _draw_shade(sketch, points[start : end + 1], tips, opacity, pen)
     sketch.draw_on(page)
 
 
 def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen: Pen) -> Array:
-    """Draw the part of the trajectories that has one shade.
+    """Draw the part of all trajectories that has the same shade.
 
     Parameters
     ----------
     sketch : Sketch
     points : (k, n, 2) array, enlarged px
     tips : (n, 2) array, enlarged px
-        Ends of the older parts; nan for robots without one.
+        Ends of the parts drawn before; nan for robots without one.
     opacity : float
     pen : Pen
 
     Returns
     -------
     (n, 2) array, enlarged px
-        The new tips. Those of robots that have hardly moved stay.
+        The ends of the parts drawn now; unchanged for robots that have hardly moved.
     """
     shades = {color: premultiply(color, opacity) for color in set(pen.colors)}
     width = max(1, round(pen.width * _FINENESS))
     is_rounded = width > _MIN_ROUNDED_WIDTH_PX * _FINENESS
+    # Negated, so that robots without a tip (nan) count as moved.
     has_moved = ~(np.abs(points - tips).max(axis=(0, 2)) < _FINENESS)
     is_present: BoolArray = np.asarray(np.isfinite(points).all(axis=(0, 2)))
     continues = is_present & ~np.isnan(tips[:, 0])
@@ -127,13 +129,13 @@ def _draw_line(
 
 
 def _select_corners(points: Array, steps: IntArray, min_distance: float) -> IntArray:
-    """Select the rows of trajectories that are needed to draw them: few if all robots are slow.
+    """Select the rows of trajectories at which they are drawn: few if all robots are slow.
 
     Parameters
     ----------
     points : (k, n, 2) array, px
     steps : (k,) int array
-        Shades; rows where they change are needed.
+        Shade of each row; rows where it changes are selected.
     min_distance : float, px
         Distance that the fastest robot covers between two rows.
 
@@ -156,7 +158,7 @@ def _select_corners(points: Array, steps: IntArray, min_distance: float) -> IntA
 
 
 def _split_at_absences(path: Array) -> list[list[list[float]]]:
-    """Split a path, (k, 2), into the parts in which its robot is present."""
+    """Return the parts of a path, (k, 2), during which its robot is present."""
     is_present = np.isfinite(path[:, 0])
     pieces = np.split(path, np.flatnonzero(np.diff(is_present)) + 1)
     return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]

@@ -1,4 +1,4 @@
-"""The layer of known obstacles: sensed points, and the map that a robot has discovered."""
+"""The layer of known obstacles: points that robots have sensed, and the map that a robot has discovered."""
 
 from dataclasses import replace
 
@@ -18,15 +18,16 @@ _CELL_OPACITIES = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}
 """Opacity of the cells of a discovered map; free ones are transparent."""
 _UNKNOWN_FILL_STRENGTH = 0.3
 _UNKNOWN_EDGE_STRENGTH = 0.6
-"""Fraction of the color of an obstacle that remains if no robot has sensed it."""
+"""Fractions of the colors of an obstacle that remain where no robot has sensed it."""
 _POINT_RADIUS_PX = 2.1
 """Radius of a sensed point, at scale 1."""
 
 
 class KnownObstaclesLayer:
-    """Draws the sensed points of the selected robot or of all, above paler obstacles, and its discovered map.
+    """Draws sensed points above paler obstacles, and the discovered map of the selected robot.
 
-    Only new points are drawn on the page, which is drawn again when the view changes.
+    The points are those of the selected robot or, if no robot is selected, of all. They stay on a page, to
+    which only new points are added; the page is drawn again when the view changes.
     """
 
     def __init__(self) -> None:
@@ -49,7 +50,10 @@ class KnownObstaclesLayer:
             draw_discovered_map(canvas, discovered)
 
     def _is_continued(self, canvas: Canvas, scene: Scene, points: Array) -> bool:
-        """Return whether the page shows the first of the points, (k, 2) m, in the same view."""
+        """Return whether the page can be continued: it shows the first of the points, (k, 2) m, in this view.
+
+        Comparing the last drawn point is enough, since points are only ever appended.
+        """
         count = len(self._drawn_points)
         is_same_source = self._sources[0] is scene.environment and self._sources[1] is scene.sensed
         is_same_view = self._key == _build_key(canvas, scene)
@@ -57,7 +61,7 @@ class KnownObstaclesLayer:
         return is_same_source and is_same_view and has_last_point
 
     def _start_page(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw a page with pale obstacles, without points."""
+        """Start a page with pale obstacles and without points."""
         self._key = _build_key(canvas, scene)
         self._sources = (scene.environment, scene.sensed)
         self._drawn_points = np.empty((0, 2))
@@ -69,11 +73,15 @@ class KnownObstaclesLayer:
         fill, edge = _get_pale_colors(canvas)
         draw_blocked_area(page, scene, fill=fill, moving_fill=fill, edge=edge)
         if "boundary" in canvas.visible_layers:
-            # The obstacles have covered parts of it.
+            # The pale obstacles hide parts of the boundary, which is drawn in a lower layer.
             draw_boundary(page, scene)
 
     def _add_points(self, canvas: Canvas, points: Array, robots: IntArray, selected: int | None) -> None:
-        """Draw the points, (k, 2) m, that are not on the page yet; with a selected robot only its own."""
+        """Draw the points, (k, 2) m, that are not on the page yet.
+
+        `robots`, (k,), are the numbers of the robots that sensed them. If a robot is selected, only its own
+        points are drawn.
+        """
         count = len(self._drawn_points)
         if count < len(points):
             new_points = points[count:]
@@ -87,7 +95,7 @@ class KnownObstaclesLayer:
 
 
 def _build_key(canvas: Canvas, scene: Scene) -> tuple[object, ...]:
-    """Return the properties that the page depends on in addition to the points."""
+    """Return all that the page depends on, apart from the points."""
     return (
         canvas.camera,
         canvas.theme.name,
@@ -110,7 +118,7 @@ def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
     """Return the map that the selected robot has discovered; None if its controller has no maps."""
     if scene.snapshot is None or scene.selected is None:
         return None
-    # Memories have no common base class, since users write controllers of their own.
+    # Controllers of users define memories of their own, which need not have maps.
     maps = getattr(scene.snapshot.decision.memory, "maps", ())
     if scene.selected >= len(maps):
         return None
@@ -121,7 +129,7 @@ def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
 
 
 def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
-    """Draw the visible cells of a discovered map: a veil over unknown ones, and walls."""
+    """Draw the visible cells of a discovered map: a veil over unknown ones, walls in color, no free ones."""
     raster = known_map.raster
     clip = canvas.surface.get_clip()
     clip_corners = np.array([clip.topleft, clip.bottomright], dtype=float)
@@ -133,6 +141,7 @@ def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
     (left, bottom), (right, top) = ends.round().astype(int).tolist()
     if right <= left or bottom <= top:
         return
+    # States above WALL are drawn as walls.
     state = np.minimum(known_map.state[visible], WALL)
     is_inside = ~raster.is_outside[visible]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
@@ -140,7 +149,7 @@ def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
         is_unknown = value == UNKNOWN
         color = canvas.theme.obstacle if is_unknown else canvas.theme.forces["repulsion_obstacle"]
         pixels[(state == value) & is_inside] = premultiply(color, opacity)
-    # The lowest row comes first in the map, and the highest one in a picture.
+    # The first row is the lowest one in the map, but the highest one in a picture.
     upright = np.ascontiguousarray(pixels[::-1])
     picture = pygame.image.frombuffer(upright.tobytes(), (state.shape[1], state.shape[0]), "RGBA")
     scaled = pygame.transform.scale(picture, (right - left, bottom - top))
@@ -148,7 +157,7 @@ def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
 
 
 def _get_pale_colors(canvas: Canvas) -> tuple[Color, Color]:
-    """Return fill and edge of obstacles that no robot knows."""
+    """Return the fill and edge colors of obstacles that no robot has sensed."""
     theme = canvas.theme
     fill = mix(theme.background, theme.obstacle, _UNKNOWN_FILL_STRENGTH)
     edge = mix(theme.background, theme.obstacle_edge, _UNKNOWN_EDGE_STRENGTH)

@@ -24,14 +24,14 @@ class Layer:
     draw : callable
         Draws the layer of a scene on a canvas.
     needs : tuple of str
-        Attributes of the scene without which nothing is drawn.
+        Attributes that the scene must have, otherwise the layer is not drawn.
     legend : LegendBuilder
     is_default : bool
         Whether the layer is shown by default.
     is_static : bool
-        Whether it depends on map, camera and theme alone.
+        Whether the layer depends only on the map, the camera and the theme.
     is_in_world : bool
-        Whether it is drawn within the view of the camera only.
+        Whether the layer is drawn only within the view of the camera.
     """
 
     name: str
@@ -59,7 +59,7 @@ def build_legend(
     glyph : Glyph
         Draws the symbol.
     applies_to : callable
-        Returns whether the legend of a scene has the entry; by default always.
+        Returns whether the entry is shown for a scene; by default it always is.
 
     Returns
     -------

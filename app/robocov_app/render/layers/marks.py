@@ -24,7 +24,7 @@ _GOAL_ARM_PX = 5.5
 
 
 class StartsLayer:
-    """Draws rings at the starts; their positions are computed again when the view changes."""
+    """Draws rings at the starts of robots; they are placed again only when the view changes."""
 
     def __init__(self) -> None:
         self._rings = LatestValue[PlacedSprites]()
@@ -56,7 +56,7 @@ build_starts_legend = build_legend(legend.START, _draw_start_symbol)
 
 
 def draw_centroids(canvas: Canvas, scene: Scene) -> None:
-    """Draw a plus at each centroid or a times sign at each goal, except where a robot has arrived."""
+    """Draw a plus sign at each centroid, or an x at each goal, except where the robot has arrived."""
     name, targets = _choose_targets(scene)
     if not name:
         return
@@ -78,9 +78,10 @@ def build_centroids_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def _choose_targets(scene: Scene) -> tuple[str, Array]:
-    """Return the name and the positions of targets, (n, 2) m: centroids, if the goals equal them, or goals.
+    """Return the name of the targets in the legend, and their positions, (n, 2) m.
 
-    The name is empty if there are no goals.
+    The targets are the centroids if they equal the goals, otherwise the goals. The name is empty if there are
+    no goals.
     """
     if scene.snapshot is None or scene.centroids is None:
         return "", np.empty((0, 2))
@@ -90,8 +91,8 @@ def _choose_targets(scene: Scene) -> tuple[str, Array]:
     centroids = scene.centroids
     cells = scene.snapshot.decision.cells
     if cells is not None:
-        # Robots that do not receive all messages compute other cells than the drawn ones. With the centroids
-        # of the drawn ones, the name would change with each lost message.
+        # A robot that misses messages computes a cell that differs from the drawn one. Goals are compared
+        # with the centroids of computed cells, otherwise the name would change with each lost message.
         centroids = cells.centroid
     if centroids.shape == goals.shape and are_centroids(goals, centroids):
         return legend.CELL_CENTROID, scene.centroids
@@ -99,7 +100,7 @@ def _choose_targets(scene: Scene) -> tuple[str, Array]:
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
-    """Draw a times sign at each goal, connected with its robot."""
+    """Draw an x at each goal, connected with its robot by a dashed line."""
     if scene.now.decision.goals is None:
         return
     goals = canvas.camera.to_pixels(scene.now.decision.goals)
@@ -111,7 +112,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
 
 
 def _build_cross(canvas: Canvas, name: str, arm: float) -> Sprite:
-    """Return the mark of centroids or goals; `arm` is half its size, px."""
+    """Return the mark of a goal (an x) or a centroid (a plus sign); `arm` is half its size, px."""
     theme = canvas.theme
     is_goal = name == legend.GOAL
     if is_goal:

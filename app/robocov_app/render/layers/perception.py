@@ -19,7 +19,10 @@ _POINT_RADIUS_PX = 3.0
 
 
 def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> Layer:
-    """Build the layer of finite sensing ranges (solid circles) or communication ranges (dashed)."""
+    """Build the layer of sensing ranges (solid circles) or communication ranges (dashed circles).
+
+    Infinite ranges are not drawn.
+    """
     is_dashed = kind == "communication"
 
     def get_ranges(scene: Scene) -> Array:
@@ -32,6 +35,7 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
         radii = (get_ranges(scene) * canvas.camera.zoom).tolist()
         for center, radius, hue in zip(centers, radii, canvas.hues.tolist(), strict=True):
             if np.isfinite(radius):
+                # Slightly darker than the robot, for contrast with its cell.
                 color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
                 canvas.draw_circle(center, radius, color, is_dashed=is_dashed)
 
@@ -42,6 +46,7 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
     legend = build_legend(
         f"{kind} range", draw_symbol, lambda scene: bool(np.isfinite(get_ranges(scene)).any())
     )
+    # Positions and ranges are only known with a snapshot of the team.
     return Layer(kind, title, draw, ("snapshot",), legend, is_default=False)
 
 
@@ -55,10 +60,11 @@ def draw_links(canvas: Canvas, scene: Scene) -> None:
 
 
 def _list_links(scene: Scene) -> IntArray | None:
-    """Return pairs of robots, (k, 2); None if the adjacency of the cells is not known."""
+    """Return the connected pairs of robots, (k, 2); None if the adjacency of the cells is unknown."""
     neighbors = scene.now.seen.neighbors
     if neighbors.is_complete:
         return scene.adjacency
+    # Neighbors are listed in both directions; each pair is kept once.
     pairs = np.column_stack(neighbors.list_pairs())
     return pairs[pairs[:, 0] < pairs[:, 1]]
 

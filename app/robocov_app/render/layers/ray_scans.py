@@ -19,7 +19,7 @@ _FINENESS = 2
 _HIT_RADIUS_PX = 1.5
 """Radius of the end of a ray, at scale 1."""
 _MIN_RAY_GAP_PX = 5.0
-"""Minimum distance between rays, at scale 1; closer to the robot every second one is left out."""
+"""Minimum distance between rays, at scale 1; nearer to the robot, every second ray is left out."""
 _FIRST_RAY_PX = 12.0
 """Distance from the robot at which rays start, at scale 1."""
 _MAX_RANGE_TOLERANCE = 1e-6
@@ -44,13 +44,13 @@ class _Scan(NamedTuple):
 
     @property
     def hits(self) -> Array:
-        """Ends of the rays that are shorter than the longest one, (k, 2) px."""
+        """Ends of the rays that hit an obstacle, (k, 2) px: those shorter than the longest ray."""
         lengths = np.hypot(*(self.ends - self.position).T)
         return np.asarray(self.ends[lengths < lengths.max() * (1.0 - _MAX_RANGE_TOLERANCE)])
 
 
 def draw_dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
-    """Draw dots, one for all at the same quarter of a pixel.
+    """Draw dots; those that coincide after rounding to a quarter of a pixel are drawn once.
 
     Parameters
     ----------
@@ -80,7 +80,10 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
 
 
 def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]) -> None:
-    """Draw scans on a sketch. Drawing replaces colors, so that overlapping scans are not darker."""
+    """Draw scans on a sketch: areas, then rays, then outlines.
+
+    Drawing on the sketch replaces colors instead of blending them, so that overlaps are not darker.
+    """
     color = canvas.theme.final
     large = sketch.large
     corner = np.array(sketch.box.topleft) - 0.5
@@ -99,6 +102,7 @@ def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]
 
 
 def _draw_rays(large: pygame.Surface, scan: _Scan, canvas: Canvas) -> None:
+    """Draw the rays of an enlarged scan, each from where rays are far enough apart."""
     along = scan.ends - scan.position
     lengths = np.hypot(along[:, 0], along[:, 1])
     starts = _choose_ray_starts(len(scan.ends)) * canvas.scale * _FINENESS
@@ -117,6 +121,7 @@ def _choose_ray_starts(n_rays: int) -> Array:
     """Return the distance from the robot at which each ray starts, px at scale 1."""
     rays = np.arange(n_rays)
     starts = np.full(n_rays, _MIN_RAY_GAP_PX * n_rays / (2 * np.pi))
+    # Every second ray starts at half the distance, every fourth at a quarter, every eighth at an eighth.
     for divisor in (2, 4, 8):
         starts[rays % divisor == 0] /= 2
     return np.asarray(np.maximum(starts, _FIRST_RAY_PX))

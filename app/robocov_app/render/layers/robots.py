@@ -35,7 +35,9 @@ _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
 
 
 def compute_drawn_radii(canvas: Canvas, scene: Scene) -> Array:
-    """Compute the radii at which robots are drawn: readable ones, in a crowd down to the true ones.
+    """Compute the radii at which robots are drawn.
+
+    Discs are large enough for readable numbers. In a crowd they are smaller, but never below the true radius.
 
     Parameters
     ----------
@@ -62,15 +64,16 @@ def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:
-    """Draw the robots as discs with their numbers; those of unicycles have a nose."""
+    """Draw the robots as discs with their numbers; unicycles have a nose that points in their heading."""
     centers = canvas.camera.to_pixels(scene.now.positions)
     radii = compute_drawn_radii(canvas, scene)
     if scene.now.steering is not None:
+        # The first column of the steering is the heading, rad.
         headings = scene.now.steering[:, 0]
         _draw_noses(canvas, centers, radii, headings, np.flatnonzero(scene.team.is_unicycle))
     ring_widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(0.3 * radii))
     numbers = _choose_numbers(canvas, scene, radii - ring_widths)
-    # In a crowd many robots look the same.
+    # Robots that look the same share a sprite, which saves time in a crowd.
     indices_by_look: dict[tuple[float, float, int, int], int] = {}
     looks = zip(radii.tolist(), ring_widths.tolist(), canvas.hues.tolist(), numbers.tolist(), strict=True)
     indices = [indices_by_look.setdefault(look, len(indices_by_look)) for look in looks]
@@ -82,7 +85,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
 
 
 def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArray:
-    """Return the number on the disc of each robot; 0 if it would be too small."""
+    """Return the number on the disc of each robot; 0 if the digits would be too small to read."""
     numbers = np.array([scene.get_number(row) for row in range(len(inner_radii))], dtype=int)
     n_digits = 1 + np.digitize(numbers, [10, 100, 1000])
     sizes = sprites.choose_number_size(inner_radii, n_digits)
@@ -90,7 +93,17 @@ def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArra
 
 
 def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, robots: IntArray) -> None:
-    """Draw the noses of some robots; headings are in radians."""
+    """Draw the noses of some robots.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    centers : (n, 2) array, px
+    radii : (n,) array, px
+    headings : (n,) array, rad
+    robots : (k,) int array
+        Rows of the robots that have a nose.
+    """
     directions = np.rint(headings * (sprites.N_NOSE_DIRECTIONS / (2.0 * np.pi))).astype(int)
     noses = []
     for radius, direction in zip(
@@ -151,10 +164,25 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
 def _choose_number_position(
     canvas: Canvas, text: str, center: Array, radius: float, robots: tuple[Array, Array]
 ) -> list[float]:
-    """Return the middle of the number of a failed robot, px.
+    """Choose where the number of a failed robot is written, beside its disc.
 
-    The first position with enough space is chosen, so that numbers do not jump when others pass by; if there
-    is none, the one with the most space. `robots` are the centers, (n, 2) px, and radii, (n,) px, of all.
+    The first side with enough space is chosen, so that numbers do not jump when other robots pass by; if no
+    side has enough, the one with the most space.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    text : str
+        The number.
+    center : (2,) array, px
+    radius : float, px
+    robots : ((n, 2) array, (n,) array), px
+        Centers and radii of all robots.
+
+    Returns
+    -------
+    list of float, px
+        Middle of the number.
     """
     centers, radii = robots
     size = canvas.theme.small_text
@@ -169,6 +197,7 @@ def _choose_number_position(
         position = center + np.array([dx, dy])
         outside = np.maximum(np.abs(centers - position) - np.array([half_width, half_height]), 0.0)
         space = float((np.hypot(outside[:, 0], outside[:, 1]) - radii).min())
+        # All sides with at least half the gap count as equal, so the first of them wins.
         sufficient_space = min(space, 0.5 * gap)
         if sufficient_space > best_space:
             best_space = sufficient_space
@@ -177,6 +206,7 @@ def _choose_number_position(
 
 
 def _draw_failed_robot(canvas: Canvas, x: float, y: float, radius: float) -> None:
+    """Draw a gray disc with a cross, around a pixel."""
     theme = canvas.theme
     edge = mix(theme.background, theme.ink, 0.75)
     disc = partial(
@@ -188,7 +218,7 @@ def _draw_failed_robot(canvas: Canvas, x: float, y: float, radius: float) -> Non
         edge=edge,
     )
     canvas.draw_sprite(disc, (x, y))
-    # The cross reaches beyond the edge; inside, it would look like the sign of a button.
+    # The cross extends beyond the edge; inside, the disc would look like a close button.
     cross = partial(
         sprites.render_cross,
         round_to_half(1.1 * radius),
@@ -208,7 +238,10 @@ build_failed_robots_legend = build_legend(legend.FAILED_ROBOT, _draw_failed_symb
 
 
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
-    """Draw a ring around the selected robot and, if messages fail, its cell and positions it believes."""
+    """Draw a ring around the selected robot and, if messages can get lost, what it believes.
+
+    That is the cell that it computes, and the positions at which it believes itself and its neighbors.
+    """
     assert scene.selected is not None
     robot = scene.selected
     positions = canvas.camera.to_pixels(scene.now.positions).tolist()
@@ -221,7 +254,7 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
 
 
 def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
-    """Draw the outline of the cell that a robot computes."""
+    """Draw the outline of the cell that a robot computes from the messages that it has received."""
     cells = scene.now.decision.cells
     if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
         corners = canvas.camera.to_pixels(cells.polygons[robot])
@@ -229,7 +262,7 @@ def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
 
 
 def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions: list[list[float]]) -> None:
-    """Draw the positions of a robot and its neighbors as it believes, connected with the true ones, px."""
+    """Draw where a robot believes itself and its neighbors, connected with the true positions, px."""
     seen = scene.now.seen
     robots = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
     believed = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
@@ -250,7 +283,7 @@ def _draw_belief_ring(canvas: Canvas, hue: int, x: float, y: float) -> None:
 
 
 def build_selection_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of the positions that the selected robot believes, if messages fail."""
+    """Build the legend of the positions that the selected robot believes, if messages can get lost."""
     assert scene.selected is not None
     if scene.now.seen.reported_positions is None:
         return []

@@ -27,7 +27,7 @@ _HEADING_HALF_LENGTH_PX = 11.0
 
 
 def draw_grid(canvas: Canvas, scene: Scene) -> None:
-    """Draw the lines of the grid within the region, at the smallest round distance that suits the zoom."""
+    """Draw the lines of the grid within the region, as close together as the zoom permits."""
     step = _choose_grid_step(MIN_GRID_GAP_PX * canvas.scale / canvas.camera.zoom)
     environment = scene.environment
     bounds = environment.region.bounds
@@ -35,6 +35,7 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
     for axis in (0, 1):
         low = max(bounds[axis], visible[axis])
         high = min(bounds[axis + 2], visible[axis + 2])
+        # Lines are at multiples of the step, also when the view moves.
         for coordinate in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
             _draw_grid_line(canvas, environment, axis, coordinate)
 
@@ -47,7 +48,7 @@ def _choose_grid_step(min_step: float) -> float:
 
 
 def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordinate: float) -> None:
-    """Draw the line of points with the same coordinate, m, along an axis."""
+    """Draw the line on which x (axis 0) or y (axis 1) has a value, m, as far as it is in the region."""
     region = environment.region
     line = np.full((2, 2), coordinate)
     line[:, 1 - axis] = (region.bounds[1 - axis], region.bounds[3 - axis])
@@ -66,7 +67,7 @@ def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordin
 
 
 def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
-    """Draw the obstacles and all other areas that block robots, such as those outside a concave boundary."""
+    """Draw all areas that block robots: obstacles, and areas outside a concave boundary."""
     theme = canvas.theme
     page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
     page.set_clip(canvas.surface.get_clip())
@@ -81,18 +82,18 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_blocked_area(canvas: Canvas, scene: Scene, *, fill: Color, moving_fill: Color, edge: Color) -> None:
-    """Draw all obstacles in some colors.
+    """Draw all obstacles, in the colors of the caller.
 
     Parameters
     ----------
     canvas : Canvas
-        Its surface is transparent, so that courtyards within obstacles show the layers below.
+        Its surface must be transparent, so that courtyards within obstacles show the layers below.
     scene : Scene
     fill, moving_fill, edge : Color
         Colors of obstacles at rest, of moving ones and of outlines.
     """
     outlines: list[Array] = []
-    # A courtyard must be cleared before the obstacles in it are drawn.
+    # Largest first: a courtyard must be cleared before the obstacles in it are drawn.
     polygons = sorted(scene.environment.blocked.geoms, key=_compute_negative_outer_area)
     for polygon in polygons:
         outer = _get_corners(canvas, polygon.exterior)
@@ -160,7 +161,7 @@ _build_moving_legend = build_legend(
 
 
 def build_obstacles_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of obstacles at rest and of moving ones."""
+    """Build the legend of obstacles at rest and moving obstacles, as far as the scene has them."""
     return [*_build_static_legend(scene), *_build_moving_legend(scene)]
 
 

@@ -26,12 +26,12 @@ MIN_STEP_PX = 2.0
 SECTION_PX = 16.0
 """Length of the sections that are added to the page; shorter ends are drawn again in each frame."""
 MIN_CROWD = 400
-"""With at least this many robots, the ends are not smooth."""
+"""With at least this many robots, the ends of trajectories are not antialiased."""
 _MIN_MOVE_PX = 1.0
 """Robots that have moved less have no trajectory yet."""
 
 Path: TypeAlias = list[list[float]]
-"""Corners of a trajectory, px; that of an absent robot is a single nan."""
+"""Corners of a trajectory, px; the path of an absent robot is a single corner at nan."""
 
 
 class _Section(NamedTuple):
@@ -49,7 +49,11 @@ class _Section(NamedTuple):
 
 
 class TrajectoriesLayer:
-    """Draws trajectories; those of absent robots are nan.
+    """Draws the trajectories of robots; positions of absent robots are nan.
+
+    Finished sections are drawn on a page, which is kept from frame to frame while the view and the first part
+    of the trail stay the same. The open path of each robot continues its last section and is drawn again in
+    each frame.
 
     Parameters
     ----------
@@ -68,7 +72,7 @@ class TrajectoriesLayer:
         self._colors = LatestValue[list[Color]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the trail of a scene."""
+        """Draw the trail of a scene, of which only new rows are added if the page can be continued."""
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
@@ -86,6 +90,7 @@ class TrajectoriesLayer:
         self._last_row = trail[-1].copy()
         is_new_page = not is_continued and not is_fading
         min_corners = 1 + SECTION_PX / MIN_STEP_PX
+        # On a new page, all paths so far are finished at once, however short.
         if is_new_page:
             min_corners = 2
         self._draw_sections(self._finish_sections(min_corners), pen, can_merge=is_new_page)
@@ -93,9 +98,9 @@ class TrajectoriesLayer:
         self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
 
     def _find_last_row(self, trail: Array) -> bool:
-        """Return whether the trail contains the row that was drawn last.
+        """Return whether the trail still contains the row that was drawn last.
 
-        Rows come forward when older ones are removed; the number of drawn rows is then updated.
+        It is at a lower index if older rows were removed; the number of drawn rows is updated accordingly.
         """
         n_rows = self._n_drawn_rows
         if n_rows <= len(trail) and _are_same_rows(trail[[n_rows - 1]], self._last_row).all():
@@ -106,7 +111,7 @@ class TrajectoriesLayer:
         return len(rows) > 0
 
     def _start_page(self, canvas: Canvas, trail: Array, key: object) -> None:
-        """Start an empty page, and paths at the first positions."""
+        """Start an empty page, and open paths at the first positions of the trail."""
         self._key = key
         self._page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         self._page.set_clip(canvas.surface.get_clip())
@@ -118,7 +123,7 @@ class TrajectoriesLayer:
         self._open_paths = [[pixel] for pixel in _to_limited_pixels(canvas, positions).tolist()]
 
     def _draw_fading_trails(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
-        """Draw the whole trail on the page if it fades, and return whether it does."""
+        """Draw the whole trail on the page if trails fade, and return whether they do."""
         if not scene.trail_fade or scene.trail_time is None:
             return False
         draw_fading_trails(self._page, canvas, trail, scene.trail_time, fade=scene.trail_fade, pen=pen)
@@ -127,7 +132,7 @@ class TrajectoriesLayer:
         return True
 
     def _extend_paths(self, rows: Array) -> None:
-        """Extend the open paths by new positions, (k, n, 2) px."""
+        """Extend the open paths by new positions, (k, n, 2) px; end those of robots that fail."""
         last = np.array([path[-1] for path in self._open_paths])
         has_absent = bool(np.isnan(last).any() or np.isnan(rows).any())
         for row in rows:
@@ -146,7 +151,10 @@ class TrajectoriesLayer:
                 last[has_moved] = row[has_moved]
 
     def _finish_sections(self, min_corners: float) -> list[_Section]:
-        """Return ended paths, and those with a number of corners, which continue at their last corner."""
+        """Return the sections to draw on the page: ended paths, and open ones with enough corners.
+
+        An open path continues at the last corner of its section.
+        """
         sections = [section for section in self._ended if len(section.path) > 1]
         self._ended.clear()
         for robot, path in enumerate(self._open_paths):
@@ -156,7 +164,7 @@ class TrajectoriesLayer:
         return sections
 
     def _draw_sections(self, sections: list[_Section], pen: Pen, *, can_merge: bool) -> None:
-        """Draw sections on the page: each in a sketch of its own, or all in one if that is smaller."""
+        """Draw sections on the page: each in its own sketch, or in one if `can_merge` and that is smaller."""
         groups = [[section] for section in sections]
         boxes = [self._find_box(group, pen.width) for group in groups]
         if can_merge:
@@ -173,7 +181,7 @@ class TrajectoriesLayer:
             sketch.draw_on(self._page)
 
     def _find_box(self, sections: Sequence[_Section], width: float) -> pygame.Rect | None:
-        """Return the visible box around sections with a line width, px; None if nothing is visible."""
+        """Return the visible box around sections drawn with a line width, px; None if nothing is visible."""
         paths = [section.path for section in sections]
         points = np.concatenate([np.empty((0, 2)), *paths])
         return find_visible_box(points, 5.0 + width, self._page)
@@ -181,7 +189,7 @@ class TrajectoriesLayer:
     def _draw_ends(self, canvas: Canvas, ends: list[list[float]], pen: Pen) -> None:
         """Draw the open paths up to the current positions, px.
 
-        They are mostly below the robots, where neither seams nor steps show.
+        They are mostly covered by the robots, so seams and jagged edges do not show.
         """
         width = canvas.scale_width(pen.width / canvas.scale)
         is_smooth = len(ends) < MIN_CROWD
@@ -197,7 +205,7 @@ class TrajectoriesLayer:
                 pygame.draw.lines(canvas.surface, color, False, points)
 
     def _choose_colors(self, canvas: Canvas, n_robots: int) -> list[Color]:
-        """Return the color of the trajectory of each robot. The last ones are those of failed robots."""
+        """Return the color of each trajectory: working robots first, then failed ones."""
         theme = canvas.theme
         hues = canvas.hues.tolist()
         working = self._colors.get(
@@ -223,7 +231,7 @@ class TrajectoriesLayer:
 
 
 def _build_key(canvas: Canvas, scene: Scene, pen: Pen, n_robots: int) -> tuple[object, ...]:
-    """Return the properties that the page depends on in addition to the trail; fading adds the time."""
+    """Return all that the page depends on, apart from the trail; the time step too if trails fade."""
     fade_step = None
     if scene.trail_fade and scene.trail_time is not None:
         step = int(np.floor(scene.trail_time[-1] / scene.trail_fade * FADE_STEPS))
@@ -262,6 +270,6 @@ def _sum_areas(boxes: Iterable[pygame.Rect | None]) -> int:
 
 
 def _are_same_rows(rows: Array, row: Array) -> Array:
-    """Return which rows, (k, n, 2), equal another one, (n, 2); nan equals nan."""
+    """Return which rows, (k, n, 2), equal a given row, (n, 2); nan equals nan."""
     is_same = (rows == row) | (np.isnan(rows) & np.isnan(row))
     return np.asarray(is_same.all(axis=(1, 2)))

@@ -14,7 +14,7 @@ from robocov_app.replication.results.study_results import BeyondResults
 
 
 def judge_beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
-    """Judge all claims beyond the paper: goals, rivals and extensions.
+    """Judge all claims beyond the paper: our goals, comparisons with rivals, and extensions.
 
     Parameters
     ----------

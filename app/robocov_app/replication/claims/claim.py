@@ -1,4 +1,4 @@
-"""Criteria and claims, and how a verdict follows from them."""
+"""Criteria and claims, and the verdicts that follow from them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
 GOALS = 7
 RIVALS = 8
 EXTENSIONS = 9
-"""Questions beyond the paper. The paper's are 1 to 6."""
+"""Numbers of the questions beyond the paper; the paper's questions are 1 to 6."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Criterion:
     interval : Interval
         Its estimate and 95 % interval.
     low, high : float
-        The range, ends included.
+        Ends of the range, both included.
     unit : str
         "", "%", "m" or "s". For "%", a value of 0.5 is written as 50 %.
     """
@@ -52,7 +52,7 @@ class Criterion:
 
     @property
     def is_met(self) -> bool | None:
-        """Whether the whole interval is in the range; None if it is partly inside, or unknown."""
+        """Whether the whole interval is in the range; None if only part of it is, or if it is unknown."""
         if self.low <= self.interval.low and self.interval.high <= self.high:
             return True
         if self.interval.high < self.low or self.interval.low > self.high:
@@ -61,7 +61,7 @@ class Criterion:
 
     @property
     def p_value(self) -> float:
-        """The p-value of the true value being outside the range."""
+        """The p-value of the hypothesis that the true value is outside the range."""
         return self.interval.compute_p_value(self.low, self.high)
 
     @property
@@ -101,7 +101,7 @@ class Claim:
     Parameters
     ----------
     key : str
-        Name that is the same in all versions, for example "nonconvex-final-shared".
+        Identifier that does not change between versions, for example "nonconvex-final-shared".
     question : int
         Number of the question that the claim belongs to.
     text : str
@@ -109,12 +109,12 @@ class Claim:
     source : str
         Where the paper makes the claim; empty if the question is ours.
     criteria : tuple of Criterion
-        The first is the main one, whose estimate represents the claim.
+        The first is the main criterion, whose estimate represents the claim.
     runs, maps : int
-        Number of simulated runs that were used, and of different maps among them.
+        Number of simulated runs that the criteria are based on, and of different maps among them.
     explanation : str
     min_maps : int
-        Minimum number of maps for a decision.
+        Minimum number of maps for a verdict other than "undecided".
     adjusted_p_value : float or None
         The p-value adjusted by Holm, if the claim is registered.
     """
@@ -137,7 +137,7 @@ class Claim:
         outcomes: Outcomes | GainOutcomes,
         runs_per_instance: int,
     ) -> Claim:
-        """Return the claim with its criteria.
+        """Return the claim with criteria, an explanation, and the numbers of runs and maps.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Claim:
 
     @property
     def p_value_text(self) -> str:
-        """The p-values as text, for example "p = 0.001, by Holm 0.007"."""
+        """The p-values as text, for example "p = 0.001, Holm-adjusted 0.007"."""
         text = f"p = {format_amount(self.p_value)}"
         if self.adjusted_p_value is not None:
             text += f", Holm-adjusted {format_amount(self.adjusted_p_value)}"
@@ -171,7 +171,11 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict. It is undecided on too few maps."""
+        """The verdict: it holds if all criteria are met, and holds partly if some are.
+
+        It is undecided on too few maps, or if no criterion is met or refuted. A registered claim must also be
+        significant to hold.
+        """
         if self.maps < self.min_maps or not self.criteria:
             return "undecided"
         met = [criterion.is_met for criterion in self.criteria]
@@ -204,7 +208,7 @@ class Claim:
 
 
 def summarize_verdicts(claims: Sequence[Claim]) -> str:
-    """Return the numbers of verdicts: "Of 3 claims 2 hold, 1 is undecided."."""
+    """Return a sentence that counts the verdicts: "Of 3 claims 2 hold, 1 is undecided."."""
     verdicts = [claim.verdict for claim in claims]
     texts = []
     for verdict, (singular, plural) in VERDICTS.items():
@@ -224,17 +228,17 @@ def judge_pairs(
     max_ratio: float = 1.0,
     min_wins: float = 0.5,
 ) -> Claim:
-    """Judge whether the first of a pair has the lower values: in the median, and in most runs.
+    """Judge whether the first of two contenders has the lower values, in the median and in most pairs.
 
     Parameters
     ----------
     claim : Claim
     pairs : PairedComparison or None
-        Without any pairs, the claim is returned unchanged.
+        If it is None, the claim is returned unchanged.
     ratio_measure, wins_measure : str
         Names of the median ratio, and of the fraction of pairs in which the first value is lower.
     explain : callable
-        Returns the explanation.
+        Returns the explanation of the verdict.
     max_ratio, min_wins : float
         Bounds of these measures.
     """

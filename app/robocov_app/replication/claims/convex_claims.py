@@ -13,7 +13,7 @@ from robocov_app.replication.results.outcomes import Outcomes
 
 
 def judge_convex_final(outcomes: Outcomes) -> Claim:
-    """Judge whether RAPF ends at the same cost as Lloyd's algorithm."""
+    """Judge whether RAPF ends at the same cost as Lloyd's algorithm in convex regions."""
     claim = Claim(
         "convex-final",
         1,
@@ -48,7 +48,7 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
 
 
 def judge_convex_spreading(outcomes: Outcomes) -> Claim:
-    """Judge whether RAPF spreads faster than Lloyd's algorithm."""
+    """Judge whether RAPF spreads faster than Lloyd's algorithm from starts close together."""
     measure = f"mean distance over the first {EARLY_S:g} s"
     return judge_pairs(
         Claim(
@@ -68,7 +68,7 @@ def judge_convex_spreading(outcomes: Outcomes) -> Claim:
 
 
 def describe_other_gains(outcomes: Outcomes) -> str:
-    """Return in a sentence how RAPF at other gains compares with Lloyd's algorithm."""
+    """Return a sentence on how RAPF with other gains compares with Lloyd's algorithm; empty without runs."""
     texts = []
     for key in ("rapf-best", "rapf-default"):
         pairs = outcomes.compare(key, "lloyd")

@@ -8,13 +8,13 @@ from robocov_app.replication.results.outcomes import PairedComparison
 
 
 def describe_middle_half(gaps: Array) -> str:
-    """Return the quartiles of (m,) gaps in a sentence."""
+    """Return a sentence with the first and third quartile of gaps, (m,)."""
     low, high = np.quantile(gaps, [0.25, 0.75]).tolist()
     return f"Half of the runs lie between {format_amount(low, '%')} and {format_amount(high, '%')}."
 
 
 def describe_losses(pairs: PairedComparison, name: str) -> str:
-    """Return a sentence about the fraction of pairs in which the first has the higher value."""
+    """Return a sentence on the pairs that the first contender, `name`, loses, and on its worst pair."""
     worst = int(np.argmax(pairs.ratios))
     highest = format_amount(pairs.ratios[worst])
     losses = (pairs.ratios >= 1.0).sum()
@@ -30,6 +30,6 @@ def list_ratios_by_start(pairs: PairedComparison) -> str:
 
 
 def compute_positive_fraction(counts: Array) -> float:
-    """Return the fraction of positive values among the finite ones of (m,) counts; nan if there are none."""
+    """Return the fraction of positive values among the finite counts, (m,); nan without finite counts."""
     finite = counts[np.isfinite(counts)]
     return float((finite > 0).mean()) if len(finite) else float("nan")

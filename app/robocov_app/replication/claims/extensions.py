@@ -13,7 +13,7 @@ from robocov_app.replication.results.study_results import Degradation
 
 
 def judge_targets(outcomes: Outcomes) -> Claim:
-    """Judge whether the kind of target in its cell makes a difference to the cost of RAPF."""
+    """Judge whether the final cost of RAPF depends on the kind of target in the cells."""
     claim = Claim(
         "targets",
         EXTENSIONS,
@@ -42,7 +42,7 @@ def judge_targets(outcomes: Outcomes) -> Claim:
 
 
 def judge_density(outcomes: Outcomes) -> Claim:
-    """Judge whether RAPF that knows the density ends at a lower weighted cost."""
+    """Judge whether RAPF ends at a lower weighted cost if it knows the density."""
     return judge_pairs(
         Claim(
             "density",
@@ -61,7 +61,7 @@ def judge_density(outcomes: Outcomes) -> Claim:
 
 
 def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
-    """Judge whether a mixed team arrives earlier with cells by time than with cells by distance."""
+    """Judge whether a team of mixed speeds reaches points sooner with cells by time than by distance."""
     by_distance, by_time = [contender for contender in TEAMS if contender.controller == controller]
     label = by_time.label.partition(",")[0]
     return judge_pairs(
@@ -83,13 +83,13 @@ def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
 
 
 def judge_conditions(degradations: Iterable[Degradation], maps: int) -> Claim:
-    """Judge whether RAPF tolerates lost and late messages.
+    """Judge whether RAPF tolerates lost messages and late messages.
 
     Parameters
     ----------
     degradations : iterable of Degradation
     maps : int
-        Number of maps they are from.
+        Number of maps of these runs.
     """
     claim = Claim(
         "conditions",

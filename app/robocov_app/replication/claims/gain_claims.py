@@ -11,11 +11,11 @@ from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import GainOutcomes
 
 _MIN_VARIATION = 1e-12
-"""Lower bound of a denominator."""
+"""Lower bound of a denominator, to avoid a division by zero."""
 
 
 def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
-    """Judge whether RAPF's final cost depends less on the gains than RPF's.
+    """Judge whether RAPF's final cost depends less on its gains than RPF's.
 
     Parameters
     ----------
@@ -51,6 +51,7 @@ def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
 
 
 def _describe_attractions(rapf: GainOutcomes) -> str:
+    """Return the variation of RAPF's cost over the gains of the repulsion, for each attraction."""
     texts = []
     for level in rapf.list_levels("k_att"):
         part = rapf.select_gain("k_att", level)
@@ -69,8 +70,9 @@ def build_variation_criteria(
     Parameters
     ----------
     measure : str
+        Description of the variation.
     rapf, rpf : (m,) arrays
-        Variations of both.
+        Variations of RAPF and of RPF.
     maps : sequence of str
         Map of each value.
     bound : float
@@ -115,7 +117,7 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
 
 
 def compute_variation(grid: GainOutcomes) -> Array:
-    """Return the standard deviation of the cost over the gains relative to its mean, by instance, (m,)."""
+    """Return the coefficient of variation of the cost over the sets of gains, for each instance, (m,)."""
     return np.array([compute_coefficient_of_variation(column) for column in grid.excess.T])
 
 
@@ -127,9 +129,8 @@ def compute_worst_by_best(grid: GainOutcomes) -> Array:
 def compute_regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
     """Compute the cost of choosing gains without knowing the map.
 
-    For every problem instance two sets of gains are compared: the best one on the *other starts of the same
-    map*, and the best one on the other maps. Neither was chosen on the instance itself, so chance favors
-    none.
+    For every problem instance, two sets of gains are compared: the best set on *other starts of the same
+    map*, and the best set on other maps. Neither was chosen on the instance itself, so chance favors neither.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def compute_regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
     Returns
     -------
     regrets : (k,) array
-        J with the gains of other maps divided by J with those of the same map, minus 1.
+        J with the gains from other maps divided by J with those from the same map, minus 1.
     maps : list of str
         Map of each value.
     """
@@ -161,7 +162,10 @@ def compute_regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
 
 
 def select_common_instances(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
-    """Return the outcomes on the instances, the same of both, where no run of either failed."""
+    """Return the outcomes of both on the instances on which no run of either failed.
+
+    Both must have the same instances in the same order.
+    """
     is_finite = np.isfinite(np.vstack([rapf.excess, rpf.excess]))
     is_complete = np.asarray(is_finite.all(axis=0))
     return rapf.select(is_complete), rpf.select(is_complete)

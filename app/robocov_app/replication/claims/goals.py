@@ -1,7 +1,7 @@
 """Goals of our own controller, each a claim with one criterion.
 
-A goal is about the runs of the study: it is met or missed by the measured value. Its verdict as a claim says
-whether other maps could have given another result.
+A goal is about the runs of the study: the measured value meets or misses it. Its verdict as a claim says in
+addition whether the result could be different on other maps.
 """
 
 import math
@@ -41,7 +41,7 @@ _RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class _MainCriteria:
-    """Criteria on the gap, on contacts and on rest."""
+    """Criteria on the gap to the reference, on contacts, and on runs that settle."""
 
     gap: Criterion
     contacts: Criterion
@@ -49,6 +49,7 @@ class _MainCriteria:
 
 
 def _build_main_criteria(outcomes: Outcomes, key: str) -> _MainCriteria:
+    """Estimate the main measures of a contender, given by its key."""
     gap = bootstrap(outcomes.get_values(key, "gap"), clusters=outcomes.maps)
     contacts = estimate_fraction(outcomes.get_values(key, "contacts") > 0, outcomes.maps)
     rest = estimate_fraction(np.isfinite(outcomes.get_values(key, "settled")), outcomes.maps)
@@ -66,7 +67,7 @@ def judge_goals(
     steps: Mapping[int, StepTimes],
     plan: Plan,
 ) -> list[Claim]:
-    """Judge the goals of a controller of our own.
+    """Judge the goals of one of our own controllers.
 
     Parameters
     ----------
@@ -74,15 +75,15 @@ def judge_goals(
         Outcomes of all contenders.
     own : Contender
     contenders : sequence of Contender
-        All contenders, among which are the paper's strongest.
+        All contenders, including the paper's strongest ones.
     steps : Mapping
-        Step times by the size of the team.
+        Step times by the number of robots.
     plan : Plan
 
     Returns
     -------
     list of Claim
-        Goals without any data are left out.
+        Goals without data are left out.
     """
     goals: list[Claim] = []
     known = outcomes.select_finite("gap", own.key)
@@ -98,7 +99,7 @@ def _build_goal(name: str, text: str, criterion: Criterion, explanation: str, ou
 
 
 def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:
-    """Judge the gap in the median, on every map, and in comparison with the paper's strongest."""
+    """Judge the gap in the median, on every map, and compared with the paper's strongest contenders."""
     key = own.key
     label = own.label
     known = outcomes.select_finite("gap", key)
@@ -146,7 +147,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
 
 
 def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim]:
-    """Judge contacts, the fraction of runs that settle, and the time until rest."""
+    """Judge contacts, the fraction of runs that settle, and the median settling time."""
     label = own.label
     criteria = _build_main_criteria(known, own.key)
     has_contact = known.get_values(own.key, "contacts") > 0
@@ -185,7 +186,7 @@ def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim
 
 
 def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan) -> list[Claim]:
-    """Judge the computing time of steps, which is measured on one map and without any run of the study."""
+    """Judge the computing time of steps, which is measured separately, on one map."""
     goals = []
     large = steps.get(plan.beyond.large)
     if large is not None:
@@ -219,14 +220,14 @@ def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan
 
 
 def estimate_maximum_over_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
-    """Estimate the maximum over all maps of a statistic of their runs.
+    """Estimate the highest value that a statistic of the runs on a map has on any map.
 
-    The interval is that of a bootstrap which resamples runs within each map, but not the maps.
+    The interval is from a bootstrap that resamples the runs on each map, but not the maps.
 
     Parameters
     ----------
     statistic : callable
-        Takes row numbers, (m,) or (k, m), and returns a value over the last axis.
+        Takes row numbers, (m,) or (k, m), and reduces the last axis to one value.
     maps : sequence of str
         Map of each row.
 
@@ -248,7 +249,7 @@ def estimate_maximum_over_maps(statistic: Callable[[IntArray], Any], maps: Seque
 
 
 def estimate_worst_ratio(pairs: PairedComparison) -> Interval:
-    """Estimate the highest ratio of a map's medians."""
+    """Estimate the highest ratio of the two contenders' medians on any map."""
 
     def compute_ratio(rows: IntArray) -> Any:
         first = np.median(pairs.first_values[rows], axis=-1)
@@ -276,7 +277,7 @@ def _describe_miss(goal: Claim) -> str:
 
 
 def describe_goal(goal: Claim) -> str:
-    """Return the outcome of a goal: "met", "missed: 1.8 % instead of at most 1.4 %"."""
+    """Return the outcome of a goal, such as "met" or "missed: 1.8 % instead of at most 1.4 %"."""
     (criterion,) = goal.criteria
     text = "met" if is_goal_met(goal) else f"missed: {_describe_miss(goal)}"
     if criterion.is_met is None and math.isfinite(criterion.interval.low):
@@ -285,7 +286,7 @@ def describe_goal(goal: Claim) -> str:
 
 
 def summarize_goals(goals: Sequence[Claim]) -> str:
-    """Return a sentence with the number of goals that are met, and the others."""
+    """Return sentences with the number of goals that are met, and the missed goals."""
     if not goals:
         return "Nothing was measured."
     missed = [f"{goal.criteria[0].measure} {_describe_miss(goal)}" for goal in goals if not is_goal_met(goal)]
@@ -296,7 +297,7 @@ def summarize_goals(goals: Sequence[Claim]) -> str:
 
 
 def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Judge our own controller on maps of other kinds than those of the claims; None without any run.
+    """Judge our own controller on maps of other kinds than those of the claims; None without runs.
 
     Parameters
     ----------
@@ -304,7 +305,7 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
         Outcomes on these maps.
     own : Contender
     contenders : sequence of Contender
-        All contenders, among which are the paper's strongest.
+        All contenders, including the paper's strongest ones.
     """
     known = outcomes.select_finite("gap", own.key)
     if not known.instances:

@@ -43,9 +43,9 @@ def judge_against_rpf(
     ----------
     outcomes : Outcomes
     gains : str
-        "shared" gains, or the "best" ones of each.
+        "shared" for equal gains, "best" for the best gains of each controller.
     period : str
-        The "final" cost, or the average during the "motion".
+        "final" for the cost at the end, "motion" for its average over the first minute.
     """
     gains_text = "with the same potential parameters" if gains == "shared" else "each with its own best gains"
     result = "ends at a lower cost than RPF"
@@ -91,7 +91,7 @@ def judge_against_lloyd(outcomes: Outcomes) -> Claim:
 
 
 def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
-    """Judge whether Lloyd's algorithm leaves robots stuck at obstacles."""
+    """Judge whether robots get stuck at obstacles with Lloyd's algorithm."""
     claim = Claim(
         "lloyd-stuck",
         5,
@@ -123,7 +123,7 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
 
 
 def judge_gap(outcomes: Outcomes, key: str) -> Claim:
-    """Judge the gap of a contender to the reference placement: RPF's is large, those of others are small."""
+    """Judge the gap of a contender to the reference: RPF's is claimed to be large, that of others small."""
     text, source = _GAP_CLAIMS[key]
     claim = Claim(f"gap-{key.removesuffix('-shared')}", 6, text, source)
     known = outcomes.select_finite("gap", key)
@@ -140,11 +140,12 @@ def judge_gap(outcomes: Outcomes, key: str) -> Claim:
 
 
 def _explain_gaps(outcomes: Outcomes, gaps: Array) -> str:
+    """Return sentences on the distribution of gaps, (m,), one for each instance."""
     better_than_reference = ""
     if (gaps < 0).any():
         fraction = format_amount((gaps < 0).mean(), "%")
         better_than_reference = f", and was beaten in {fraction} of the runs"
-    # Bundled maps are larger, and harder.
+    # Bundled maps are larger and more difficult, so they are listed separately.
     is_generated = np.array([name.startswith("generated-") for name in outcomes.maps], dtype=bool)
     medians = []
     for kind, kind_gaps in (("generated", gaps[is_generated]), ("bundled", gaps[~is_generated])):

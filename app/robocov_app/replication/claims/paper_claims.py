@@ -1,4 +1,4 @@
-"""All claims of the paper, the registered ones adjusted by Holm."""
+"""All claims of the paper, with Holm-adjusted p-values of the registered ones."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Claims on our own controller in comparison with all others."""
+"""Claims on our own controller compared with all others."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from robocov_app.replication.results.outcomes import Outcomes
 
 
 def judge_rivals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:
-    """Judge whether our own controller ends at a lower cost than each other one.
+    """Judge, for each other controller, whether our own controller ends at a lower cost.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import Outcomes
 
 _MIN_VARIATION = 1e-12
-"""Lower bound of a denominator."""
+"""Lower bound of a denominator, to avoid a division by zero."""
 
 
 def judge_starts_cost(outcomes: Outcomes) -> Claim:
@@ -78,7 +78,10 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
 
 
 def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[Array, list[str]]:
-    """Return the variations of a contender's final cost over several starts, (k,), and their maps."""
+    """Return the coefficients of variation of a contender's final cost over the starts, and their maps.
+
+    There is one coefficient for each map and seed with several starts, (k,).
+    """
     finals = zip(outcomes.instances, outcomes.get_values(key, "final"), strict=True)
     groups = group_by(finals, lambda pair: (pair[0].map, pair[0].seed))
     variations = []

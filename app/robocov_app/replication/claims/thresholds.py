@@ -11,34 +11,38 @@ SAME_COST = 0.02
 NEARLY_SAME = 0.05
 """In single runs two costs are nearly the same if they differ by at most 5 %."""
 NEARLY_ALWAYS = 0.9
-"""Fraction of runs that "the result is" refers to, where the paper makes no exceptions.
+"""Minimum fraction of runs for which a statement that the paper makes without exceptions must be true.
 
-Its exact interval counts maps: on 33 not one may differ, and by Holm even none is too few. Of the full
-study's 100 maps four may, two if the p-value is the lowest of all registered ones.
+The exact interval of the fraction counts maps: of 33 maps no map may differ, and after Holm's adjustment even
+that is not enough. Of the 100 maps of the full study four may differ, or two if the p-value is the lowest of
+all registered ones.
 """
 CLEARLY_BELOW = 0.95
-"""A controller is better than another if the median ratio of their costs is below this."""
+"""A controller is clearly better than another if the median ratio of their costs is below this."""
 BARELY = 0.05
 """A result barely depends on the gains if its standard deviation is below 5 % of its mean."""
 REGRET = 0.02
-"""The best gains depend on the environment if those of other maps cost more than 2 % on it."""
+"""The best gains depend on the environment if the best gains of other maps raise the cost by over 2 %."""
 BARELY_BY_START = 0.1
 """A result barely depends on the starts if its standard deviation over them is below 10 % of its mean.
 
 Starts matter more than gains for any controller that descends to a local optimum, so the bound is wider.
 """
 SAME_PLACEMENT = 0.25
-"""Two placements are nearly the same if robots are less than a quarter of the side of their share apart."""
-NEAR_OPTIMUM = 0.1
-"""A team is near the reference within 10 % of its cost."""
-FAR_FROM_OPTIMUM = 0.25
-"""A team is far from the reference above 25 % of its cost."""
-CLUSTERED = CONVEX_KINDS[:-1]
-"""Starts in convex regions in which the robots are close together."""
+"""Two placements are nearly the same if the matched robots are closer than this.
 
-# The goals of our own controller. Its gains were tuned on other generated maps, but its outcomes on those of
-# the study were inspected while its rules were made. The claim "goal-unseen" is on maps of other kinds. They
-# are also kinds of the benchmark, whose results were inspected as well.
+In units of the side of a square whose area is one robot's share of the free space.
+"""
+NEAR_OPTIMUM = 0.1
+"""A team is near the reference if its cost exceeds that of the reference by at most 10 %."""
+FAR_FROM_OPTIMUM = 0.25
+"""A team is far from the reference if its cost exceeds that of the reference by at least 25 %."""
+CLUSTERED = CONVEX_KINDS[:-1]
+"""Kinds of starts in convex regions from which the robots start close together."""
+
+# The goals of our own controller. Its gains were tuned on other generated maps, but its outcomes on the maps
+# of the study were inspected while its rules were developed. The claim "goal-unseen" is about maps of other
+# kinds. These kinds are also in the benchmark, whose results were inspected as well.
 MAX_GAP = 0.01
 """Maximum median of J / J_ref - 1."""
 MAX_MAP_GAP = 0.05
@@ -48,13 +52,13 @@ NEVER_WORSE = 1.01
 MIN_AT_REST = 0.95
 """Minimum fraction of its runs that come to rest."""
 RARELY = 0.1
-"""Maximum fraction of runs with a contact. No number of runs can show that none has any."""
+"""Maximum fraction of runs with a contact; no number of runs can prove that contacts never happen."""
 MAX_REST_TIME_S = 40.0
 """Maximum median time until rest."""
 MAX_STEP_RATIO = 10.0
 """Maximum ratio of the step time of a large team to that of RAPF."""
 MIN_CLOSED_FRACTION = 0.5
-"""Minimum fraction of a gap that is closed, if most of it is."""
+"""Minimum fraction of a gap that must be closed to say that most of it is."""
 
 TOLERATED = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
 """Disturbances that RAPF should tolerate: axis and value, and their description."""
@@ -68,12 +72,12 @@ REGISTERED = (
     "lloyd-stuck",
     "gap-rapf",
 )
-"""The paper's main claims, tested together at the level `ALPHA`. The others have their intervals only."""
+"""The paper's main claims, which are tested together at the level `ALPHA`; others only have intervals."""
 ALPHA = 0.05
 """Significance level of the registered claims."""
 MIN_MAPS = 12
-"""Minimum number of maps to judge a claim on.
+"""Minimum number of maps for judging a claim.
 
-A 95 % percentile interval of the mean of 5 normal clusters contains the true value in 82 % of all cases, that
-of 12 in 92 %.
+A 95 % percentile interval of the mean contains the true value in 82 % of all cases with 5 normally
+distributed clusters, and in 92 % with 12.
 """

@@ -1,4 +1,4 @@
-"""Compared controllers with their gains: the paper's, other authors', and our own."""
+"""The compared controllers with their gains: those of the paper, those of other authors, and our own."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -13,15 +13,15 @@ from robocov_app.replication.assets import ASSETS
 PAPER = ("rapf", "rpf", "lloyd")
 """Controllers of the paper's claims."""
 OURS = ("atlas", "atlas-shared")
-"""The project's own controllers. The goals are for the first."""
+"""The project's own controllers; the goals are about the first one."""
 
 BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]
-"""The best gains of controllers that were tuned, by controller."""
+"""The best gains of each tuned controller."""
 
 SHARED: Mapping[str, Value] = {"k_rep": 1.0, "rho_0": 2.0}
-"""Potential parameters of both RAPF and RPF, as in the paper, which does not print its own.
+"""Potential parameters that RAPF and RPF share, as in the paper, which does not state its values.
 
-The repulsion then holds a robot that is pulled with 1 N about 0.83 m away from a wall.
+With these, the repulsion holds a robot that is pulled with 1 N about 0.83 m away from a wall.
 """
 SHARED_ATTRACTION = 3.0
 """RAPF's k_att: at a distance of 1 m from its goal a robot is pulled with 3 N, enough for full speed."""
@@ -59,7 +59,7 @@ class Contender:
 
     @property
     def all_gains(self) -> dict[str, Value]:
-        """All gains, those that have their defaults included."""
+        """All gains, including those that have their default values."""
         return dict(get_gain_values(make_controller(self.controller, self.gains)))
 
     @property
@@ -85,7 +85,7 @@ RPF_SHARED = build_paper_contender("rpf-shared", SHARED)
 LLOYD = build_paper_contender("lloyd", {})
 RAPF_DEFAULT = build_paper_contender("rapf-default", {})
 UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
-"""Contenders of the paper's claims whose gains are fixed."""
+"""Contenders of the paper's claims whose gains are not tuned."""
 
 TARGETS = (
     Contender("centroid", "the centroid", "rapf", {}),
@@ -116,6 +116,7 @@ def combine_gains(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
 
 
 def _load_gain_grids() -> dict[str, tuple[dict[str, Value], ...]]:
+    """Load the sets of gains of each baseline: all combinations within each part of its grid."""
     grids: dict[str, tuple[dict[str, Value], ...]] = {}
     document = tomllib.loads((ASSETS / "grids.toml").read_text(encoding="utf-8"))
     for name, parts in document.items():
@@ -131,12 +132,12 @@ GAIN_GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = _load_gain_grids()
 
 
 def build_baselines(best: BestGains) -> tuple[Contender, ...]:
-    """Build the contenders of all controllers by other authors that the paper does not compare.
+    """Build the contenders of all controllers of other authors that are not in the paper.
 
     Parameters
     ----------
     best : Mapping
-        Their best gains. A controller without any keeps its defaults.
+        Their best gains; a controller without an entry keeps its defaults.
 
     Returns
     -------
@@ -152,7 +153,7 @@ def build_paper_contenders(best: BestGains) -> tuple[Contender, ...]:
     Parameters
     ----------
     best : Mapping
-        The best gains of RAPF and RPF. If it is empty, the contenders at the best gains are left out.
+        The best gains of RAPF and RPF. If it is empty, the contenders with the best gains are left out.
 
     Returns
     -------
@@ -166,16 +167,19 @@ def build_paper_contenders(best: BestGains) -> tuple[Contender, ...]:
 
 
 def select_strongest(contenders: Sequence[Contender]) -> list[Contender]:
-    """Return RAPF at its best gains, or at its defaults if those are not known, and LA."""
+    """Return the paper's strongest contenders: Lloyd's algorithm, and RAPF with its best gains.
+
+    Without its best gains, RAPF with its defaults is returned.
+    """
     by_key = {contender.key: contender for contender in contenders}
     rapf = by_key.get("rapf-best") or by_key.get("rapf-default")
     return [contender for contender in (rapf, by_key.get("lloyd")) if contender is not None]
 
 
 def collect_gain_sets(contenders: Sequence[Contender]) -> dict[str, list[dict[str, Value]]]:
-    """Return all sets of gains by controller.
+    """Return all sets of gains by controller, each set once.
 
-    Each set is listed once: the best gains of a controller may be the shared ones.
+    The best gains of a controller may be equal to the shared ones.
     """
     gain_sets: dict[str, list[dict[str, Value]]] = {}
     for contender in contenders:

@@ -9,7 +9,7 @@ from robocov_app.replication.design.contenders import OURS
 ROBOTS = 6
 """Size of the team, as in the paper."""
 PARTITION_SEED = 56
-"""Seed of the robots in figure 1, where none hides the center of mass of its cell."""
+"""Seed of the positions in figure 1, in which no robot hides the center of mass of its cell."""
 
 KINDS = ("corner", "centre", "uniform")
 """Kinds of starts, the same on all maps.
@@ -35,12 +35,12 @@ NON_CONVEX = (
     "warehouse",
     "city",
 )
-"""Bundled maps of the study: all that are not convex, except for ``campus``. It is 120 m wide: at 1 m/s the
-robots would not have arrived when the run ends."""
+"""Bundled maps of the study: all that are not convex, except for ``campus``. It is 120 m wide, so that robots
+at 1 m/s would not arrive before the run ends."""
 CONVEX = ("square", "pentagon")
 """Bundled maps of the convex case."""
 UNSEEN = ("blocks", "rooms", "caves", "mazes")
-"""Kinds of generated maps on which no claim of the paper is tested."""
+"""Kinds of generated maps on which the paper's claims are not tested."""
 
 TEAM: Mapping[str, Any] = {
     "radius": 0.1,
@@ -52,30 +52,30 @@ TEAM: Mapping[str, Any] = {
 }
 """Team of every controller.
 
-The sensors reach as far as the longest repulsion of the gain grids, so that `rho_0` alone limits the range of
-obstacles. Communication is unlimited.
+The sensing range equals the longest repulsion in the gain grids, so that only `rho_0` limits the distance at
+which obstacles act. Communication is unlimited.
 """
 
 
 @dataclass(frozen=True)
 class BeyondPlan:
-    """Extent of the study beyond the paper, by default of the full one.
+    """Extent of the study beyond the paper; the defaults are those of the full study.
 
     Our own controller runs as often as RAPF.
 
     Parameters
     ----------
     bundled, generated, starts, seeds : tuple
-        Bundled maps, seeds of generated maps, kinds and seeds of starts for the baselines and our own
-        controllers. They are among those of the paper's claims.
+        Bundled maps, seeds of generated maps, and kinds and seeds of starts for the baselines and our own
+        controllers: a selection from those of the paper's claims.
     own_seeds, shared_seeds : tuple of int
         Seeds of starts for our own controller, and for the one that shares its map.
     tuning : tuple of int
-        Seeds of the generated maps on which the gains of the baselines are tuned, among those of the paper's
-        tuning. Without any, the baselines keep their default gains.
+        Seeds of the generated maps on which the gains of the baselines are tuned: a selection from those of
+        the paper's tuning. If it is empty, the baselines keep their default gains.
     unseen : tuple of int
-        Seeds of maps of other kinds than those of the claims, `UNSEEN`, on which our own controller is
-        judged again, next to RAPF and LA.
+        Seeds of maps of the kinds in `UNSEEN`, on which our own controller is judged again and compared with
+        RAPF and Lloyd's algorithm.
     maps, map_starts : tuple
         Seeds of generated maps, and kinds of starts, for targets, density and mixed teams.
     conditions_maps : tuple of str
@@ -85,10 +85,10 @@ class BeyondPlan:
     conditions_duration : float
         Duration of these runs, s.
     probe : float
-        Duration of the runs by which the computing time is estimated, s. Controllers that plan compute most
-        at first: shorter runs make them appear slower than they are.
+        Duration of the runs from which the computing time is estimated, s. Controllers that plan need most
+        of it at first, so shorter runs would make them appear slower than they are.
     worst : int
-        Number of our worst runs that are shown, on different maps.
+        Number of our controller's worst runs that are shown, each on another map.
     warm_up : int
         Number of steps before those that are timed.
     blocks : int
@@ -125,7 +125,9 @@ class BeyondPlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """Extent of a study, by default of the full one: 100 non-convex maps, 100 convex regions, 12 for gains.
+    """Extent of a study; the defaults are those of the full study.
+
+    It has 100 non-convex maps and 100 convex regions for the claims, and 12 maps for the gain grids.
 
     Parameters
     ----------
@@ -139,13 +141,13 @@ class Plan:
     lattice : int
         Sites along a side of the lattice of the coverage cost.
     bundled, generated, seeds : tuple
-        Bundled maps, seeds of generated maps, and seeds of the starts for the claims. Together they are 100
-        maps, see `NEARLY_ALWAYS` in `robocov_app.replication.claims.thresholds`.
+        Bundled maps, seeds of generated maps, and seeds of starts for the claims. For the reason of their
+        number see `NEARLY_ALWAYS` in `robocov_app.replication.claims.thresholds`.
     tuning, tuning_starts, tuning_seed : tuple, tuple and int
-        Seeds of the generated maps for the gain grids, none of them in `generated`, kinds of starts, and a
-        seed of the starts that no claim uses.
+        Seeds of the generated maps for the gain grids, which must not be in `generated`, kinds of starts, and
+        a seed of starts that no claim uses.
     k_rep, rho_0, k_att : tuple of float
-        Gains in the grids.
+        Values of the gains in the grids.
     convex_generated, convex_seeds : tuple of int
         Seeds of the convex regions next to the bundled ones, and seeds of the starts there.
     restarts : int
@@ -205,4 +207,4 @@ QUICK = Plan(
         blocks=1,
     ),
 )
-"""The quick study: enough to see that everything works, too little to decide much. It takes four minutes."""
+"""The quick study, which takes four minutes: enough to check that everything works, but for few verdicts."""

@@ -1,8 +1,8 @@
 """The sweeps of the study, each with the name of its folder.
 
-``gains`` and ``rival-gains`` are gain grids on maps of their own, from which the best gains are chosen. On
-the maps of ``claims`` the paper's contenders run, and from the same starts all others in ``rivals`` and
-``ours-…``. ``density`` is RAPF that knows the density, ``density-ignored`` RAPF that does not.
+``gains`` and ``rival-gains`` are gain grids on separate maps, from which the best gains are chosen.
+``claims`` contains the runs of the paper's contenders, ``rivals`` and ``ours-…`` those of all others on the
+same maps and from the same starts. In ``density`` RAPF knows the density, in ``density-ignored`` it does not.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ from robocov_app.sweep.study import Study, StudyMap
 
 
 class FigureCase(NamedTuple):
-    """Runs that some figures of the paper show."""
+    """Runs shown in some figures of the paper."""
 
     map: str
     starts: tuple[str, ...]
@@ -48,21 +48,21 @@ FIGURE_CASES = {
     "figures-a": FigureCase("blocks-a", ("paper",), (RAPF_SHARED, RPF_SHARED)),
     "figures-b": FigureCase("blocks-b", ("paper", "other"), (RAPF_SHARED, RPF_SHARED)),
 }
-"""Runs of the figures by sweep. The start "paper" is the same on both maps, "other" is that of figure 8."""
+"""Runs of the figures by sweep; "paper" is the same start on both maps, "other" the start of figure 8."""
 
 DENSITY_MAP = "hospital"
 DENSITY_START = "reception"
-"""Map and start of the figure of a density."""
+"""Map and start of the figure about the density."""
 
 GROUPS = (
     {"count": 2, "max_speed": 1.0},
     {"count": 2, "max_speed": 0.5},
     {"count": 2, "max_speed": 0.25},
 )
-"""A team of robots with different speeds, m/s."""
+"""Groups of a team with mixed speeds, m/s."""
 
 Axes: TypeAlias = Mapping[str, tuple[float | None, ...]]
-"""Values of disturbances. The first of each is the ideal one."""
+"""Values of each disturbance; the first value means that there is none."""
 AXES: Axes = {
     "loss": (0.0, 0.3, 0.6, 0.9),
     "delay": (0.0, 0.5, 1.0, 2.0),
@@ -73,9 +73,9 @@ AXES: Axes = {
 }
 """Disturbances, from none to strong."""
 COMMON_CONDITIONS = {"message_rate": 2.0}
-"""Conditions of all these runs, the ideal ones included: among 60 messages a second no loss would matter."""
+"""Conditions of all these runs, also the ideal ones: with 60 messages per second, no loss would matter."""
 DISTURBED = ("rapf", "lloyd")
-"""Controllers that run at every value of `AXES`. All others run at `STRONG_INDEX` with one seed."""
+"""Controllers that run with every value of `AXES`; all others run only at `STRONG_INDEX`, with one seed."""
 STRONG_INDEX = 2
 """Index in `AXES` of a strong disturbance."""
 BASELINE_GAINS = "rival-gains"
@@ -86,14 +86,14 @@ _COST_RATE_HZ = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """A sweep, and the contenders that take part in it."""
+    """A sweep and its contenders."""
 
     study: Study
     contenders: tuple[Contender, ...]
 
 
 class Disturbances(NamedTuple):
-    """Controllers, and the disturbances they run with."""
+    """Controllers, and the disturbances with which they run."""
 
     controllers: tuple[str, ...]
     seeds: int
@@ -109,7 +109,7 @@ def build_contest(
     seeds: Sequence[int],
     **changes: Any,
 ) -> Contest:
-    """Build a sweep of contenders.
+    """Build the sweep of contenders on maps, with the common options of the study.
 
     Parameters
     ----------
@@ -151,14 +151,14 @@ def _build_common_options(plan: Plan) -> dict[str, Any]:
 
 
 def build_figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[str, Study]:
-    """Build the sweeps whose runs the figures show. Their trajectories and costs are recorded finely.
+    """Build the sweeps whose runs are shown in figures; trajectories and costs are recorded in fine steps.
 
     Parameters
     ----------
     plan : Plan
     papers : sequence of Contender
-        The paper's contenders. If there are some at their best gains, the sweeps are those of figures 4 to 8
-        with these gains.
+        The paper's contenders. If some of them have their best gains, only the sweeps of figures 4 to 8 with
+        these gains are built.
 
     Returns
     -------
@@ -168,6 +168,7 @@ def build_figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[s
     best = tuple(contender for contender in papers if contender.key.endswith("-best"))
     studies = {}
     for name, case in FIGURE_CASES.items():
+        # Figures that compare with Lloyd's algorithm are not drawn for the best gains.
         if best and LLOYD in case.contenders:
             continue
         contest = build_contest(
@@ -185,7 +186,7 @@ def build_figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[s
 
 
 def list_gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
-    """Return the gain grids: the same potentials for RAPF and RPF, for RAPF with every attraction."""
+    """Return the gain grids: the same potentials for both, combined with each attraction for RAPF."""
     potentials = list(contenders.combine_gains(k_rep=plan.k_rep, rho_0=plan.rho_0))
     attractions = contenders.combine_gains(k_att=plan.k_att, attraction_limit=(None,))
     rapf = [potential | attraction for attraction in attractions for potential in potentials]
@@ -237,9 +238,9 @@ def build_beyond_contests(
     ----------
     plan : Plan
     best : Mapping
-        The best gains of the baselines. Others keep their defaults.
+        The best gains of the baselines; baselines without an entry keep their defaults.
     papers : sequence of Contender
-        The paper's contenders. The strongest run next to ours on the unseen maps.
+        The paper's contenders, of which the strongest run on the unseen maps as well.
 
     Returns
     -------
@@ -265,7 +266,7 @@ def build_beyond_contests(
 
 
 def _build_density_contests(plan: Plan) -> dict[str, Contest]:
-    """Build the sweeps of RAPF with and without knowledge of the density, and those of their figure."""
+    """Build the sweeps of RAPF with and without knowledge of the density, and those for the figure."""
     hospital = load_map(DENSITY_MAP)
     weighted = (build_density_maps(plan), hospital)
     plain = (build_generated_maps(plan.beyond.maps), replace(hospital, density=None))
@@ -286,7 +287,7 @@ def _build_density_contests(plan: Plan) -> dict[str, Contest]:
 
 
 def list_disturbances(plan: Plan) -> dict[str, Disturbances]:
-    """Return the disturbances by the first words of their sweeps' names."""
+    """Return the disturbances by the prefix of their sweeps' names."""
     strong_only = {name: (values[0], values[STRONG_INDEX]) for name, values in AXES.items()}
     others = tuple(name for name in CONTROLLERS if name not in DISTURBED)
     axes = strong_only if plan.name == "quick" else AXES
@@ -314,6 +315,7 @@ def build_conditions_studies(plan: Plan) -> dict[str, Study]:
         }
         studies[f"{part}-ideal"] = Study(**options)
         for name, values in disturbances.axes.items():
+            # The first value is the ideal one.
             disturbed = list(values[1:])
             changes: dict[str, Any] = {"conditions": {**COMMON_CONDITIONS, name: disturbed}}
             if name in TEAM_PARAMETERS:
@@ -323,13 +325,13 @@ def build_conditions_studies(plan: Plan) -> dict[str, Study]:
 
 
 def build_probe_studies(plan: Plan, *, beyond: bool) -> list[Study]:
-    """Build the runs by which the computing time of the study is estimated, one for each controller.
+    """Build the runs from which the computing time of the study is estimated, one for each controller.
 
     Parameters
     ----------
     plan : Plan
     beyond : bool
-        Include the controllers beyond the paper, with shorter runs.
+        Whether to include the controllers beyond the paper, with shorter runs.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Maps of the study with its kinds of starts: bundled and generated ones."""
+"""Bundled and generated maps with the kinds of starts of the study."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -17,11 +17,11 @@ from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, KINDS, UNS
 from robocov_app.sweep.study import StudyMap
 
 START_RADII_M = (0.8, 0.6, 0.45)
-"""Radii of the discs of clustered starts. The first that fits is used."""
+"""Radii of the discs of clustered starts, of which the first that fits is used."""
 TIGHT_RADIUS_M = 0.35
-"""Radius of the disc of "tight" starts, which hardly has space for more than the centers of six robots."""
+"""Radius of the disc of "tight" starts, which is hardly larger than six robots need."""
 SIDE_M = 10.0
-"""Side of the square in which maps and regions are drawn."""
+"""Side of the square in which maps and regions are generated."""
 _HULL_POINTS = 9
 _MIN_HULL_AREA_M2 = 40.0
 _MIN_HULL_WIDTH_M = 5.0
@@ -51,8 +51,8 @@ def generate_study_map(seed: int) -> StudyMap:
 def generate_convex_region(seed: int) -> StudyMap:
     """Generate a convex region without obstacles, with the study's starts.
 
-    It is the convex hull of nine points that are uniform in a square with a side of ten meters. Hulls smaller
-    than 40 m² or narrower than 5 m are drawn again. Coordinates are whole centimeters.
+    It is the convex hull of nine random points in a square with a side of ten meters. Hulls smaller than
+    40 m² or narrower than 5 m are rejected. Coordinates are whole centimeters.
     """
     rng = np.random.default_rng([seed, 1])
     area = 0.0
@@ -81,6 +81,7 @@ def replace_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> En
 
 
 def _build_start(environment: Environment, kind: str) -> StartSpec:
+    """Build a start: anywhere, or in a free disc as near as possible to the lower left corner or middle."""
     if kind == "uniform":
         return UniformStart()
     min_x, min_y, max_x, max_y = environment.region.bounds
@@ -92,14 +93,14 @@ def _build_start(environment: Environment, kind: str) -> StartSpec:
         centers = environment.free.geoms[0].buffer(-radius)
         if not centers.is_empty:
             x, y = shapely.shortest_line(centers, desired).coords[0]
-            # Whole centimeters are the same on every processor.
+            # Rounding makes the start the same on every processor.
             return DiscStart((round(x, 2), round(y, 2)), radius)
     raise StartError(f"map {environment.name!r}: no free disc of {START_RADII_M[-1]:g} m radius")
 
 
 @cache
 def build_generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
-    """Return the generated non-convex maps of some seeds."""
+    """Return the generated non-convex maps for some seeds."""
     return tuple(generate_study_map(seed) for seed in seeds)
 
 
@@ -128,7 +129,7 @@ def build_unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 
 def build_baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the maps of baselines and our own controllers: those of the claims, or some of them."""
+    """Return the maps for the baselines and our own controllers, a selection from the maps of the claims."""
     names = {*plan.beyond.bundled, *(f"generated-{seed}" for seed in plan.beyond.generated)}
     return tuple(study_map for study_map in build_claim_maps(plan) if study_map.name in names)
 

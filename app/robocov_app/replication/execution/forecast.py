@@ -28,7 +28,7 @@ class Forecast:
     left : int
         Number of runs that are not finished.
     seconds : float
-        Computing time of these on all workers, s.
+        Computing time of the unfinished runs on all workers, s.
     seconds_per_run : Mapping
         Computing time of one run, s, by controller.
     """
@@ -40,7 +40,7 @@ class Forecast:
 
 
 def forecast_study(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
-    """Forecast a study by a short run of every controller.
+    """Forecast a study from a short run of every controller.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def forecast_study(folder: Path, plan: Plan, workers: int, *, claims: bool, beyo
     workers : int
         Number of processes.
     claims, beyond : bool
-        Include the paper's claims, and the part beyond the paper.
+        Whether to include the paper's claims, and the part beyond the paper.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def forecast_study(folder: Path, plan: Plan, workers: int, *, claims: bool, beyo
 def _list_studies(folder: Path, plan: Plan, *, claims: bool, beyond: bool) -> dict[str, Study]:
     """Return all sweeps of a study by name.
 
-    The best gains are not known yet. The number of runs hardly depends on them.
+    The best gains are not known yet, but the number of runs hardly depends on them.
     """
     sweeps = studies.build_figure_studies(plan)
     papers: tuple[Contender, ...] = UNTUNED
@@ -102,7 +102,10 @@ def _list_studies(folder: Path, plan: Plan, *, claims: bool, beyond: bool) -> di
 
 
 def _guess_paper_contenders(plan: Plan) -> tuple[Contender, ...]:
-    """Return contenders at any gains in place of the best ones, if possible not the shared ones."""
+    """Return the paper's contenders with a guess of their best gains.
+
+    If the best gains equal the shared ones, there are fewer runs, so the guess with more sets is returned.
+    """
     guesses = []
     for k in (0, -1):
         best = {controller: gain_sets[k] for controller, gain_sets in studies.list_gain_sets(plan).items()}
@@ -120,12 +123,12 @@ def _count_runs_left(folder: Path, name: str, study: Study) -> int:
 
 
 def _measure_speeds(plan: Plan, *, beyond: bool) -> dict[str, float]:
-    """Return the computing time of one second of simulation time, s, by controller."""
+    """Return the computing time per second of simulation time, s, by controller."""
     speeds: dict[str, float] = {}
     for study in studies.build_probe_studies(plan, beyond=beyond):
         for task in generate_tasks(study):
             if not speeds:
-                # The time of loading and compiling on the first run does not count.
+                # An untimed run first, which loads and compiles everything.
                 worker.perform(task)
             start = time.perf_counter()
             worker.perform(task)

@@ -1,6 +1,6 @@
 """The parts of the study: figures, the paper's claims, and the results beyond the paper.
 
-The runs are executed in an order in which each has the results that it depends on.
+They are executed in an order in which the results that each part depends on are available.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -68,7 +68,7 @@ _PARTITION_DURATION_S = 0.1
 
 
 def record_partition() -> Record:
-    """Return the run whose first frame is figure 1: robots anywhere in the pentagon."""
+    """Record the run whose first frame is figure 1: robots at random positions in the pentagon."""
     environment = robocov.load_map("pentagon")
     starts = environment.start("uniform").sample(ROBOTS, seed=PARTITION_SEED)
     return robocov.Simulation(environment, robocov.Lloyd(), starts).run(_PARTITION_DURATION_S)
@@ -77,7 +77,7 @@ def record_partition() -> Record:
 def run_figures(
     folder: Path, plan: Plan, options: RunnerOptions, papers: Sequence[Contender] = ()
 ) -> dict[str, FigureRun]:
-    """Execute the runs that the figures show.
+    """Execute the runs that are shown in figures.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def run_figures(
     plan : Plan
     options : RunnerOptions
     papers : sequence of Contender
-        The paper's contenders, for the figures at the best gains.
+        The paper's contenders, for the figures with the best gains.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def run_figures(
     Raises
     ------
     InputError
-        If one of them failed.
+        If a run failed.
     """
     runs: dict[str, FigureRun] = {}
     for name, study in studies.build_figure_studies(plan, papers).items():
@@ -114,7 +114,10 @@ def _read_figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]
 
 
 def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
-    """Execute the runs of the paper's figures and claims."""
+    """Execute the runs of the paper's figures and claims, and read their results.
+
+    The gain grids come first, because they determine the best gains of the contenders.
+    """
     figures = run_figures(folder, plan, options)
     gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
     papers = build_paper_contenders(find_best_gains(gains))
@@ -150,7 +153,7 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
-    """Execute the runs beyond the paper.
+    """Execute the runs beyond the paper, and read their results.
 
     Parameters
     ----------
@@ -158,8 +161,8 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     plan : Plan
     options : RunnerOptions
     paper : PaperResults or None
-        Results of the paper's claims. Without them, the paper's contenders run as well, at their best gains
-        if those are known.
+        Results of the paper's claims. Without them, the paper's contenders run as well, with their best gains
+        if these are known.
 
     Returns
     -------
@@ -215,7 +218,7 @@ def _run_claims_only(
     gains: dict[str, GainOutcomes] = {}
     references: References = {}
     if is_gain_grid_finished(folder, plan):
-        # All runs are there. This makes sure that the table exists as well.
+        # All runs exist already, but the table may be missing; this writes it.
         gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
     papers = build_paper_contenders(find_best_gains(gains))
     contest = studies.build_claims_contest(plan, papers)
@@ -225,7 +228,7 @@ def _run_claims_only(
 
 
 def _run_baseline_gain_grids(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, GainOutcomes]:
-    """Run the gain grids of the baselines, if the plan tunes them; return their outcomes by controller."""
+    """Run the gain grids of the baselines; return their outcomes by controller, {} if they are not tuned."""
     tuning = studies.build_baseline_gains_study(plan)
     if tuning is None:
         return {}
@@ -243,7 +246,7 @@ def _run_gain_grid(
 
 
 def select_baseline_outcomes(outcomes: Outcomes, plan: Plan) -> Outcomes:
-    """Return the outcomes on the maps, and from the starts, of the baselines."""
+    """Return the outcomes on the maps and from the starts on which the baselines run."""
     names = {study_map.name for study_map in build_baseline_maps(plan)}
     starts = plan.beyond.starts
     return outcomes.select(
@@ -252,12 +255,12 @@ def select_baseline_outcomes(outcomes: Outcomes, plan: Plan) -> Outcomes:
 
 
 def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:
-    """Measure the step times of all controllers, and of the largest team for our own controller only.
+    """Measure the step times of all controllers; the largest team is only timed with our own controller.
 
     Raises
     ------
     StudyInterrupted
-        If the user has interrupted it.
+        If the user has interrupted the study.
     """
     every_controller = tuple(CONTROLLERS)
     controllers_by_size = {
@@ -273,12 +276,12 @@ def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, St
 
 
 def repeat_worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: int) -> ShownRuns:
-    """Repeat the worst runs of a contender, to show them.
+    """Repeat the worst runs of a contender, with trajectories, so that they can be shown.
 
     Parameters
     ----------
     study : Study
-        The sweep of these runs.
+        Sweep that contains these runs.
     outcomes : Outcomes
     contender : Contender
     count : int
@@ -304,7 +307,10 @@ def repeat_worst_runs(study: Study, outcomes: Outcomes, contender: Contender, co
 
 
 def _read_density_results(folder: Path, plan: Plan, known: Outcomes, ignored: Outcomes) -> DensityResults:
-    """Judge the runs with and without knowledge of the density, both by the density."""
+    """Read the runs with and without knowledge of the density, and compute the weighted costs of both.
+
+    Runs that ignore the density have recorded unweighted costs.
+    """
     costs = {
         study_map.name: CoverageCost(study_map.environment, plan.lattice)
         for study_map in build_density_maps(plan)
@@ -341,6 +347,6 @@ def _read_single_run(folder: Path) -> FigureRun:
 
 
 def _count_runs(folder: Path, names: Iterable[str]) -> tuple[int, int]:
-    """Return the number of runs of some sweeps, and of those that failed."""
+    """Return the number of runs in some sweeps, and the number of failed runs among them."""
     tables = [read_results(get_study_folder(folder, name)) for name in names]
     return sum(len(table) for table in tables), sum(len(table.failures()) for table in tables)

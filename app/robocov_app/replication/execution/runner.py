@@ -22,7 +22,7 @@ from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.terminal.interruption import Interruption
 
 STUDY_FILE = "paper.json"
-"""File that marks a folder as that of a study, quick or full."""
+"""File that marks a folder as the folder of a study, and says whether it is the quick or the full one."""
 _HEAD = {"format": "robocov-paper", "version": 1}
 
 
@@ -32,7 +32,7 @@ class StudyInterrupted(Exception):  # noqa: N818 - it is no error
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """Options of the execution.
+    """Options for executing the runs of a study.
 
     Parameters
     ----------
@@ -41,10 +41,11 @@ class RunnerOptions:
     scheduler : str or None
         Address of a Dask scheduler, whose workers execute the runs.
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
     stop : Interruption
+        Tells whether the user has interrupted the study.
     keep_versions : bool
-        Use runs of other versions of robocov and its dependencies.
+        Whether to keep runs of other versions of robocov and its dependencies.
     """
 
     workers: int
@@ -60,12 +61,12 @@ class RunnerOptions:
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
-    """Create the folder of a study, or check that it is the folder of the same study.
+    """Create the folder of a study, or check that an existing folder contains the same study.
 
     Raises
     ------
     InputError
-        If the folder contains something else, or another study.
+        If the folder contains another study or anything else.
     """
     with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -86,17 +87,17 @@ def open_folder(folder: Path, plan: Plan) -> None:
 
 
 def get_study_folder(folder: Path, name: str) -> Path:
-    """Return the folder of a sweep in the folder of a study."""
+    """Return the folder of a sweep within the folder of a study."""
     return folder / "studies" / name
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
-    """Run a sweep, and return its folder.
+    """Run a sweep, except for runs that are finished already, and return its folder.
 
     Raises
     ------
     StudyInterrupted
-        If the user has interrupted it.
+        If the user has interrupted the sweep.
     """
     target = get_study_folder(folder, name)
     sweep(
@@ -116,7 +117,7 @@ def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> 
 def run_studies(studies: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
     """Run several sweeps with one pool of processes.
 
-    Most of them are so small that starting processes takes longer than their runs. Each sweep has its own
+    Most sweeps are so small that starting processes takes longer than their runs. Each sweep gets its own
     folder and table, as if it had been run alone.
 
     Parameters
@@ -127,24 +128,25 @@ def run_studies(studies: Mapping[str, Study], folder: Path, options: RunnerOptio
         Folder of the study.
     options : RunnerOptions
     title : str
-        Title of the progress.
+        Title of the progress display.
 
     Raises
     ------
     StudyInterrupted
-        If the user has interrupted them.
+        If the user has interrupted the sweeps.
     """
     uses_pool = options.scheduler is None
     if uses_pool:
         _run_in_one_pool(studies, folder, options, title)
     options.raise_if_stopped()
-    # The runs of the pool have been reported. What is left is to write the tables.
+    # After the pool, only the tables are left to be written, without progress.
     quiet = options.quiet or uses_pool
     for name, study in studies.items():
         run_study(study, folder, name, replace(options, quiet=quiet))
 
 
 def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
+    """Execute the unfinished runs of all sweeps with local processes; each run is stored in its sweeps."""
     tasks: dict[str, Task] = {}
     ledgers: dict[str, list[Ledger]] = {}  # Two sweeps may have a task in common.
     notes = []
@@ -175,7 +177,7 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
 def find_map_references(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
 ) -> References:
-    """Return the reference placements of maps, stored ones and new ones.
+    """Return the reference placements of maps; those that are not stored yet are computed.
 
     Raises
     ------

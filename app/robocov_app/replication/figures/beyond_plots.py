@@ -53,7 +53,7 @@ def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
 
 
 def build_gap_samples(results: BeyondResults) -> list[Sample]:
-    """Return the gaps of all contenders, %, the lowest median first."""
+    """Return the gaps of all contenders, %, by ascending median."""
     samples = []
     for summary in rank_contenders(results):
         contender = summary.contender
@@ -91,7 +91,7 @@ def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
-    """Return the function that draws runs with and without knowledge of the density, over the density."""
+    """Return a function that draws runs with and without knowledge of the density, both above the density."""
     known, ignored = results.density.figure_runs
     weighted = known.record.environment
     records = [replace(run.record, environment=weighted) for run in (known, ignored)]

@@ -23,7 +23,7 @@ from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, Pai
 Draw: TypeAlias = Callable[[], Figure]
 """Draws a figure."""
 Plots: TypeAlias = Mapping[str, Draw]
-"""Plotting functions by name. Plots without any run are left out."""
+"""Plotting functions by name; plots without runs are left out."""
 
 _GAP_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Ticks of an axis of gaps, %."""
@@ -50,12 +50,12 @@ class CostRow(NamedTuple):
 
 
 def select_plots(plots: Mapping[str, Draw | None]) -> Plots:
-    """Return the plots that have any run."""
+    """Return the plots that have runs."""
     return {name: draw for name, draw in plots.items() if draw is not None}
 
 
 def get_style(controller: str) -> CurveStyle:
-    """Return the style of a controller among many: ours is highlighted, baselines look the same."""
+    """Return the style of a controller among many: ours are highlighted, all baselines look the same."""
     style = choose_controller_styles([controller])[controller]
     if not style.name.startswith("other"):
         return style
@@ -86,14 +86,14 @@ def _draw_pairs(pairs: Sequence[Pairs], label: str, theme: Theme) -> Figure:
     (axes,) = figure.axes
     low, high = axes.get_xlim()
     if sum(low <= tick <= high for tick in axes.get_xticks()) < _MIN_TICKS:
-        # If all ratios are near 1, the ticks of a logarithmic axis are too far apart.
+        # If all ratios are near 1, the ticks of the logarithmic axis are too far apart; use equal steps.
         step = next(step for step in _TICK_STEPS if (high - low) / step <= _MAX_TICK_INTERVALS)
         axes.set_xticks(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)
     return figure
 
 
 def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
-    """Return the values of J / J_ref in each row. Rows without any are left out."""
+    """Return the values of J / J_ref in each row; rows without values are left out."""
     texts = []
     controllers = []
     costs = []
@@ -102,6 +102,7 @@ def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
         values = known.get_values(row.contender, "gap") + 1.0
         if len(values):
             texts.append(row.text)
+            # The key of a contender starts with the name of its controller.
             controllers.append(row.contender.partition("-")[0])
             costs.append(values)
     styles = choose_curve_styles(controllers)
@@ -109,7 +110,7 @@ def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
 
 
 def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Draw | None:
-    """Return a function that draws final costs in groups with names; None if there are none."""
+    """Return a function that draws final costs in named groups; None if all groups are empty."""
     with_samples = [group for group in groups if group[1]]
     if not with_samples:
         return None
@@ -127,7 +128,7 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
 
 @plain_style()
 def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
-    """Draw gaps, in percent, on an axis of square roots."""
+    """Draw gaps, in percent, on a square-root axis, which shows small gaps as well as large ones."""
     label = "J/J_ref − 1 at the end (%)"
     figure = plot_final_costs([("", samples)], label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
@@ -145,13 +146,13 @@ def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
 
 
 def _compute_signed_power(values: Array, exponent: float) -> Array:
-    """Raise the absolute values to a power, and keep the signs."""
+    """Raise the absolute values to a power, but keep the signs."""
     return np.asarray(np.sign(values) * np.abs(values) ** exponent)
 
 
 @plain_style()
 def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
-    """Draw the mean gap, in percent, over the gains of the repulsion: of RPF, and of RAPF at each k_att."""
+    """Draw the mean gap, in percent, over k_rep and rho_0, for RPF and for RAPF with each k_att."""
     rpf = gains["rpf"].select_complete()
     rapf = gains["rapf"].select_complete()
     levels = rapf.list_levels("k_att")
@@ -160,6 +161,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     k_rep = rpf.list_levels("k_rep")
     rho_0 = rpf.list_levels("rho_0")
     columns = 3 if len(panels) > 4 else 2
+    # Rounded up.
     rows = -(-len(panels) // columns)
     left = 44 * PAGE_SCALE
     right = 10 * PAGE_SCALE
@@ -186,7 +188,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
 
 
 def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> Array:
-    """Return the mean gap for each rho_0 and k_rep, (len(rho_0), len(k_rep)), %; nan where none was tried."""
+    """Return the mean gap for each rho_0 (row) and k_rep (column), %; nan for pairs that were not tried."""
     gaps = np.full((len(rho_0), len(k_rep)), np.nan)
     for gains, excess in zip(grid.gains, grid.excess, strict=True):
         row = rho_0.index(float(gains["rho_0"] or 0.0))

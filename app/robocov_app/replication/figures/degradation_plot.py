@@ -1,4 +1,4 @@
-"""Plot of final costs with disturbances, a panel for each kind."""
+"""Plot of final costs under disturbances, with a panel for each kind of disturbance."""
 
 from collections.abc import Sequence
 
@@ -19,12 +19,12 @@ from robocov_app.sweep.parameters import UNITS
 _SIZE_PX = (1180, 720)
 _MAX_COLUMNS = 3
 _OFFSET = 0.11
-"""Horizontal distance between controllers at one value, relative to that between two values."""
+"""Horizontal distance between controllers at the same value; the distance between values is 1."""
 
 
 @plain_style()
 def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = LIGHT) -> Figure:
-    """Draw final costs relative to those without the disturbance, a panel for each kind of disturbance.
+    """Draw final costs relative to those without disturbances, in a panel for each kind of disturbance.
 
     Parameters
     ----------
@@ -41,6 +41,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     quiet = mix(theme.background, theme.ink, 0.7)
     names = list(dict.fromkeys(degradation.axis for degradation in degradations))
     columns = min(_MAX_COLUMNS, len(names))
+    # Rounded up.
     rows = -(-len(names) // columns)
     panel_width = (width - 40) / columns
     panel_height = (height - 110) / rows
@@ -76,7 +77,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
 
 
 def _find_limits(degradations: Sequence[Degradation]) -> tuple[float, float]:
-    """Return the common vertical limits of all panels."""
+    """Return the vertical limits that all panels share: they include 1 and all intervals."""
     values = []
     for degradation in degradations:
         values += [degradation.ratio.estimate, degradation.ratio.low, degradation.ratio.high]
@@ -87,6 +88,7 @@ def _find_limits(degradations: Sequence[Degradation]) -> tuple[float, float]:
 
 
 def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], theme: Theme) -> None:
+    """Draw the panel of a disturbance: the values next to each other, the controllers slightly shifted."""
     values = list(dict.fromkeys(degradation.value for degradation in degradations))
     styles = choose_controller_styles(degradation.controller for degradation in degradations)
     axes.axhline(1.0, color=to_plot_color(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
@@ -107,10 +109,11 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
 def _draw_curve(
     axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
-    """Draw the median ratios of a controller, with their intervals."""
+    """Draw the median ratios of a controller, with error bars for their intervals."""
     color = to_plot_color(style.get_color(theme))
     y = np.array([degradation.ratio.estimate for degradation in degradations])
     ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])
+    # matplotlib expects the distances from the estimate to both ends, (2, k).
     errors = np.nan_to_num(np.abs(ends - y[:, None]).T)
     axes.errorbar(x, y, errors, fmt="none", ecolor=color, elinewidth=1.4, capsize=2.5, zorder=3)
     axes.plot(

@@ -26,7 +26,7 @@ _SUFFIXES = ("png", "svg", "pdf")
 
 
 class FigureFile(NamedTuple):
-    """A figure in the page."""
+    """A written figure that a page shows."""
 
     name: str
     """Name of its files in ``figures/``."""
@@ -59,9 +59,9 @@ def save_paper_figures(
     partition_run : Record
         The run whose first frame is figure 1.
     results : PaperResults or None
-        Without them, no plots and no figures at the best gains are written.
+        Without them, no plots and no figures with the best gains are written.
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
 
     Returns
     -------
@@ -96,6 +96,19 @@ def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) ->
 def _save_figures(
     folder: Path, plan_plots: Callable[[str], Plots], findings: Mapping[str, str], *, quiet: bool
 ) -> dict[str, FigureFile]:
+    """Write all plots in the light theme, in all formats, and in the dark theme as PNG.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+    plan_plots : callable
+        Takes the name of a theme, and returns the plots by name.
+    findings : Mapping
+        Observations by the name of the plot.
+    quiet : bool
+        Whether to show no progress.
+    """
     target = folder / FIGURES_FOLDER
     with report_folder_errors(target):
         target.mkdir(exist_ok=True)

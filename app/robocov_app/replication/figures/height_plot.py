@@ -1,4 +1,4 @@
-"""Plot of the best position of a sensor over a cell, depending on its height (equation 14).
+"""Plot of the best position of a sensor above a cell, depending on its height (equation 14).
 
 The optimum of f = 1 / (r² + h²) moves from its limit for h → 0 to the centroid for h → ∞.
 """
@@ -23,14 +23,14 @@ from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
-"""A cell without any symmetry, m."""
+"""Corners of a cell without symmetry, m."""
 _MIN_LABEL_DISTANCE = 0.13
 """Minimum distance between labeled positions, relative to the length of the path."""
 _MIN_HEIGHT_M = 0.01
 _MAX_HEIGHT_M = 100.0
 _PATH_POINTS = 240
 _GROUND_HEIGHT = 1e-7
-"""Height that represents the limit 0, relative to the size of the cell."""
+"""Height that stands for the limit h → 0, relative to the size of the cell."""
 _PANELS = (
     (0.0, 0.30, "the cell (m)"),
     (0.37, 0.26, "the frame in it (m)"),
@@ -40,7 +40,7 @@ _PANELS = (
 
 
 class SensorOptimum(NamedTuple):
-    """The best position for a sensor at a height."""
+    """The best position of a sensor at some height."""
 
     height: float
     """m"""
@@ -50,11 +50,11 @@ class SensorOptimum(NamedTuple):
     distance: float
     """Distance from the centroid of the cell, m."""
     loss: float
-    """Relative loss of a sensor over the centroid; nan in the limits."""
+    """Relative loss if the sensor is above the centroid instead; nan in the limits."""
 
 
 def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
-    """Find the best positions of a sensor over the cell.
+    """Find the best positions of a sensor above the cell at several heights.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
     Returns
     -------
     list of SensorOptimum
-        Optima at these heights, preceded by the limit of height 0, and followed by that of infinity.
+        Optima at these heights, preceded by the limit for h → 0 and followed by that for h → ∞.
     """
     cell = _build_cell()
     return [
@@ -104,7 +104,7 @@ def _build_cell() -> VoronoiPartition:
 
 @plain_style()
 def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
-    """Draw the path of the optimum over the cell, and its distance from the centroid.
+    """Draw the cell, the path of the optimum in an enlarged frame, and its distance from the centroid.
 
     Parameters
     ----------
@@ -120,6 +120,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     """
     cell = _build_cell()
     path = find_sensor_optima(np.geomspace(_MIN_HEIGHT_M, _MAX_HEIGHT_M, _PATH_POINTS).tolist())
+    # Heights of 0.1 m to 50 m are candidates for labels.
     labeled = _select_labeled_optima(path_heights=[n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)])
     median = find_best_points(cell, Distance())[0]
     page = FigurePage(size, theme, scale)
@@ -153,7 +154,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
 
 
 def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]:
-    """Return the limits, and the optima that are far enough from them and from each other for a label."""
+    """Return the optima with labels: both limits, and those between them that are far enough apart."""
     first, *inner, last = find_sensor_optima(path_heights)
     min_distance = _MIN_LABEL_DISTANCE * first.distance
     labeled = [first]
@@ -166,7 +167,10 @@ def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]
 
 
 def _find_frame(points: Array, aspect: float) -> PageBox:
-    """Return x, y, width and height of the enlarged frame: all points, with space for labels at the right."""
+    """Return low x, low y, width and height of the enlarged frame, m, with an aspect.
+
+    It contains all points, (k, 2) m, and leaves space for labels, most of it on the right.
+    """
     low = points.min(axis=0)
     high = points.max(axis=0)
     width, height = (high - low) * (1.9, 1.3)
@@ -175,6 +179,7 @@ def _find_frame(points: Array, aspect: float) -> PageBox:
 
 
 def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme) -> None:
+    """Draw the cell, the only one of its partition, and the outline of the frame that is enlarged."""
     fill = to_plot_color(mix(theme.background, theme.robots[1], theme.tint))
     axes.add_patch(
         Polygon(cell.polygons[0], facecolor=fill, edgecolor=to_plot_color(theme.boundary), linewidth=1.6)
@@ -194,7 +199,7 @@ def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme)
 def _draw_path(
     axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], median: Array, theme: Theme
 ) -> None:
-    """Draw the path of the optimum with labels, and the geometric median."""
+    """Draw the path of the optimum with labeled heights, and the geometric median."""
     line = to_plot_color(theme.final)
     faint = to_plot_color(theme.faint)
     label_style: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
@@ -225,7 +230,7 @@ def _draw_path(
 
 
 def _set_frame(axes: Axes, frame: PageBox, theme: Theme) -> None:
-    """Limit axes to the enlarged frame, and outline it."""
+    """Set the limits of axes to the enlarged frame, and outline it."""
     x, y, width, height = frame
     axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
     _simplify_axes(axes, theme)
@@ -238,8 +243,9 @@ def _set_frame(axes: Axes, frame: PageBox, theme: Theme) -> None:
 def _draw_distance(
     axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], theme: Theme
 ) -> None:
-    """Draw the distance of the optimum from the centroid against the height."""
+    """Draw the distance of the optimum from the centroid against the height, and a note on the loss."""
     line = to_plot_color(theme.final)
+    # In millimeters.
     highest = 1e3 * path[0].distance
     inner = path[1:-1]
     axes.axhline(highest, color=to_plot_color(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))

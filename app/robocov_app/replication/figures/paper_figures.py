@@ -35,22 +35,22 @@ PAGE_SCALE = 3.0
 """Scale of the pages: 300 dots per inch."""
 WIDE_PX = 2148
 NARROW_PX = 1050
-"""Widths of two columns of a journal (7.16 inches) and of one (3.5 inches)."""
+"""Widths of two journal columns (7.16 inches) and of one (3.5 inches)."""
 _COST_HEIGHT_PX = 1050
 _COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=34)
 _HIDDEN_M = 0.25
-"""Distance from its centroid within which the disc of a robot hides it, on a map of ten meters."""
+"""Distance within which the disc of a robot hides its goal, on a map of ten meters."""
 _ARRIVED = 0.05
-"""A cost has arrived when it stays within 5 % of its last value."""
+"""A cost counts as settled from the time after which it stays within 5 % of its last value."""
 _SAME_COST = 0.0005
 """Relative difference below which two costs are called the same."""
 
 FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 """The case that each of the paper's figures shows, by its number."""
 BEST_FIGURES = (4, 5, 6, 7, 8)
-"""Figures that are drawn at the best gains as well."""
+"""Figures that are also drawn with the best gains."""
 COST_FIGURES = (3, 5, 7)
-"""Figures of the cost against time. The others, except for the first, show trajectories."""
+"""Figures of the cost against time; the others, except for the first, show trajectories."""
 
 CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
 """Captions of all figures by name."""
@@ -91,20 +91,20 @@ def draw_figure(
 
 
 def _are_goals_hidden(record: Record) -> bool:
-    """Return whether all robots hide their goals at the end."""
+    """Return whether, at the end, all robots are so near their goals that their discs hide them."""
     offsets = record.goals[-1] - record.positions[-1]
     return bool((np.hypot(*offsets.T) < _HIDDEN_M).all())
 
 
 def _get_pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
-    """Return the runs of RAPF and of the other controller in a figure."""
+    """Return the runs of RAPF and of the other controller that a figure compares."""
     case = FIGURES[number]
     other = "lloyd" if case == "convex" else "rpf"
     return runs[f"{case}/rapf"], runs[f"{case}/{other}"]
 
 
 def describe_figure(number: int, runs: Mapping[str, FigureRun], partition_run: Record) -> str:
-    """Return in sentences what one of the paper's figures shows.
+    """Return sentences on what one of the paper's figures shows.
 
     Parameters
     ----------
@@ -137,12 +137,13 @@ def _describe_partition(run: Record) -> str:
 
 
 def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
+    """Return sentences that compare the costs of two runs over time."""
     label = other.record.label
     rapf_mean = compute_mean_until(rapf.history, FIRST_MINUTE_S)
     other_mean = compute_mean_until(other.history, FIRST_MINUTE_S)
     rapf_cost = rapf.history.mean_distance
     other_cost = other.history.mean_distance
-    # Both start from the same positions, at the same cost.
+    # The first costs are equal, because both start from the same positions.
     common = slice(1, min(len(rapf_cost), len(other_cost)))
     lower = float((rapf_cost[common] < other_cost[common]).mean())
     return (
@@ -193,7 +194,7 @@ def find_arrival_time(history: CostHistory) -> float:
 
 @plain_style()
 def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
-    """Draw the Voronoi cells at the start of a run, and their centers of mass."""
+    """Draw robots, their Voronoi cells and the centers of mass of the cells at the start of a run."""
     environment = run.environment
     positions = run.positions[0]
     edge_color = to_plot_color(theme.cell_edge)
@@ -232,7 +233,7 @@ def draw_side_by_side(
     theme: Theme,
     unnamed: Sequence[str] = (),
 ) -> Figure:
-    """Draw runs on one map next to each other.
+    """Draw runs on the same map next to each other.
 
     Parameters
     ----------
@@ -284,7 +285,7 @@ def build_panels(
     *,
     above: float,
 ) -> tuple[FigurePage, list[Axes]]:
-    """Build a page with equal axes for one map in a row, and its legend and scale bar.
+    """Build a page with several axes for the same map in a row, a legend and a scale bar.
 
     Parameters
     ----------
@@ -297,7 +298,7 @@ def build_panels(
         Handles of the legend.
     theme : Theme
     above : float
-        Space above the axes, px before scaling.
+        Space above the axes, px at scale 1.
 
     Returns
     -------

@@ -56,11 +56,11 @@ CLAIMS_FILE = "claims.json"
 _MAX_REPLAY_BYTES = 400_000
 """Maximum size of the runs in the page's replay."""
 _REPLAY_PANES = ("b/rapf", "b/rpf")
-"""Runs that the replay shows first."""
+"""Runs that the replay shows initially."""
 _FIGURES_OF_CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}
 _PICTURE_SIZE_PX = (300, 240)
 _REPORTED_GAPS = (0.25, 0.5, 1.0)
-"""Gaps for which the page has the fraction of runs above them."""
+"""Gaps for which the page reports the fraction of runs that exceed them."""
 _SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N|J)(?![\w³²]))")
 
 
@@ -73,7 +73,7 @@ class ShownFailure(NamedTuple):
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write or replace a text file, completely or not at all."""
+    """Write or replace a text file atomically."""
     with replace_file(path) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -112,7 +112,7 @@ def build_paper_page(
     Returns
     -------
     str
-        The page as HTML. The same results give the same page.
+        The page as HTML. Equal results give identical pages.
     """
     numbered_figures = []
     for number in FIGURES:
@@ -147,7 +147,7 @@ def _build_replay(runs: Mapping[str, FigureRun]) -> Markup:
 
 
 def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
-    """Return the variables of ``index.html`` that depend on the results of the claims."""
+    """Return the template variables of ``index.html`` that depend on the results of the claims."""
     outcomes = results.claims
     by_key = {contender.key: contender for contender in results.contenders}
     participants = [by_key[key] for key in LABELS if key in by_key]
@@ -165,7 +165,7 @@ def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
 
 
 def _tabulate_medians(outcomes: Outcomes) -> dict[str, dict[str, float]]:
-    """Return the median gaps by map and contender."""
+    """Return the median gap of each contender on each map, by map and then by contender."""
     table: dict[str, dict[str, float]] = {name: {} for name in dict.fromkeys(outcomes.maps)}
     for key in LABELS:
         for name, median in outcomes.compute_medians_by_map(key).items():
@@ -185,7 +185,7 @@ def build_beyond_page(figure_files: Mapping[str, FigureFile], results: BeyondRes
     Returns
     -------
     str
-        The page as HTML. The same results give the same page.
+        The page as HTML. Equal results give identical pages.
     """
     claims = judge_beyond_claims(results)
     goal_claims = [claim for claim in claims if claim.question == GOALS]
@@ -215,7 +215,10 @@ def build_beyond_page(figure_files: Mapping[str, FigureFile], results: BeyondRes
 
 
 def _draw_evidence_strips(item: ControllerEvidence, evidence: Sequence[ControllerEvidence]) -> Markup:
-    """Draw the medians of a controller, and those of ours, or of RAPF for ours, below them."""
+    """Draw the medians of a controller on all maps and, below, those of our main controller for comparison.
+
+    Our main controller itself is compared with RAPF.
+    """
     highest = 0.0
     for other in evidence:
         highest = max([highest, *other.medians_by_map.values()])
@@ -231,14 +234,14 @@ def _draw_evidence_strips(item: ControllerEvidence, evidence: Sequence[Controlle
 def _show_failures(
     worst: Sequence[tuple[ProblemInstance, Record]], outcomes: Outcomes, key: str, others: Mapping[str, str]
 ) -> list[ShownFailure]:
-    """Return pictures of the worst runs of a contender, with its gaps and those of others.
+    """Return pictures of the worst runs of a contender, with its gap and the gaps of others.
 
     Parameters
     ----------
     worst : sequence of (ProblemInstance, Record)
     outcomes : Outcomes
     key : str
-        The contender.
+        Key of the contender.
     others : Mapping
         Labels of other contenders by key.
     """
@@ -257,6 +260,7 @@ def _show_failures(
 
 
 def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
+    """Render a page template with its variables, and with the functions that all pages use."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -301,7 +305,7 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
 
 
 def format_span(numbers: Sequence[int]) -> str:
-    """Return whole numbers as text, consecutive ones by their ends.
+    """Format integers as a list, or as a range if they are consecutive.
 
     Examples
     --------
@@ -318,5 +322,5 @@ def _format_hundredths(value: float) -> str:
 
 
 def _join_units(value: Any) -> Any:
-    """Return a text with no-break spaces between numbers and units. Other values, also markup, stay."""
+    """Put no-break spaces between numbers and units of a text; return other values, markup too, unchanged."""
     return _SPACE_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", value) if type(value) is str else value

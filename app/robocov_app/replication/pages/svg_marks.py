@@ -14,7 +14,7 @@ _BAR_WIDTH_PX = 320.0
 _BAR_HEIGHT_PX = 44.0
 _BAR_EDGE_PX = 14.0
 _MIN_LABEL_GAP_PX = 40.0
-"""Distance between two bounds below which their labels are aligned outwards."""
+"""If two bounds are closer than this, their labels are to their left and right instead of centered."""
 
 _STRIP_WIDTH_PX = 440.0
 _STRIP_HEIGHT_PX = 40.0
@@ -34,7 +34,7 @@ class _Range(NamedTuple):
 
 
 def draw_interval_bar(criterion: Criterion) -> Markup:
-    """Draw a criterion: its range shaded, the interval as a line, the estimate as a dot.
+    """Draw a criterion: the required range is shaded, the interval is a line, the estimate a dot.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def draw_interval_bar(criterion: Criterion) -> Markup:
     Returns
     -------
     Markup
-        An SVG element; empty if nothing is known.
+        An SVG element; empty if the estimate or the range is unknown.
     """
     interval = criterion.interval
     known = [*filter(math.isfinite, (interval.estimate, interval.low, interval.high))]
@@ -77,7 +77,7 @@ def draw_interval_bar(criterion: Criterion) -> Markup:
 
 
 def _find_bar_range(values: Sequence[float], unit: str) -> _Range:
-    """Return the range of a bar's axis: all values, with some margin, but no negative percentages."""
+    """Return the range of a bar's axis: all values and a margin, but no negative percentages."""
     low = min(values)
     high = max(values)
     margin = 0.18 * (high - low) if high > low else max(0.1 * abs(high), 0.01)
@@ -90,12 +90,12 @@ class DotStrip(NamedTuple):
 
     label: str
     is_ours: bool
-    """Whether it is of our own controller, which is highlighted."""
+    """Whether the controller is one of ours, which are highlighted."""
     medians_by_map: Mapping[str, float]
 
 
 def draw_strips(strips: Sequence[DotStrip], highest: float) -> Markup:
-    """Draw strips of dots below each other, a dot for each map, on an axis of square roots.
+    """Draw strips of dots below each other, with a dot for each map, on a square-root axis.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def draw_strips(strips: Sequence[DotStrip], highest: float) -> Markup:
     Returns
     -------
     Markup
-        An SVG element; empty if there is no dot.
+        An SVG element; empty if there are no dots.
     """
     strips = [strip for strip in strips if strip.medians_by_map]
     if not strips:
@@ -135,6 +135,7 @@ def draw_strips(strips: Sequence[DotStrip], highest: float) -> Markup:
 
 
 def _draw_ticks(highest: float, to_x: Callable[[float], float], strips: int) -> list[str]:
+    """Return the SVG elements of grid lines and labels for a number of strips, without overlaps."""
     height = _STRIP_HEIGHT_PX * strips
     parts = []
     last_x = -math.inf
@@ -149,16 +150,18 @@ def _draw_ticks(highest: float, to_x: Callable[[float], float], strips: int) -> 
 
 
 def _draw_strip(strip: DotStrip, top: float, to_x: Callable[[float], float]) -> list[str]:
+    """Return the SVG elements of a strip: its name, a dot for each map, and a line at the median."""
     kind = "ours" if strip.is_ours else "other"
     middle = top + _STRIP_LABEL_PX + (_STRIP_HEIGHT_PX - _STRIP_LABEL_PX) / 2
     label_y = top + _STRIP_LABEL_PX - 2
     parts = [f'<text class="name" x="{_STRIP_LEFT_PX - 4}" y="{label_y}">{escape(strip.label)}</text>']
     ranked = sorted(strip.medians_by_map.items(), key=lambda item: item[1])
     for k, (name, value) in enumerate(ranked):
-        # Neighbors in the order of values are at different heights, so that they hardly overlap.
+        # Dots with similar values are at different heights (of eight), so that they hardly overlap.
         y = round(middle + 7.0 * ((k * 5 % 8) / 7.0 - 0.5) * 2.0, 1)
         title = f"<title>{escape(name)}: {format_amount(value, '%')}</title>"
         parts.append(f'<circle class="{kind}" cx="{to_x(value)}" cy="{y}" r="3">{title}</circle>')
+    # The mean of the two middle values, which are the same if the number of values is odd.
     median = ranked[(len(ranked) - 1) // 2][1] / 2 + ranked[len(ranked) // 2][1] / 2
     parts.append(f'<path class="middle" d="M{to_x(median)} {middle - 11}V{middle + 11}"/>')
     return parts

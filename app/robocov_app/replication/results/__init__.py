@@ -1,6 +1,6 @@
 """Results of the study.
 
-- `outcomes`, `outcome_tables`: outcomes of contenders on the same problem instances, and how they are read
+- `outcomes`, `outcome_tables`: outcomes of contenders on the same problem instances, and reading them
 - `degradations`: final costs with disturbances, relative to those under ideal conditions
 - `references`: the reference placement of every map
 - `step_times`: computing times of a step of every controller

@@ -1,4 +1,4 @@
-"""Final costs with disturbances, relative to those under ideal conditions."""
+"""Final costs under disturbances, relative to those under ideal conditions."""
 
 from itertools import product
 from pathlib import Path
@@ -17,7 +17,7 @@ from robocov_app.sweep.parameters import name_parameter_column
 Costs: TypeAlias = dict[tuple[str, int], float]
 """Final costs, m, by map and seed."""
 CostTable: TypeAlias = dict[tuple[str, float | None], Costs]
-"""Final costs by controller and value of a disturbance."""
+"""Final costs by controller and by the value of a disturbance."""
 
 
 def read_degradations(folder: Path, plan: Plan) -> list[Degradation]:
@@ -32,7 +32,8 @@ def read_degradations(folder: Path, plan: Plan) -> list[Degradation]:
     Returns
     -------
     list of Degradation
-        First the costs under ideal conditions, relative to those of RAPF, then those with each disturbance.
+        First the costs under ideal conditions, relative to those of RAPF; then the costs under each
+        disturbance, relative to those of the same controller under ideal conditions.
     """
     parts = studies.list_disturbances(plan)
     ideal: CostTable = {}
@@ -62,9 +63,10 @@ def _build_degradation(
     costs: Costs,
     ideal_costs: Costs,
 ) -> Degradation:
+    """Estimate the median ratio of the costs of a controller to ideal ones on the same maps and seeds."""
     ratios = {key: costs[key] / ideal_costs[key] for key in ideal_costs if key in costs}
     maps = [name for name, _ in ratios]
-    # On few maps, runs are drawn one by one: the interval is then that of these maps alone.
+    # With few maps, runs are resampled one by one; the interval then applies to these maps only.
     clusters = maps if len(set(maps)) >= MIN_BOOTSTRAP_MAPS else None
     ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
     label = str(load_controller_class(controller).label)
@@ -72,15 +74,15 @@ def _build_degradation(
 
 
 def _read_costs(folder: Path, column: str = "", default: float | None = None) -> CostTable:
-    """Return the final costs of a sweep.
+    """Read the final costs of a sweep; failed runs are left out.
 
     Parameters
     ----------
     folder : Path
     column : str
-        Column of the disturbance.
+        Column with the value of the disturbance.
     default : float or None
-        Value of the disturbance if the table has no such column, because it has one value only.
+        Value of the disturbance if the table has no such column, because the sweep has a single value.
     """
     table: CostTable = {}
     for row in read_results(folder).rows():

@@ -1,4 +1,4 @@
-"""Reading the outcomes of a sweep from its table and records."""
+"""Reading the outcomes of a sweep from its table and its records."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ from robocov_app.replication.results.references import References
 from robocov_app.sweep.study import Study
 
 EARLY_S = 20.0
-"""Time in which a team spreads over a convex region of ten meters: Lloyd's algorithm has then settled."""
+"""Time in which a team spreads over a convex region of ten meters; Lloyd's algorithm has settled by then."""
 FIRST_MINUTE_S = 60.0
 """Time that counts as "during the motion"."""
 
@@ -34,7 +34,7 @@ COLUMNS = {
     "over_run": "mean_distance_over_run_m",
     "work": "work_J",
 }
-"""Columns of a sweep's table by measure. Robots of one speed have no time."""
+"""Columns of a sweep's table by measure; "time" is only available for robots of different speeds."""
 
 _ControllerKey: TypeAlias = tuple[Any, ...]
 """A controller and the values of all its gains."""
@@ -49,7 +49,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         Folder of the sweep.
     contest : Contest
     references : dict
-        Reference placements by map. On a map without any the gap is nan.
+        Reference placements by map; on maps without one, the gap is nan.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
         Folder of the sweep.
     study : Study
     references : dict
-        Reference placements by map. On a map without any the excess is nan.
+        Reference placements by map; on maps without one, the excess is nan.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
 
 
 def list_instances(study: Study) -> tuple[ProblemInstance, ...]:
-    """Return the problem instances of a sweep: all maps, starts and seeds."""
+    """Return the problem instances of a sweep: all combinations of maps, starts and seeds."""
     instances: list[ProblemInstance] = []
     for study_map in study.maps:
         for start in study.list_starts(study_map):
@@ -128,7 +128,7 @@ def list_instances(study: Study) -> tuple[ProblemInstance, ...]:
 
 
 def _read_rows(folder: Path, instances: Iterable[ProblemInstance]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the runs that did not fail, each with the index of its instance."""
+    """Yield the table rows of runs that did not fail, each with the index of its instance."""
     index = {instance: k for k, instance in enumerate(instances)}
     for row in read_results(folder).rows():
         k = index.get(ProblemInstance(row["map"], row["start"], row["seed"]))

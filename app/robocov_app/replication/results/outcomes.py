@@ -1,6 +1,6 @@
 """Outcomes of contenders on the same problem instances: selecting, comparing and merging them.
 
-A run that failed is nan, and is left out of every comparison that needs it.
+The values of failed runs are nan, and comparisons leave these runs out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from robocov_app.figures.statistics import Interval, bootstrap, estimate_fractio
 
 
 class ProblemInstance(NamedTuple):
-    """A map, a start and a seed. All contenders start from the same positions on it."""
+    """A map, a start and a seed, from which the same initial positions follow for all contenders."""
 
     map: str
     start: str
@@ -53,7 +53,7 @@ class Outcomes:
     share_sides: Mapping[str, float] = field(default_factory=dict)
 
     def get_values(self, contender: str, measure: str) -> Array:
-        """Return the values of a contender, (m,); all nan if it did not take part."""
+        """Return the values of a measure for a contender, (m,); all nan if it did not take part."""
         values = self.values.get((contender, measure))
         return np.full(len(self.instances), np.nan) if values is None else values
 
@@ -74,7 +74,7 @@ class Outcomes:
         return Outcomes(tuple(compress(self.instances, mask)), values, self.share_sides)
 
     def select_finite(self, measure: str, *contenders: str) -> Outcomes:
-        """Return the outcomes on the instances where all contenders have a finite value."""
+        """Return the outcomes on the instances on which a measure is finite for all given contenders."""
         is_finite = [np.isfinite(self.get_values(contender, measure)) for contender in contenders]
         return self.select(np.all(is_finite, axis=0))
 
@@ -83,14 +83,14 @@ class Outcomes:
         return self.select([start in starts for start in self.starts])
 
     def compute_medians_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:
-        """Return the median of a contender's values on each map where it has a finite one."""
+        """Return the median of a contender's finite values on each map that has any."""
         known = self.select_finite(measure, contender)
         values = known.get_values(contender, measure)
         maps = np.array(known.maps)
         return {name: float(np.median(values[maps == name])) for name in dict.fromkeys(known.maps)}
 
     def compute_placement_spreads(self, contender: str) -> dict[str, float]:
-        """Compute the dependence of the final placement of a contender on the starts.
+        """Compute how much the final placement of a contender depends on the starts.
 
         Returns
         -------
@@ -120,7 +120,7 @@ class Outcomes:
 
 @dataclass(frozen=True, eq=False)
 class PairedComparison:
-    """Comparison of two contenders on m instances where both have a value.
+    """Comparison of two contenders on the m instances on which both have a value.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class PairedComparison:
 
     @cached_property
     def wins(self) -> Interval:
-        """Fraction of the pairs in which the first value is lower. Ties count half."""
+        """Fraction of the pairs in which the first value is lower; a tie counts half."""
         is_lower = self.first_values < self.second_values
         is_tie = self.first_values == self.second_values
         return estimate_fraction(is_lower + 0.5 * is_tie, self.outcomes.maps)
@@ -160,12 +160,12 @@ def merge_outcomes(parts: Sequence[Outcomes]) -> Outcomes:
     Parameters
     ----------
     parts : sequence of Outcomes
-        If two contain the same run, the last one counts.
+        If several contain the same run, the last one counts.
 
     Returns
     -------
     Outcomes
-        Outcomes on all instances, nan where a contender did not take part.
+        Outcomes on all instances; nan where a contender did not take part.
     """
     instances = tuple(dict.fromkeys(instance for part in parts for instance in part.instances))
     index = {instance: k for k, instance in enumerate(instances)}
@@ -214,23 +214,29 @@ class GainOutcomes:
         return self.select(np.asarray(np.isfinite(self.excess).all(axis=0)))
 
     def find_best(self, columns: Sequence[int] | None = None) -> int:
-        """Return the index of the set of gains with the lowest mean excess, on some or all instances."""
+        """Return the index of the set of gains with the lowest mean excess.
+
+        Parameters
+        ----------
+        columns : sequence of int, optional
+            Instances to consider; by default all. Instances with a failed run are left out.
+        """
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         is_complete = np.isfinite(excess).all(axis=0)
         return int(np.argmin(excess[:, is_complete].mean(axis=1)))
 
     def list_levels(self, gain: str) -> list[float]:
-        """Return the values of a gain in ascending order."""
+        """Return the different values of a gain in ascending order; a gain without a value counts as 0."""
         return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
 
     def select_gain(self, name: str, value: float) -> GainOutcomes:
-        """Return the outcomes of the sets in which a gain has a value."""
+        """Return the outcomes of the sets in which the named gain has the given value."""
         mask = [gains.get(name) == value for gains in self.gains]
         return GainOutcomes(self.instances, tuple(compress(self.gains, mask)), self.excess[mask])
 
 
 def find_best_gains(outcomes: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Value]]:
-    """Return the best gains of controllers. Those without an instance where no run failed are left out."""
+    """Return the best gains of controllers, except for those that had a failed run on every instance."""
     best = {}
     for name, grid in outcomes.items():
         if grid.select_complete().instances:
@@ -239,7 +245,7 @@ def find_best_gains(outcomes: Mapping[str, GainOutcomes]) -> dict[str, Mapping[s
 
 
 def compute_mean_until(history: CostHistory, until: float) -> float:
-    """Return the time average of the mean distance up to a time or the end of the run.
+    """Compute the time average of the mean distance up to a time or to the end of the run.
 
     Parameters
     ----------
@@ -250,7 +256,7 @@ def compute_mean_until(history: CostHistory, until: float) -> float:
     Returns
     -------
     float
-        Mean distance averaged by the trapezoidal rule, m.
+        Time average by the trapezoidal rule, m.
     """
     end = min(until, float(history.time[-1]))
     is_before = history.time < end
@@ -263,7 +269,7 @@ def compute_mean_until(history: CostHistory, until: float) -> float:
 
 
 def compute_matched_distance(first: Array, second: Array) -> float:
-    """Compute the distance between two placements of robots that are interchangeable.
+    """Compute the mean distance between two placements of interchangeable robots.
 
     Parameters
     ----------
@@ -272,7 +278,7 @@ def compute_matched_distance(first: Array, second: Array) -> float:
     Returns
     -------
     float
-        Mean distance between the robots, m, matched such that the sum of the distances is minimal.
+        Mean distance between matched robots, m; they are matched such that the sum of distances is minimal.
 
     Examples
     --------

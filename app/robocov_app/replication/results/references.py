@@ -1,4 +1,4 @@
-"""The reference placement of every map, stored in a file each."""
+"""The reference placements of maps, each stored in a file."""
 
 import json
 from collections.abc import Sequence
@@ -27,20 +27,20 @@ References: TypeAlias = dict[str, ReferencePlacement]
 def find_references(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, workers: int, stop: Interruption, *, quiet: bool
 ) -> References:
-    """Return the reference placements of maps, stored ones and new ones.
+    """Return the reference placements of maps; those that are not stored yet are computed.
 
     Parameters
     ----------
     maps : sequence of StudyMap
     folder : Path
-        Folder of the files, one for each map. New answers are stored at once.
+        Folder of the files, one for each map. Each new placement is stored immediately.
     plan : Plan
     workers : int
         Maximum number of processes.
     stop : Interruption
-        When it is requested, the search ends and only the known references are returned.
+        When the user interrupts, the search ends, and only the references known by then are returned.
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def find_references(
 
 
 def _load_reference(path: Path, query: ReferenceQuery) -> ReferencePlacement | None:
-    """Return the stored answer to a query, None if there is no readable one."""
+    """Return the stored answer to a query; None if there is none, or if the file cannot be read."""
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["digest"] == query.input_hash:
@@ -82,6 +82,7 @@ def _load_reference(path: Path, query: ReferenceQuery) -> ReferencePlacement | N
 
 
 def _save_reference(path: Path, query: ReferenceQuery, answer: ReferencePlacement) -> None:
+    """Store the answer to a query as JSON, with a hash of the query by which it is recognized."""
     content = {
         "format": REFERENCE_FORMAT,
         "digest": query.input_hash,

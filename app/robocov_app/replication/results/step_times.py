@@ -1,4 +1,4 @@
-"""Computing times of a step of every controller, measured alternately with RAPF's; stored in a file."""
+"""Computing times of a step with each controller, measured in alternation and stored in a file."""
 
 import hashlib
 import json
@@ -20,22 +20,22 @@ from robocov_app.replication.design.plan import TEAM, Plan
 from robocov_app.sweep.parameters import build_swept_team
 
 BASELINE = "rapf"
-"""Controller whose steps the others' are compared with."""
+"""Controller with whose step times those of the others are compared."""
 TIMING_MAP = "campus"
 """Map on which steps are timed: the largest bundled one, which has space for large teams."""
 STEPS_PER_BLOCK = 50
-"""Number of steps that are timed together, so that occasional scans and plans count by their share."""
+"""Number of steps that are timed together, so that occasional scans and plans count proportionally."""
 STEP_TIMES_FILE = "steps.json"
 UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
 """Interval of an unknown value."""
 _MAX_CLOCK_RESOLUTION_S = 1e-5
-"""A block of the quickest steps takes a few milliseconds."""
+"""Maximum resolution of a usable clock: a block of the fastest steps takes a few milliseconds."""
 _HEAD = {"format": "robocov-steps", "version": 1}
 
 
 @dataclass(frozen=True)
 class StepTimes:
-    """Computing times of steps of one team, measured alternately for all controllers.
+    """Computing times of a step of one team, measured in alternation for all controllers.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class StepTimes:
     seconds: Mapping[str, tuple[float, ...]]
 
     def compute_ratio(self, controller: str) -> Interval:
-        """Return the ratio of the step time of a controller to that of RAPF."""
+        """Return the median ratio of the step time of a controller to that of RAPF."""
         times = self.seconds.get(controller)
         baseline_times = self.seconds.get(BASELINE)
         if not times or not baseline_times:
@@ -60,7 +60,7 @@ class StepTimes:
         return bootstrap(np.array(times) / np.array(baseline_times))
 
     def compute_real_time_factor(self, controller: str) -> Interval:
-        """Return the ratio of computing time to simulation time."""
+        """Return the median ratio of computing time to simulation time for a controller."""
         times = self.seconds.get(controller)
         return bootstrap(np.array(times) / self.dt) if times else UNKNOWN
 
@@ -73,9 +73,9 @@ def measure_step_times(
     is_stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] | None = None,
 ) -> dict[int, StepTimes]:
-    """Return the step times of controllers, stored ones and new ones.
+    """Return the step times of controllers; those that are not stored yet are measured.
 
-    Stored times are those of the machine that measured them.
+    Stored times may come from another machine.
 
     Parameters
     ----------
@@ -85,15 +85,15 @@ def measure_step_times(
         Controllers to time by the size of the team.
     plan : Plan
     is_stopped : callable
-        Called between two blocks. If it returns True, only complete measurements are returned.
+        Called between blocks. If it returns True, only complete measurements are returned.
     clock : callable, optional
-        Returns a time in s. By default the processor time of this process where the system measures it
-        finely: other processes hardly disturb it.
+        Returns a time in s. By default the processor time of this process, which other processes hardly
+        affect; where its resolution is too coarse, the elapsed time.
 
     Returns
     -------
     dict
-        Step times by the size of the team.
+        Step times by the number of robots.
     """
     path = folder / STEP_TIMES_FILE
     stored = _load_entries(path)
@@ -118,7 +118,7 @@ def measure_step_times(
 
 
 def _hash_inputs(robots: int, controllers: Sequence[str], plan: Plan) -> str:
-    """Return a hash of everything that step times depend on, except for the machine."""
+    """Return a hash of everything that step times depend on, apart from the machine."""
     gains = {name: dict(get_gain_values(make_controller(name))) for name in controllers}
     content = [
         robots,
@@ -139,7 +139,7 @@ def _measure(
     is_stopped: Callable[[], bool],
     clock: Callable[[], float],
 ) -> dict[str, list[float]] | None:
-    """Return the step times of controllers in each block, s; None if it was stopped."""
+    """Return the mean step time of each controller in each block, s; None if the measurement was stopped."""
     scenario = Scenario(TIMING_MAP, team=build_swept_team(robots, TEAM), start="uniform", dt=plan.dt)
     simulations = {name: scenario.replace(controller=name).build_simulation() for name in controllers}
     for simulation in simulations.values():
@@ -158,7 +158,7 @@ def _measure(
 
 
 def _load_entries(path: Path) -> dict[str, Any]:
-    """Return the stored measurements by the size of the team, none if the file cannot be read."""
+    """Return the stored measurements by the number of robots; empty if the file cannot be read."""
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["format"] == _HEAD["format"]:

@@ -1,4 +1,4 @@
-"""Results of the study: of the paper's claims, and beyond the paper."""
+"""Results of the study: on the paper's claims, and beyond the paper."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from robocov_app.replication.results.references import References
 from robocov_app.replication.results.step_times import StepTimes
 
 ShownRuns: TypeAlias = list[tuple[ProblemInstance, Record]]
-"""Runs that were repeated to be shown."""
+"""Runs that were repeated with trajectories, so that they can be shown."""
 IDEAL = "ideal"
-"""Axis of a `Degradation` without any disturbance."""
+"""Axis of a `Degradation` without disturbances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class PaperResults:
     figures : Mapping
         Runs of the figures by "case/controller".
     best_figures : Mapping
-        Runs of figures 4 to 8 at the best gains.
+        Runs of figures 4 to 8 with the best gains.
     gains : Mapping
         Outcomes of the gain grids by controller.
     convex, claims : Outcomes
@@ -64,12 +64,12 @@ class PaperResults:
 
 @dataclass(frozen=True, eq=False)
 class DensityResults:
-    """Results on knowing the density.
+    """Results on whether RAPF benefits from knowing the density.
 
     Parameters
     ----------
     outcomes : Outcomes
-        Outcomes of ``known`` and ``ignored``. The measure ``final`` is the mean distance weighted by φ, m.
+        Outcomes of the contenders ``known`` and ``ignored``; ``final`` is the mean distance weighted by φ, m.
     figure_runs : tuple of FigureRun
         A run that knew the density, and one from the same starts that did not.
     costs : tuple of float
@@ -83,9 +83,9 @@ class DensityResults:
 
 @dataclass(frozen=True)
 class Degradation:
-    """Final cost of a controller with a disturbance, relative to that of the same runs without any.
+    """Final cost of a controller under a disturbance, relative to that of the same runs without it.
 
-    On the axis `IDEAL` it is the cost without any disturbance, relative to that of RAPF.
+    On the axis `IDEAL` it is the cost without disturbances, relative to that of RAPF.
 
     Parameters
     ----------
@@ -115,22 +115,22 @@ class BeyondResults:
     ----------
     plan : Plan
     outcomes : Outcomes
-        Outcomes of all contenders: those of the claims, the baselines, and ours.
+        Outcomes of all contenders: those of the paper's claims, the baselines, and our controllers.
     unseen : Outcomes or None
-        Outcomes of ours and of the paper's strongest on maps of other kinds.
+        Outcomes of our main controller and of the paper's strongest contenders on maps of other kinds.
     contenders : tuple of Contender
     gains : Mapping
         Outcomes of the gain grids of the baselines that were tuned, by controller.
     steps : Mapping
-        Step times by the size of the team.
+        Step times by the number of robots.
     worst : list of (ProblemInstance, Record)
-        The worst runs of the first of ours.
+        The worst runs of our main controller.
     targets, teams : Outcomes
         Outcomes of `contenders.TARGETS` and `contenders.TEAMS`.
     density : DensityResults
     degradations : sequence of Degradation
     runs, failed : int
-        Number of the runs of this part alone, and of those that failed.
+        Number of runs in this part of the study, and of those that failed.
     """
 
     plan: Plan
