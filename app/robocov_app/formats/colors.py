@@ -18,9 +18,9 @@ Role: TypeAlias = Literal["free", "solid", "ignore"]
 ROLES: tuple[Role, ...] = ("free", "solid", "ignore")
 WHITE: Color = (255, 255, 255)
 NO_ROLE = 0
-"""Value in arrays of roles, in which a role is its index in `ROLES` plus one."""
+"""Code of pixels without a role. The code of a role is its index in `ROLES` plus one."""
 PICTURE_TOLERANCE = 24.0
-"""Tolerance of a picture, in levels: JPEG compression and soft edges change colors by that much."""
+"""Tolerance of a picture, in levels (0 to 255): JPEG compression and soft edges change colors this much."""
 MAX_DARK_LUMINANCE = 0.5
 """Paint with a lower luminance is dark."""
 MIN_PALE_LUMINANCE = 0.75
@@ -28,7 +28,7 @@ MIN_PALE_LUMINANCE = 0.75
 _LUMA_WEIGHTS = (0.299, 0.587, 0.114)
 """Weights of red, green and blue (ITU-R BT.601)."""
 _MAX_COLORS = 32
-"""Largest number of declared colors: each is compared with every pixel."""
+"""Largest number of declared colors. Each of them is compared with every pixel."""
 _MAX_LISTED_COLORS = 6
 _MAX_NAME_CHARACTERS = 100
 _FUNCTION = re.compile(r"rgba?\(([^()]*)\)", re.IGNORECASE)
@@ -77,14 +77,15 @@ class ColorKey:
         return bool(self.entries)
 
     def find_role(self, color: Color | None) -> Role | None:
-        """Return the role of the nearest declared color within the tolerance, or None."""
+        """Return the role of the nearest declared color, or None if no color is within the tolerance."""
         if color is None or not self.entries:
             return None
+        # A picture of one pixel.
         code = int(self.classify(np.array([[color]], dtype=np.uint8))[0, 0])
         return None if code == NO_ROLE else ROLES[code - 1]
 
     def find_nearest(self, color: Color) -> Color | None:
-        """Return the nearest color of the key within the tolerance, of any role, or None."""
+        """Return the nearest declared color of any role, or None if no color is within the tolerance."""
         nearest: Color | None = None
         smallest_difference = np.inf
         for entry, _ in self.entries:
@@ -95,7 +96,7 @@ class ColorKey:
         return nearest
 
     def classify(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the roles of pixels.
+        """Return the role of each pixel: that of the nearest declared color within the tolerance.
 
         Parameters
         ----------
@@ -107,7 +108,7 @@ class ColorKey:
             `NO_ROLE`, or the index in `ROLES` plus one.
         """
         roles = np.full(pixels.shape[:2], NO_ROLE, dtype=np.uint8)
-        nearest = np.full(pixels.shape[:2], 256, dtype=np.int16)
+        nearest = np.full(pixels.shape[:2], 256, dtype=np.int16)  # more than any difference of levels
         for color, role in self.entries:
             difference = np.zeros(pixels.shape[:2], dtype=np.int16)
             for channel in range(3):
@@ -138,12 +139,12 @@ UNPAINTED = Paint()
 
 
 def parse_color(text: str, option: str) -> Color:
-    """Return the color of a CSS name or of ``#rrggbb``, given as an option.
+    """Return the color that a user gave as an option: a CSS name or ``#rrggbb``.
 
     Raises
     ------
     ParameterError
-        If the text is neither; the message begins with `option`.
+        If the text is not a color. The message begins with `option`.
     """
     color = parse_css_color_on_white(text)
     if color is None or text.strip().casefold() == "transparent":
@@ -153,7 +154,7 @@ def parse_color(text: str, option: str) -> Color:
 
 
 def parse_css_color_on_white(text: str) -> Color | None:
-    """Return the color of a CSS text on a white page, or None if it is not a color."""
+    """Return the color that a CSS color gives on a white page, or None for invalid input."""
     paint = parse_css_color(text)
     if paint is None:
         return None
@@ -162,7 +163,7 @@ def parse_css_color_on_white(text: str) -> Color | None:
 
 
 def parse_css_color(text: str) -> tuple[Color, float] | None:
-    """Return the color and the opacity, from 0 to 1, of a CSS text, or None if it is not a color."""
+    """Return the color and the opacity (0 to 1) of a CSS color, or None for invalid input."""
     from PIL import ImageColor
 
     text = text.strip()
@@ -183,7 +184,10 @@ def parse_css_color(text: str) -> tuple[Color, float] | None:
 
 
 def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
-    """Return the color and the opacity of the arguments of ``rgb()``, in any notation of CSS Color 4."""
+    """Return the color and the opacity given by the arguments of ``rgb()``, in any notation of CSS Color 4.
+
+    None stands for invalid arguments. Numbers above the maximum are clipped, as in CSS.
+    """
     levels: list[float] = []
     for word in re.split(r"[\s,/]+", arguments.strip()):
         number = _NUMBER.fullmatch(word)
@@ -191,7 +195,7 @@ def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
             return None
         maximum = 255.0
         if len(levels) == 3:
-            maximum = 1.0  # of the opacity
+            maximum = 1.0  # the fourth argument is the opacity
         level = float(number[1])
         if number[2] == "%":
             level *= maximum / 100
@@ -216,7 +220,7 @@ def name_color(color: Sequence[int]) -> str:
 
 
 def count_colors(colors: Iterable[Color | None]) -> str:
-    """Return the names of colors with their frequencies, the most frequent first; None is ignored."""
+    """List the distinct colors and how often each occurs, the most frequent first; None is ignored."""
     counts = Counter(name_color(color) for color in colors if color is not None)
     words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_LISTED_COLORS)]
     unlisted = len(counts) - len(words)

@@ -49,42 +49,43 @@ class Thumbnail:
 
 @dataclass(frozen=True, eq=False)
 class ForeignMap:
-    """The content of a foreign file as it was read; `geometry.conversion` cleans it.
+    """The content of a foreign file as it was read, before `geometry.conversion` cleans it.
 
     Attributes
     ----------
     name, description : str
         Name and description of the map.
     free : MultiPolygon, m
-        Free space, y up. It may be invalid, empty, in several parts, and extend beyond `boundary`.
+        Free space, with the y axis up. It may be invalid or empty, and may extend beyond `boundary`.
     format : str
         Name of the format.
     boundary : Polygon or MultiPolygon or None, m
-        Outer boundary. Everything in it that is not free becomes an obstacle. Without it, or if walls
-        separate the free space from it, the outline of the free space is the boundary.
+        Outer boundary. Everything inside that is not free becomes an obstacle. If it is None, or if walls
+        separate it from the free space, the outline of the free space becomes the boundary.
     has_named_boundary : bool
-        Whether the file names the boundary, which is then kept even if walls separate it.
+        Whether the file itself marks a shape as the boundary, which is kept even if walls separate it from
+        the free space.
     boundary_source : str
         Description of where the boundary comes from, for the report.
     vertices_read : int
-        Number of vertices; of a raster, corners of the outline of its free cells.
+        Number of vertices in the file. For a raster: number of corners of the outline of its free cells.
     cell : float or None, m
-        Longer side of a cell of a raster.
+        Longer side of a raster's cells.
     specks : float, m²
-        Smaller obstacles are noise of the sensors or the compression by which such maps are made.
+        Area below which obstacles are noise of the sensor or of the compression.
     cut_corners : bool
-        Whether corners are cut by a step or two of a grid; `geometry.cells.corners` completes them.
+        Whether corners are cut off by a step or two of a grid; `geometry.cells.corners` restores them.
     primitives : tuple of Primitive
-        Obstacles that the file draws as such, not in `free`. They are kept instead of the polygons that they
-        cover if nothing contradicts it.
+        Circles and walls in the file, outside `free`. They replace the polygons that they cover where that
+        does not change the map.
     robots : tuple of (x, y), m
-        Positions of robots in the file.
+        Positions of the robots in the file.
     repaired, dropped, notes : tuple of str
-        Lines of the report, with counts.
+        Lines of the import report.
     page : Polygon or None, m
-        Page of a drawing, or frame of a picture.
+        Page of a drawing, or outline of a picture.
     painted : tuple of Painted
-        Colored shapes of a drawing, the lowest first.
+        Colored shapes of a drawing, from bottom to top.
     thumbnail : Thumbnail or None
         The picture that the map was read from.
     """

@@ -19,17 +19,17 @@ class Importer:
     Attributes
     ----------
     name : str
-        Name as in ``--format``.
+        Name of the format in the option ``--format``.
     title : str
-        Title for people.
+        Name of the format for people to read.
     suffixes : tuple of str
         File suffixes in lower case.
     sniff : callable
-        ``sniff(path, head)`` returns whether a file that starts with the bytes `head` has this format. It is
-        fast and never raises. `head` has `files.HEAD_BYTES` bytes, or is the whole file.
+        ``sniff(path, head)`` returns whether a file that starts with the bytes `head` has this format. It
+        must be fast and never raise. `head` has `files.HEAD_BYTES` bytes, or is the whole file.
     reader : callable
-        ``reader(path, options)`` returns the map in a file, or raises a MapError of one line, within a second
-        and 200 MB.
+        ``reader(path, options)`` returns the map in a file, or raises a MapError with a message of one line.
+        It takes at most a second and 200 MB.
     options : frozenset of str
         The fields of `ReadOptions` that apply to the format.
     """
@@ -42,7 +42,7 @@ class Importer:
     options: frozenset[str] = frozenset()
 
     def read(self, path: Path, options: ReadOptions) -> ForeignMap:
-        """Return the map in a file."""
+        """Read the map in a file."""
         return replace(self.reader(path, options), format=self.name)
 
 
@@ -53,14 +53,14 @@ class Exporter:
     Attributes
     ----------
     name, title, suffixes
-        As of `Importer`.
+        See `Importer`.
     write : callable
-        ``write(environment, path, options)`` writes the map completely or not at all, by
+        ``write(environment, path, options)`` writes the map completely or not at all, by means of
         `robocov.files.writing.replace_file`.
     options : frozenset of str
         The fields of `WriteOptions` that apply to the format.
     list_files : callable
-        ``list_files(path, options)`` returns all files that would be written, the given one first.
+        ``list_files(path, options)`` returns all files that would be written, with `path` first.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Counts of shapes that an import leaves out, such as those of dropped layers, for its report."""
+"""Counts of the shapes that an import leaves out, such as those of dropped layers, for its report."""
 
 from collections import Counter
 
@@ -14,7 +14,7 @@ class Omissions:
     Attributes
     ----------
     counts : Counter of (str, str)
-        Number of shapes by their kind and the reason.
+        Number of shapes by kind and reason.
     """
 
     def __init__(self) -> None:
@@ -22,7 +22,7 @@ class Omissions:
         self._heights: list[Array] = []
 
     def add_heights(self, heights: Array) -> None:
-        """Count third coordinates, which maps do not have; nan stands for none."""
+        """Count third coordinates, which are dropped because maps are plane; nan stands for a missing one."""
         self._heights.append(heights[~np.isnan(heights)])
 
     def describe(self) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ class Omissions:
 
 
 def format_plural(count: int, noun: str) -> str:
-    """Return a count with its noun, also for nouns in y and x.
+    """Return a count with its noun, including nouns that end in y or x.
 
     Examples
     --------

@@ -20,7 +20,7 @@ _Value = TypeVar("_Value")
 
 
 def get_or_default(value: _Value | None, default: _Value) -> _Value:
-    """Return the value of an option, or a default if it is not given."""
+    """Return the value of an option, or the default if the value is None."""
     return default if value is None else value
 
 
@@ -29,17 +29,17 @@ class Options:
     """Base class of options: dataclasses whose fields all have defaults."""
 
     def require_ranges(self, **ranges: tuple[float, float, str]) -> None:
-        """Check the values of the options.
+        """Check that numbers are in their ranges, and that words are among those that the option accepts.
 
         Parameters
         ----------
         **ranges : (minimum, maximum, unit)
-            Ranges of numbers, by the names of the options.
+            Ranges of numbers, keyed by the names of the options.
 
         Raises
         ------
         ParameterError
-            If a number is out of its range, or a word is not one of its type.
+            If a number is out of range, or a word is not accepted.
         """
         for name, hint in get_type_hints(type(self)).items():
             value = getattr(self, name)
@@ -53,18 +53,18 @@ class Options:
                 raise ParameterError(f"{name}: expected one of {', '.join(words)}, got {quote(value)}")
 
     def require_supported(self, format_name: str, supported: Collection[str]) -> None:
-        """Check that all given options apply to a format.
+        """Check that all options given by the user apply to a format.
 
         Parameters
         ----------
         format_name : str
         supported : collection of str
-            Names of the options of the format.
+            Names of the options that apply to the format.
 
         Raises
         ------
         ParameterError
-            If another option differs from its default.
+            If any other option differs from its default.
         """
         for option in fields(self):
             is_given = getattr(self, option.name) != option.default
@@ -75,7 +75,7 @@ class Options:
 
 
 def _list_words(hint: Any) -> list[str]:
-    """Return the words of the literal types in a type hint."""
+    """Return the words that the Literal types in a type hint allow."""
     words: list[str] = []
     for kind in (hint, *get_args(hint)):
         if get_origin(kind) is Literal:
@@ -149,17 +149,17 @@ class ReadOptions(Options):
             snap=(0.0, 10.0, "m"),
             color_tolerance=(0.0, 255.0, ""),
         )
-        # These raise errors for a wrong width or color before any file is read.
+        # Called only to raise errors for an invalid width or color before a file is read.
         self.compute_stroke_width(1.0)
         self.build_color_key()
 
     def build_color_key(self, default_tolerance: float = 0.0) -> ColorKey:
-        """Return the given colors with their roles.
+        """Build the key of the declared colors and their roles.
 
         Parameters
         ----------
         default_tolerance : float
-            Tolerance if the options have none, from 0 to 255.
+            Tolerance if the user gives none, from 0 to 255.
 
         Raises
         ------
@@ -171,7 +171,7 @@ class ReadOptions(Options):
         return ColorKey.from_names(names, tolerance)
 
     def compute_stroke_width(self, pixel: float) -> float:
-        """Return the width in meters below which strokes are dropped, 0 for none.
+        """Return the width, m, below which strokes are dropped; 0 if the option is not given.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class ReadOptions(Options):
         Raises
         ------
         ParameterError
-            If the option is not a width.
+            If the option is not a valid width.
         """
         if self.min_stroke is None:
             return 0.0

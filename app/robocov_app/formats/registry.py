@@ -1,4 +1,4 @@
-"""The tables of foreign formats, and import and export by them."""
+"""The tables of foreign formats, and functions that import and export maps in them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ _DRAWING_OPTIONS = frozenset(
 )
 _COLOR_OPTIONS = frozenset({"free_color", "solid_color", "ignore_color", "color_tolerance"})
 
-# A file has the format whose `sniff` accepts it first, so the most specific formats come first.
+# The order matters: a file has the first format whose `sniff` accepts it, so specific formats come first.
 _IMPORTERS = (
     Importer(
         name="irsim",
@@ -198,7 +198,7 @@ EXPORTERS: dict[str, Exporter] = {exporter.name: exporter for exporter in _EXPOR
 
 
 def get_importer(name: str) -> Importer:
-    """Return a format that can be read.
+    """Return the importer of a format.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def get_importer(name: str) -> Importer:
 
 
 def detect_format(path: str | Path) -> Importer:
-    """Return the format of a file, by its content or else by its suffix.
+    """Detect the format of a file from its content or, if that fails, from its suffix.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def detect_format(path: str | Path) -> Importer:
         if importer.sniff(path, head):
             return importer
     with_suffix = [importer for importer in IMPORTERS.values() if path.suffix.lower() in importer.suffixes]
-    if len(with_suffix) == 1:  # its reader gives the most helpful message
+    if len(with_suffix) == 1:  # the reader of that format will raise the most helpful error
         return with_suffix[0]
     expected = f"expected one of {', '.join(IMPORTERS)}"
     raise MapError(f"{to_one_line(path)}: unknown format ({describe_head(head)}), {expected}")
@@ -253,7 +253,7 @@ def import_map(
     ----------
     path : str or Path
     format : str, optional
-        Name of the format. By default the file is inspected.
+        Name of the format. By default, it is detected.
     options : ReadOptions
     shaping : Shaping
         Parameters of the conversion to an environment, such as simplification.
@@ -269,7 +269,7 @@ def import_map(
     Raises
     ------
     MapError
-        If the file cannot be read or understood, or robots cannot drive in it.
+        If the file cannot be read or parsed, or if no robot could drive in the map.
     ParameterError
         If the format is unknown, or does not have an option that is given.
     """
@@ -292,7 +292,7 @@ def read_map(
 
 
 def choose_exporter(path: str | Path, name: str | None = None) -> Exporter:
-    """Return the format in which a file is written.
+    """Return the exporter for a file.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ def export_map(
     ----------
     environment : Environment
     path : str or Path
-        File to be written; some formats write others next to it.
+        File to write. Some formats write further files next to it.
     format : str, optional
         Name of the format. By default the suffix of the file decides.
     options : WriteOptions

@@ -1,4 +1,4 @@
-"""Counts of shapes that an import repairs, for its report."""
+"""Counts of the shapes that an import repairs, for its report."""
 
 from collections import Counter
 
@@ -11,7 +11,7 @@ class Repairs:
     Attributes
     ----------
     counts : Counter of (str, str)
-        Number of shapes by their kind and the repair.
+        Number of shapes by kind and repair.
     """
 
     def __init__(self) -> None:
@@ -19,13 +19,13 @@ class Repairs:
         self._self_crossings: list[str] = []
 
     def add_self_crossing(self, reason: str, at: str) -> None:
-        """Count an outline that meets itself.
+        """Count an outline that crosses or touches itself.
 
         Parameters
         ----------
         reason : str
         at : str
-            Position in the file; may be empty.
+            Place in the file; may be empty.
         """
         if at:
             reason = f"{at}: {reason}"

@@ -20,13 +20,13 @@ _JSON_KEYS = {
     "moved_area": "moved_area_m2",
     "removed_area": "removed_area_m2",
 }
-"""Keys in JSON of the fields that have a unit."""
+"""JSON keys of the fields that have a unit."""
 _MIN_WHOLE_AREA_M2 = 1000.0
-"""Larger areas are written without decimals."""
+"""Areas from this one on are written without decimals."""
 
 
 def format_area(area: float, digits: int = 4) -> str:
-    """Return an area with a number of significant digits, never as a power of ten."""
+    """Format an area with a number of significant digits, without an exponent."""
     if area >= _MIN_WHOLE_AREA_M2:
         return f"{area:.0f} m²"
     return f"{area:.{digits}g} m²"
@@ -70,11 +70,11 @@ class ImportReport(_Report):
     moved_area : float, m²
         Area that the simplification made free or solid.
     moved : float, m
-        Largest distance by which it moved a wall that was kept: a Hausdorff distance.
+        Largest distance by which the simplification moved a wall: a Hausdorff distance.
     removed, removed_area : int, float m²
-        Hairs, that is slits and spurs thinner than the decimals of a map.
+        Number and area of removed hairs: slits and spurs thinner than the resolution of coordinates.
     others : tuple of (x, y), m
-        A point in each large part of the free space that was left out, as `Shaping.inside` takes it.
+        A point in each large part of the free space that was left out, for `Shaping.inside`.
     repaired, dropped, changed, notes : tuple of str
         Repairs, losses, changes on purpose (simplified, grown), and remarks; one line each.
     """
@@ -99,7 +99,7 @@ class ImportReport(_Report):
     notes: tuple[str, ...] = ()
 
     def format_lines(self) -> list[str]:
-        """Return the report as lines of text: two of facts, then a line for each remark."""
+        """Return the report as lines of text: two lines of facts, then one line for each remark."""
         area_read = format_area(self.area_read)
         area_kept = format_area(self.area_kept)
         width, height = self.size

@@ -1,4 +1,4 @@
-"""Kinds of files that no importer reads, and how to convert each to a file that one reads."""
+"""Kinds of files that no importer reads, and how to convert each of them to a file that can be read."""
 
 import re
 import shlex
@@ -13,7 +13,7 @@ _ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with ma
 _UNPACK = "unpack it first"
 _PNG = "save it as a PNG"
 _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
-# The start of a file, its kind, and how to get a map from it.
+# Pattern of the first bytes of a file, its kind, and how to get a map from it. The first match counts.
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),
@@ -58,7 +58,7 @@ _STL_HEADER_BYTES = 84
 
 
 def describe_unsupported_file(path: Path, head: bytes) -> str | None:
-    """Return the kind of a file and a way to convert it.
+    """Return the kind of an unsupported file, and a way to convert it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def describe_unsupported_file(path: Path, head: bytes) -> str | None:
     Returns
     -------
     str or None
-        None if the kind is not in the table, so that an importer may read the file.
+        None if the kind is unknown here, in which case an importer may be able to read the file.
     """
     name = shlex.quote(path.name)
     suffix = path.suffix.lower()
@@ -84,13 +84,13 @@ def describe_unsupported_file(path: Path, head: bytes) -> str | None:
 
 
 def _format_advice(kind: str, advice: str, name: str) -> str:
-    """Return the kind of a file, and how to convert the file of a name."""
+    """Return the message about a file: its kind, and how to convert the file called `name`."""
     remark = "" if "robocov" in kind else ", which cannot be imported"
     return f"{kind}{remark}: {advice.format(name=name)}"
 
 
 def describe_head(head: bytes) -> str:
-    """Return the first characters or bytes of a file of unknown kind, as text for a message."""
+    """Describe a file of unknown kind for a message, by its first characters or bytes."""
     text = head[:1000].decode(errors="replace")
     is_binary = "\0" in text or text.count("\ufffd") > 1
     if is_binary:

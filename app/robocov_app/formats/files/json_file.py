@@ -18,9 +18,9 @@ class JsonFile:
     Parameters
     ----------
     path : Path
-        The file; for a part of an archive, the path of the archive and the name in it.
+        The file. For a file in an archive: the path of the archive, followed by the name in the archive.
     text : bytes, optional
-        Content of the file, if it was read already.
+        Content of the file, if it has been read already.
 
     Attributes
     ----------
@@ -33,19 +33,20 @@ class JsonFile:
     def __init__(self, path: Path, text: bytes | None = None) -> None:
         self.where = to_one_line(path)
         self._content = read_content(path, MAX_TEXT_BYTES) if text is None else text
-        # Each point is a list of two or three numbers. Counting takes a moment, parsing minutes.
+        # Each point is a list of two or three numbers, so brackets and commas bound the number of points.
+        # Counting them takes milliseconds, parsing a huge file takes minutes.
         require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
         self.document: Any = parse_json(self._content, self.where)
 
     def build_error(self, at: JsonPath, value: object, expected: str) -> MapError:
-        """Return the error for a wrong value.
+        """Build the error for an invalid value, with its line and column.
 
         Parameters
         ----------
         at : JsonPath
             Keys and indices that lead to the value.
         value : object
-            The value that the file has.
+            The value in the file.
         expected : str
             Description of the values that are accepted.
         """
@@ -55,7 +56,9 @@ class JsonFile:
     def parse_points(
         self, value: Any, at: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int
     ) -> Array:
-        """Return the points of a list as a (k, d) array, nan where a point has fewer coordinates.
+        """Convert a JSON list of points to a (k, d) array.
+
+        The number of coordinates d is that of the longest point; missing coordinates of others are nan.
 
         Parameters
         ----------
@@ -71,7 +74,7 @@ class JsonFile:
         Raises
         ------
         MapError
-            If the value is not such a list.
+            If the value is not a list of at least `min_count` points.
         """
         if not isinstance(value, list) or len(value) < min_count:
             points = "point" if min_count == 1 else "points"
@@ -88,7 +91,7 @@ class JsonFile:
 
 
 def get_member(value: object, name: str) -> Any:
-    """Return a member of a JSON object, or None if a value is not an object or does not have it."""
+    """Return a member of a JSON object, or None if it is missing or `value` is not an object."""
     return value.get(name) if isinstance(value, dict) else None
 
 

@@ -7,21 +7,21 @@ from robocov.errors import MapError, quote
 from robocov_app.formats.files.reading import read_head
 
 MAX_INCLUDED_FILES = 200
-"""Largest number of files that a map may include, counted each time that one is read."""
+"""Largest number of files that a map may include. A file that is read twice counts twice."""
 MAX_INCLUDED_BYTES = 20_000_000
-"""Largest size of all included files together."""
+"""Largest total size of all included files."""
 _MAX_PATH_CHARACTERS = 400
 
 
 class IncludeBudget:
-    """Limit on all files that a map includes, because a few kB can name billions of them.
+    """Limit on the files that a map includes: with nested includes, a few kB can name billions of files.
 
     Parameters
     ----------
     max_files : int
         Number of files that may be read. A file that is included twice counts twice.
     max_bytes : int
-        Size of all of them together.
+        Total size that may be read.
     """
 
     def __init__(self, max_files: int = MAX_INCLUDED_FILES, max_bytes: int = MAX_INCLUDED_BYTES) -> None:
@@ -37,13 +37,14 @@ class IncludeBudget:
         ----------
         path : Path
         at : str
-            Position of the name of the file, for messages.
+            Place where the file is named, for messages.
 
         Raises
         ------
         MapError
-            If the map includes too many files or too many bytes, or there is no such file.
+            If the map includes too many files or too many bytes, or the file cannot be read.
         """
+        # Reading no bytes raises the error for a file that is missing or not a regular file.
         read_head(path, 0)
         self.files_read += 1
         self.bytes_read += path.stat().st_size
@@ -60,10 +61,10 @@ class IncludeBudget:
 def find_named_file(
     path: Path, name: str, kind: str, *, at: str, notes: list[str], allow_anywhere: bool
 ) -> Path:
-    """Return the path of a file that another file names.
+    """Return the path of a file that is named in another file.
 
-    Programs write the path that a file had when it was saved, and it may have moved since. If it does not
-    exist, a file of the same name next to the naming file is returned instead, and a note says so.
+    Programs store the path that a file had when the map was saved, and files may have moved since. If there
+    is no file at that path, a file of the same name next to `path` is returned instead, and a note says so.
 
     Parameters
     ----------
@@ -74,22 +75,23 @@ def find_named_file(
     kind : str
         Kind of the file, such as "picture", for messages.
     at : str
-        Position of the name, for messages.
+        Place of the name, for messages.
     notes : list of str
-        Notes of the import; one is appended if another file is taken.
+        Notes of the import. One is appended if the file next to `path` is used instead.
     allow_anywhere : bool
-        Whether the file may be outside of the folder of `path`.
+        Whether the file may be outside the folder of `path`.
 
     Raises
     ------
     MapError
-        If the name is empty or too long, or the file is outside of the folder.
+        If the name is empty, too long or invalid, or if the file must be in the folder but is not.
     """
     if not name:
         raise MapError(f"{at}: empty, expected the name of a {kind}")
     if len(name) > _MAX_PATH_CHARACTERS:
         raise MapError(f"{at}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
+    # PureWindowsPath separates folders at both kinds of slashes.
     neighbor = path.parent / PureWindowsPath(name).name
     try:
         is_allowed = allow_anywhere or _is_inside(named, path.parent)
@@ -119,7 +121,7 @@ def _is_inside(path: Path, folder: Path) -> bool:
 
 
 def _exists(path: Path) -> bool:
-    """Return whether there is such a file; raise OSError if that is unknown, as for a name too long."""
+    """Return whether a path exists; raise OSError if that is unknown, for example because it is too long."""
     with suppress(FileNotFoundError, NotADirectoryError):
         path.stat()
         return True

@@ -1,7 +1,7 @@
 """YAML without tags: mappings, lists and text.
 
-Text is always text here: the caller decides whether it is a number or a word. Aliases may repeat a
-value, within a limit on all values together.
+Scalars are returned as text: the caller decides which of them are numbers. Aliases may repeat a value, within
+a limit on the total number of values.
 """
 
 from collections.abc import Iterator
@@ -13,24 +13,24 @@ import yaml
 from robocov.errors import MapError, quote, to_one_line
 
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"
-"""A value as it is written in the file."""
+"""A value as it is written in the file, before numbers are parsed."""
 MAX_YAML_BYTES = 262_144
-"""Largest text, which takes a second to read: a map has 200 bytes, a world a few thousand."""
+"""Largest text, which takes a second to parse. A map file has 200 bytes, a world a few thousand."""
 MAX_YAML_VALUES = 50_000
-"""Largest number of values, each counted as often as an alias repeats it."""
+"""Largest number of values. A value that aliases repeat counts each time."""
 MAX_YAML_DEPTH = 12
-"""Deepest nesting of lists and mappings, also through aliases."""
+"""Deepest nesting of lists and mappings, including nesting through aliases."""
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Return the mapping in a YAML text.
+    """Parse a YAML text that contains a mapping.
 
-    Anchors and aliases, and the merge key ``<<``, are those of YAML 1.1.
+    Anchors, aliases and the merge key ``<<`` work as in YAML 1.1.
 
     Parameters
     ----------
     text : bytes
-        UTF-8.
+        Content of the file, in UTF-8.
     where : str
         Name of the file for messages.
 
@@ -56,7 +56,7 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
 
 
 class _SizedValue(NamedTuple):
-    """A value, the number of values in it, itself included, and its nesting depth."""
+    """A value, the number of values in it (including itself), and its nesting depth."""
 
     value: Value
     size: int
@@ -64,7 +64,7 @@ class _SizedValue(NamedTuple):
 
 
 class _YamlReader:
-    """Builds values from the events of the parser one by one, so that limits apply at once."""
+    """Builds values from parser events one at a time, so that limits apply before a large file is parsed."""
 
     def __init__(self, text: str, where: str) -> None:
         self.where = where
@@ -73,7 +73,7 @@ class _YamlReader:
         self.count = 0
 
     def read(self) -> dict[str, Value]:
-        """Return the mapping in the text, empty for an empty text."""
+        """Return the mapping in the text; an empty text gives an empty mapping."""
         result: dict[str, Value] = {}
         for event in self.events:
             if isinstance(event, yaml.DocumentStartEvent) and result:
@@ -92,7 +92,7 @@ class _YamlReader:
         return f"{self.where}: line {line}"
 
     def _build(self, event: Any, depth: int) -> _SizedValue:
-        """Return the value that starts with an event; `depth` is that of a list or mapping at the event."""
+        """Build the value that starts with an event; `depth` is the nesting depth of a list or mapping."""
         if isinstance(event, yaml.AliasEvent):
             return self._follow_alias(event, depth)
         if event.tag is not None:
@@ -136,13 +136,13 @@ class _YamlReader:
         return takewhile(lambda event: not isinstance(event, yaml.CollectionEndEvent), self.events)
 
     def _build_list(self, depth: int) -> tuple[list[Value], int]:
-        """Return the items of a list and its depth."""
+        """Return the items of a list and the number of levels in it."""
         items = [self._build(event, depth + 1) for event in self._iterate_collection()]
         inner_depth = max((item.depth for item in items), default=0)
         return [item.value for item in items], inner_depth + 1
 
     def _build_mapping(self, depth: int) -> tuple[dict[str, Value], int]:
-        """Return the items of a mapping, merge keys resolved, and its depth."""
+        """Return the items of a mapping, with merge keys resolved, and the number of levels in it."""
         mapping: dict[str, Value] = {}
         merged_mappings: list[Value] = []
         inner_depth = 0
@@ -154,7 +154,7 @@ class _YamlReader:
             assert isinstance(name, str)
             item = self._build(next(self.events), depth + 1)
             inner_depth = max(inner_depth, item.depth)
-            if name == "<<" and event.style is None:
+            if name == "<<" and event.style is None:  # no style: not in quotes
                 merged_mappings += self._list_merged_mappings(item.value, event)
             elif name in mapping:
                 raise MapError(f"{self._locate(event)}: {to_one_line(name)}: duplicate key")
@@ -162,11 +162,12 @@ class _YamlReader:
                 mapping[name] = item.value
         for merged_mapping in merged_mappings:
             assert isinstance(merged_mapping, dict)
+            # Keys of the mapping itself, and of mappings that were merged before, take precedence.
             mapping = merged_mapping | mapping
         return mapping, inner_depth + 1
 
     def _list_merged_mappings(self, value: Value, event: Any) -> list[Value]:
-        """Return the mappings that a merge key names; earlier ones take precedence."""
+        """Return the mappings that are the value of a merge key: one, or a list of them."""
         mappings: list[Value] = value if isinstance(value, list) else [value]
         if not all(isinstance(mapping, dict) for mapping in mappings):
             raise MapError(

@@ -8,7 +8,7 @@ from robocov.errors import MapError, describe_error, to_one_line
 from robocov_app.formats.files.limits import MAX_FILE_BYTES, MAX_TEXT_BYTES, require_vertices
 
 HEAD_BYTES = 1 << 20
-"""Number of bytes in which the format of a file is detected."""
+"""Number of bytes at the start of a file from which its format is detected."""
 _MAX_NAME_CHARACTERS = 60
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -58,10 +58,12 @@ def read_content(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
     Raises
     ------
     MapError
-        If the file is larger, or as `read_head`.
+        If the file is larger, or if it cannot be read.
     """
+    # Reading no bytes raises the error for a file that is missing or not a regular file.
     read_head(path, 0)
     if path.stat().st_size <= maximum:
+        # The file may have grown since: one byte more shows whether it has.
         content = read_head(path, maximum + 1)
         if len(content) <= maximum:
             return content
@@ -69,13 +71,13 @@ def read_content(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
 
 
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
-    """Return the text of a file and the name of the file for messages.
+    """Return the text of a file, and the name of the file for messages.
 
     Parameters
     ----------
     path : Path
     separator : bytes
-        Bytes between two vertices. They are counted first, because parsing takes long.
+        Bytes between two vertices. They are counted to refuse files with too many vertices before parsing.
 
     Raises
     ------
@@ -98,10 +100,10 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
 
 
 def get_map_name(path: Path) -> str:
-    """Return a name for a map whose file contains none."""
+    """Return a name for a map whose file contains none: the file name without its suffix."""
     return to_one_line(path.stem)[:_MAX_NAME_CHARACTERS] or "map"
 
 
 def starts_with(head: bytes, bracket: bytes) -> bool:
-    """Return whether a text starts with a bracket, after a byte order mark and blanks."""
+    """Return whether a text starts with a bracket, apart from a byte order mark and white space."""
     return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == bracket

@@ -1,4 +1,4 @@
-"""Elements of an XML file, read by expat, without anything in it that could grow or name other files."""
+"""Elements of an XML file, read by expat. Entities that name files or expand without limit are refused."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from robocov_app.formats.files.numbers import parse_number
 from robocov_app.formats.files.reading import read_content
 
 MAX_ELEMENTS = 100_000
-"""Largest number of elements in a file, and of those drawn if elements are used again."""
+"""Largest number of elements in a file, and of elements drawn if some are drawn repeatedly."""
 MAX_ATTRIBUTES = 1_000_000
 MAX_NESTING = 100
-"""Deepest nesting of elements and uses; drawing programs stay below 30."""
+"""Deepest nesting of elements and of ``use`` references; drawing programs stay below 30."""
 _SVG_NAMESPACE = "http://www.w3.org/2000/svg"
 _MAX_EXPANDED_CHARACTERS = 1_000_000
-"""Characters that entities and default attributes may add: mostly names of namespaces."""
+"""Number of characters that entities and default attributes may add. Most are names of namespaces."""
 _MAX_NAMESPACE_CHARACTERS = 1000
 _MAX_DECLARATIONS = 1000
 
@@ -43,7 +43,7 @@ class Element:
     line : int
     children : list of Element
     text_pieces : list of str
-        Text in the element, if its tag is one whose text counts.
+        Text in the element, if its tag is among those whose text is kept.
     """
 
     tag: str
@@ -78,14 +78,14 @@ class Element:
         name : str
             Name of the attribute. Commas or blanks separate its numbers.
         count : int, optional
-            Expected number of numbers. By default any number is accepted.
+            How many numbers are expected. By default, any count is accepted.
         default : str, optional
-            Text that is parsed if the element has no such attribute.
+            Text to parse if the element has no such attribute. By default, the attribute is required.
 
         Raises
         ------
         MapError
-            If the attribute is missing, has another number of numbers, or a number is out of range.
+            If the attribute is missing, has the wrong count of numbers, or a number is out of range.
         """
         text = self.attributes.get(name, default)
         expected = f"expected {_describe_count(count)} within 1e7"
@@ -121,17 +121,17 @@ def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] =
     kind : str
         Kind of the file for messages, such as "SVG".
     text_tags : collection of str
-        Tags whose text counts; the text of other elements is dropped.
+        Tags of the elements whose text is kept.
 
     Raises
     ------
     MapError
-        If the file is not XML, has another root or is too large, or if it has entities that stand for other
-        files, for other entities or for too much text.
+        If the file is not XML, has another root or is too large, or if its entities refer to other files, to
+        other entities or to too much text.
     """
     where = to_one_line(path)
     content = read_content(path, MAX_TEXT_BYTES)
-    if content.startswith(b"\x1f\x8b"):
+    if content.startswith(b"\x1f\x8b"):  # gzip
         raise MapError(f"{where}: expected plain {kind}, got compressed (gunzip makes it)")
     if content.count(b"=") > MAX_ATTRIBUTES:
         raise MapError(f"{where}: expected at most {MAX_ATTRIBUTES} attributes, got more")
@@ -173,12 +173,14 @@ class _Reader:
         self.declaration_count = 0
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
+        """Add an element to its parent; None in `open` stands for an element of a foreign namespace."""
         self.element_count += 1
         line = self.parser.CurrentLineNumber
         if self.element_count > MAX_ELEMENTS:
             raise MapError(f"{self.where}:{line}: expected at most {MAX_ELEMENTS} elements, got more")
         if len(self.open) >= MAX_NESTING:
             raise MapError(f"{self.where}:{line}: elements are nested deeper than {MAX_NESTING}")
+        # Expat puts a blank between the namespace and the name.
         namespace, _, tag = name.rpartition(" ")
         plain_attributes = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
         self._count_characters(sum(map(len, plain_attributes)))
@@ -202,13 +204,13 @@ class _Reader:
             element.text_pieces.append(text)
 
     def _count_characters(self, count: int) -> None:
-        """Count characters: entities and default attributes make more of them than the file has."""
+        """Count characters, because entities and default attributes can expand to more than the file has."""
         self.remaining_characters -= count
         if self.remaining_characters < 0:
             self._refuse("entities that stand for too much")
 
     def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
-        """Check an entity: it may stand for a few words, which expat inserts at every use."""
+        """Check a declared entity: it may be short text, which expat inserts at every reference."""
         self._count_declaration()
         stands = f"an entity {quote(name)} that stands"
         if value is None:
@@ -219,13 +221,13 @@ class _Reader:
             self._refuse(f"{stands} for too much")
 
     def _count_declaration(self, *_: object) -> None:
-        """Count declared entities and attributes: expat looks through all of them each time."""
+        """Count declared entities and attributes, because expat searches all of them at each use."""
         self.declaration_count += 1
         if self.declaration_count > _MAX_DECLARATIONS:
             self._refuse(f"more than {_MAX_DECLARATIONS} declarations")
 
     def _check_namespace(self, prefix: str | None, name: str | None) -> None:
-        """Check the name of a namespace, which becomes part of every name in it."""
+        """Check the length of a namespace, which expat prepends to every name in it."""
         if name is not None and len(name) > _MAX_NAMESPACE_CHARACTERS:
             self._refuse(f"a namespace of {len(name)} characters")
 

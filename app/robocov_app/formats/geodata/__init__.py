@@ -1,1 +1,1 @@
-"""Formats of coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and their common parts."""
+"""Formats with coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and what they share."""

@@ -1,8 +1,8 @@
-"""The free space of a floor of a building: spaces, their walls, and the openings that join them.
+"""The free space of one floor of a building: spaces, their walls, and the openings between them.
 
 OpenStreetMap's indoor tags and IMDF both describe a floor by the areas of its rooms and corridors. A wall
-runs along the outline of each space that has walls, and ends at the openings, both where two spaces share an
-edge and where the file has a gap for the wall between them.
+runs along the outline of each space that has walls, and is interrupted by the openings. Two adjacent spaces
+may share an edge, or the file may leave a gap for the wall between them.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_def
 Role: TypeAlias = Literal["open", "walled", "solid", "wall", "opening", "post"]
 DEFAULT_DOOR_WIDTH_M = 0.9
 OPENING_REACH_M = 0.4
-"""Distance on both sides of an opening within which it joins spaces and cuts walls."""
+"""Distance to which an opening joins spaces and cuts walls on each side of its line."""
 MAX_FLOORS = 200
-"""Largest number of floors of a building, and of floors that an element may be on."""
+"""Largest number of floors that a range of levels of one element may span."""
 _MIN_WALL_M = 1e-6
-"""Shorter pieces of walls are left by rounding."""
+"""Shorter pieces of walls are rounding errors."""
 _INTERIORS_INTERSECT = "T********"
-"""DE-9IM pattern of areas that have an area in common."""
+"""DE-9IM pattern of two areas whose interiors overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ def choose_floor(floors: dict[float, float], requested: str | None, where: str) 
     Parameters
     ----------
     floors : dict of float to float
-        Area of the spaces on each floor, by its number.
+        Total area of the spaces on each floor, keyed by its number.
     requested : str or None
-        Number that the user gave. None stands for the ground floor, or the floor nearest to it.
+        Number that the user gave. With None, it is the floor nearest to the ground floor, 0.
     where : str
         Name of the file for messages.
 
@@ -73,6 +73,7 @@ def choose_floor(floors: dict[float, float], requested: str | None, where: str) 
         If there is no such floor.
     """
     if requested is None:
+        # Of two floors at the same distance, the upper one.
         return min(floors, key=lambda floor: (abs(floor), -floor))
     try:
         number = float(requested)
@@ -110,14 +111,14 @@ class _Spaces:
 
 
 def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, description: str) -> ForeignMap:
-    """Build the map of a floor.
+    """Build the map of a floor from its spaces, walls, openings and obstacles.
 
-    If there is no opening at all, nothing would be connected; spaces are then open to their neighbors.
+    If the floor has no opening at all, its rooms get no walls, because they would all be disconnected.
 
     Parameters
     ----------
     shapes : Shapes
-        Gives the options and takes the obstacles.
+        Holds the options, and collects the walls, obstacles and notes.
     elements : sequence of FloorElement
     name, description : str
         Name and description of the map.
@@ -125,7 +126,7 @@ def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, des
     Raises
     ------
     MapError
-        If there is no space with an area, or there are too many shapes.
+        If there is no space with an area, or if there are too many shapes.
     """
     elements = [element for element in elements if shapes.accept(element.geometry.labels)]
     openings = [element.geometry for element in elements if element.role == "opening"]
@@ -158,6 +159,7 @@ def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, des
 
 
 def _collect_spaces(elements: Sequence[FloorElement], shapes: Shapes) -> _Spaces:
+    """Return the spaces among the elements of a floor; those without an area are counted as left out."""
     spaces = _Spaces()
     for element in elements:
         if element.role not in ("open", "walled"):
@@ -195,7 +197,7 @@ def _list_wall_lines(elements: Sequence[FloorElement]) -> list[BaseGeometry]:
 
 
 def _compute_opening_area(opening: SourceGeometry) -> BaseGeometry:
-    """Return the rectangle around an opening in which it cuts walls, empty for one without a width."""
+    """Return the rectangle in which an opening cuts walls; empty if the opening has no width."""
     line = opening.rings[0]
     if not _has_length(line):
         return MultiPolygon()
@@ -203,7 +205,7 @@ def _compute_opening_area(opening: SourceGeometry) -> BaseGeometry:
 
 
 def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes) -> MultiPolygon:
-    """Return the area of all spaces with a passage through each opening that has a wall between them."""
+    """Add a passage to the area of all spaces for each opening between spaces that do not touch."""
     tree = shapely.STRtree(list(floor.geoms))
     passages = []
     for gap in gaps:
@@ -212,6 +214,7 @@ def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes)
             shapes.leave_out("opening", "that adjoins no space")
             continue
         free_area = to_multipolygon(shapely.intersection(shapely.MultiPolygon(neighbors), gap))
+        # Several parts: the file leaves a gap for the wall, which the passage bridges.
         if len(free_area.geoms) > 1:
             passages.append(gap)
     if not passages:
@@ -220,7 +223,7 @@ def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes)
 
 
 def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[Array]:
-    """Return the lines of walls, each once, without their sections in openings, (k, 2) m."""
+    """Return the lines of walls, (k, 2) m each, without duplicates and without their sections in openings."""
     if not walls:
         return []
     lines = shapely.union_all(walls)
@@ -231,7 +234,7 @@ def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[Arra
 
 
 def _add_obstacles(shapes: Shapes, elements: Sequence[FloorElement], floor: MultiPolygon) -> None:
-    """Add posts and solid areas; most solid areas are between the spaces, where nothing is free anyway."""
+    """Add the posts, and the solid areas that overlap a space; the others are not free anyway."""
     shapely.prepare(floor)
     for element in elements:
         geometry = element.geometry

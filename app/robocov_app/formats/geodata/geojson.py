@@ -2,12 +2,12 @@
 
 Polygons and lines are interpreted as in `Shapes.build_foreign_map`; the properties ``name``, ``kind`` and
 ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
-projected to meters, if that makes a map of at most 10 km; else they are meters. The member ``crs`` of the
-older standard is obeyed, as is a member ``units`` (``meters`` or ``degrees``), which `robocov export` writes;
-the option overrules both.
+projected to meters if that makes a map of at most 10 km; otherwise they are taken as meters. The member
+``crs`` of the older standard is respected, and so is the member ``units`` (``meters`` or ``degrees``), which
+`robocov export` writes; the option ``units`` takes precedence over both.
 
-A file may also be a sequence of such texts (GeoJSONSeq, RFC 8142): each after a record separator, or, as many
-programs write it, each on a line of its own.
+A file may also be a sequence of GeoJSON texts (GeoJSONSeq, RFC 8142), each preceded by a record separator.
+Many programs write each text on its own line instead.
 """
 
 import json
@@ -42,12 +42,12 @@ _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
 _TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
 _NAME_PROPERTIES = ("name", "kind", "id")
-"""Properties of a feature that name its shapes; its own id does too."""
+"""Properties of a feature that name its shapes, in addition to the feature's own id."""
 _RECORD_SEPARATOR = b"\x1e"
 _SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".jsonl", ".ldjson", ".ndjson")
 _SECOND_RECORD = re.compile(rb"\}[ \t]*\r?\n\s*\{")
 _EXTRA_DIGITS_OF_DEGREES = 6
-"""Additional decimals of degrees: a degree is about a hundred kilometers."""
+"""Additional decimals of coordinates in degrees: a degree is about 100 km."""
 _MAX_NAME_CHARACTERS = 80
 _MAX_DESCRIPTION_CHARACTERS = 1000
 
@@ -98,7 +98,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _parse_origin(file: JsonFile, document: dict[str, Any]) -> tuple[float, float] | None:
-    """Return the member ``origin``, the longitude and latitude of [0, 0] m, or None."""
+    """Return the member ``origin``: the longitude and latitude of the map's point [0, 0], or None."""
     origin = document.get("origin")
     if origin is None:
         return None
@@ -110,7 +110,10 @@ def _parse_origin(file: JsonFile, document: dict[str, Any]) -> tuple[float, floa
 
 
 def _convert_to_list(content: bytes, suffix: str) -> bytes | None:
-    """Return a sequence of GeoJSON texts as a JSON list on the same lines, or None if it is not one."""
+    """Convert a sequence of GeoJSON texts to one JSON list; return None if the content is not a sequence.
+
+    Each text stays on its line, so that error messages name the right one.
+    """
     text = content.removeprefix(BOM_UTF8)
     if text.lstrip().startswith(_RECORD_SEPARATOR):
         return _convert_records_to_list(text)
@@ -125,7 +128,8 @@ def _convert_to_list(content: bytes, suffix: str) -> bytes | None:
 
 
 def _convert_records_to_list(text: bytes) -> bytes:
-    """Return records after separators as a JSON list; a comma replaces each separator between two of them."""
+    """Convert a sequence with record separators to a JSON list; empty records are skipped."""
+    # Nothing but white space precedes the first separator.
     _, first, *others = text.split(_RECORD_SEPARATOR)
     has_record = bool(first.strip())
     pieces = [b"[", first]
@@ -149,12 +153,12 @@ def _is_json(line: bytes) -> bool:
 
 
 class GeometryCollector:
-    """Collects the geometries in GeoJSON, with the names of the features that contain them.
+    """Collects the geometries in a GeoJSON file, labeled with the names of their features.
 
     Attributes
     ----------
     geometries : list of SourceGeometry
-        In the coordinates of the file.
+        The geometries, in the coordinates of the file.
     crs : str or None
         Reference system that the file names.
     """
@@ -166,7 +170,7 @@ class GeometryCollector:
         self.crs: str | None = None
 
     def collect(self, *, is_sequence: bool = False) -> None:
-        """Add the content of the file: one GeoJSON text, or a list of them that stands for a sequence."""
+        """Add the geometries of the file, which is one GeoJSON text or, for a sequence, a list of them."""
         if not is_sequence:
             self._add_text(self.file.document, ())
             return
@@ -191,6 +195,7 @@ class GeometryCollector:
             self.add_geometry(text, at, ())
 
     def _add_feature(self, feature: Any, at: JsonPath) -> None:
+        """Add the geometry of a feature; a feature without one is counted as left out."""
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
             raise self.file.build_error(at, feature, "a Feature")
         self._store_reference_system(feature, at)
@@ -204,21 +209,21 @@ class GeometryCollector:
         self.add_geometry(feature["geometry"], (*at, "geometry"), labels)
 
     def add_geometry(self, geometry: Any, at: JsonPath, labels: tuple[str, ...]) -> None:
-        """Add a geometry.
+        """Add a geometry, or each geometry of a collection.
 
         Parameters
         ----------
         geometry : object
             A geometry as parsed from JSON.
         at : JsonPath
-            Keys and indices that lead to it.
+            Keys and indices that lead to the geometry.
         labels : tuple of str
-            Names of its shapes.
+            Names of the shapes that it becomes.
 
         Raises
         ------
         MapError
-            If it is not a geometry.
+            If the value is not a valid geometry.
         """
         kind = files.get_member(geometry, "type")
         expected = f"one of {', '.join(_GEOMETRIES)}"
@@ -239,7 +244,10 @@ class GeometryCollector:
     def _add_coordinates(
         self, kind: str, value: Any, at: JsonPath, labels: tuple[str, ...], whole: str = ""
     ) -> None:
-        """Add the coordinates of a geometry; `whole` is the position of the multipolygon of a polygon."""
+        """Add the coordinates of a geometry.
+
+        For a part of a multipolygon, `whole` is the place of the multipolygon in the file.
+        """
         if kind in _PLURAL:
             if not isinstance(value, list):
                 raise self.file.build_error(at, value, "a list")
@@ -264,7 +272,10 @@ class GeometryCollector:
         return self.shapes.drop_heights(points)
 
     def _store_reference_system(self, member: dict[str, Any], at: JsonPath) -> None:
-        """Store the reference system that an object names, as GeoJSON did before RFC 7946."""
+        """Store the coordinate reference system that an object names (GeoJSON before RFC 7946).
+
+        Raise MapError if it differs from the one of an earlier object.
+        """
         value = member.get("crs")
         if value is None:
             return
@@ -277,28 +288,28 @@ class GeometryCollector:
 
 
 def _list_labels(properties: dict[str, Any], identifier: Any) -> tuple[str, ...]:
-    """Return the names of a feature, each once."""
+    """Return the distinct names of a feature."""
     values = [*(properties.get(name) for name in _NAME_PROPERTIES), identifier]
     labels = [to_one_line(value).strip() for value in values if type(value) in (str, int)]
     kind = properties.get("kind")
     if isinstance(kind, str) and kind.casefold() != BOUNDARY:
-        # A feature of another kind is not the boundary, even if that is its name.
+        # A feature of another kind is not the boundary, even if its name is "boundary".
         labels = [label for label in labels if label.casefold() != BOUNDARY]
     return tuple(dict.fromkeys(filter(None, labels)))
 
 
 @dataclass
 class _WrittenShapes:
-    """The shapes of a map as they are written, rounded to the decimals of the file.
+    """The shapes of a map as written to a file, rounded to its number of decimals.
 
     Attributes
     ----------
     features : list of str
         JSON of each feature.
     areas : list of geometry, m
-        The boundary and the obstacles as a reader finds them.
+        The boundary, followed by the obstacles, as a reader of the file would get them.
     lost : int
-        Number of shapes that vanish by rounding.
+        Number of shapes that rounding reduced to nothing.
     crosses_antimeridian : bool
     """
 
@@ -354,7 +365,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 
 
 def _format_shapes(environment: Environment, plane: LocalPlane | None, digits: int) -> _WrittenShapes:
-    """Format the boundary and the obstacles as features, in degrees if there is a plane."""
+    """Format the boundary and the obstacles as features, in degrees if `plane` is given, else in meters."""
     written = _WrittenShapes()
     _format_shape(written, environment.boundary_polygon, {"kind": "boundary"}, plane, digits)
     for obstacle in environment.obstacles:
@@ -372,7 +383,7 @@ def _format_shape(
     plane: LocalPlane | None,
     digits: int,
 ) -> None:
-    """Add a shape, m, to those that are written."""
+    """Round a shape, in m, format it as a feature and add it to `written`."""
     if plane is None:
         polygons = snap_to_grid(shape, digits)
         written.areas.append(MultiPolygon(polygons))
@@ -395,7 +406,7 @@ def _format_shape(
 
 
 def _build_plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
-    """Return the plane about an origin; raise ParameterError if the map spans too many longitudes."""
+    """Build the plane around an origin; raise ParameterError if the map spans too many longitudes."""
     longitude, latitude = origin
     try:
         plane = LocalPlane(import_optional("pyproj", "geo"), longitude, latitude)

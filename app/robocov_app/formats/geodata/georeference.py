@@ -1,4 +1,4 @@
-"""Conversion of coordinates on the globe to meters in a local plane, the unit of maps."""
+"""Conversion of coordinates on the globe to meters in a local plane."""
 
 import math
 import re
@@ -26,11 +26,11 @@ _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
 _URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
 _ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
 _DIGITS = 6
-"""Decimals of meters: free space is known to a micrometer."""
+"""Decimals of coordinates in meters: they are rounded to a micrometer."""
 _EARTH_RADIUS_M = 6_371_000.0
-"""Mean radius, to distinguish degrees from meters; nothing else is computed with it."""
+"""Mean radius, used only to tell degrees from meters."""
 _MAX_DEGREES = (360.0, 90.0)
-"""Largest longitude and latitude: some files continue beyond the antimeridian."""
+"""Largest longitude and latitude. Longitudes exceed 180 in files that continue beyond the antimeridian."""
 
 
 def convert_to_meters(
@@ -41,21 +41,23 @@ def convert_to_meters(
     may_be_degrees: bool = False,
     origin: Point | None = None,
 ) -> list[SourceGeometry]:
-    """Return geometries with coordinates in meters, and add notes on the conversion to `shapes`.
+    """Convert the coordinates of geometries to meters, and add notes on the conversion to `shapes`.
 
-    The option ``units`` overrules the file; ``scale`` is the size of a unit in meters if the file has none.
+    The option ``units`` takes precedence over the file. If coordinates are neither degrees nor in a reference
+    system, the option ``scale`` is the length of their unit in meters.
 
     Parameters
     ----------
     geometries : list of SourceGeometry
     shapes : Shapes
-        Gives the options and takes the notes.
+        Holds the options, and collects the notes.
     crs : str or None
-        Reference system that the file names, as ``EPSG:25832`` or an OGC URN.
+        Reference system that the file names, such as ``EPSG:25832`` or an OGC URN.
     may_be_degrees : bool
-        Whether coordinates without a reference system are degrees if that makes a map of at most 10 km.
+        Whether to take coordinates without a reference system as degrees if the map is then at most 10 km
+        wide.
     origin : (longitude, latitude), degrees
-        Point that becomes [0, 0] m. By default the middle of the geometries.
+        Point that becomes [0, 0] of the map. By default, the center of the geometries' bounding box.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def _join_points(geometries: Sequence[SourceGeometry]) -> Array:
 
 
 def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list[SourceGeometry]:
-    """Return geometries with other points, in the order of `_join_points`."""
+    """Replace the points of geometries; the new ones are in the order of `_join_points`."""
     lengths = [len(ring) for geometry in geometries for ring in geometry.rings]
     rings = iter(np.split(points, np.cumsum(lengths)[:-1]))
     replaced = []
@@ -100,7 +102,10 @@ def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list
 
 
 def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
-    """Return whether coordinates are degrees of a site, not meters of a plan: a plan is meters wide."""
+    """Return whether coordinates are degrees: they are valid, and the map would be small enough.
+
+    A plan in meters would be hundreds of kilometers wide if its coordinates were taken as degrees.
+    """
     points = _join_points(geometries)
     if not (np.abs(points) <= _MAX_DEGREES).all():
         return False
@@ -111,13 +116,19 @@ def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
 
 
 def _unwrap_longitudes(points: Array, center: float) -> Array:
-    """Return longitudes and latitudes without a jump at the antimeridian: all within 180 degrees of one."""
+    """Return longitudes and latitudes, with all longitudes within 180 degrees of `center`.
+
+    So shapes that cross the antimeridian have no jump there.
+    """
     longitudes = center + (points[:, 0] - center + 180.0) % 360.0 - 180.0
     return np.column_stack([longitudes, points[:, 1]])
 
 
 def _parse_reference_system(crs: str, where: str) -> str:
-    """Return a name as AUTHORITY:CODE. Only codes are looked up, because full definitions may name files."""
+    """Return the name of a reference system as AUTHORITY:CODE.
+
+    Full definitions are refused, because they may name files.
+    """
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
         expected = f"expected a code as EPSG:25832 ({_WAY_OUT})"
@@ -128,7 +139,7 @@ def _parse_reference_system(crs: str, where: str) -> str:
 def _project(
     geometries: Sequence[SourceGeometry], system: str, shapes: Shapes, origin: Point | None
 ) -> list[SourceGeometry]:
-    """Return geometries in meters east and north of an origin, by the azimuthal equidistant projection."""
+    """Project geometries to meters east and north of an origin (azimuthal equidistant projection)."""
     pyproj = _import_pyproj(system, shapes.where)
     points = _join_points(geometries)
     if system not in _SYSTEMS_IN_DEGREES:
@@ -162,7 +173,7 @@ def _import_pyproj(system: str, where: str) -> Any:
 
 
 def _transform_to_degrees(pyproj: Any, points: Array, system: str, where: str) -> Array:
-    """Return points of a reference system as longitudes and latitudes, inf where that is impossible."""
+    """Convert points of a reference system to longitude and latitude; inf if that is impossible."""
     try:
         source = pyproj.CRS.from_authority(*system.split(":"))
         transformer = pyproj.Transformer.from_crs(source, DEGREES, always_xy=True)
@@ -183,11 +194,14 @@ class LocalPlane:
         self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
 
     def to_meters(self, coordinates: Array) -> Array:
-        """Return longitudes and latitudes, (n, 2), as meters, rounded so that touching walls still touch."""
+        """Convert longitudes and latitudes, (n, 2), to meters, rounded so that touching walls still touch."""
         return np.round(np.column_stack(self._project(*coordinates.T)), _DIGITS)
 
     def to_degrees(self, coordinates: Array) -> Array:
-        """Return meters, (n, 2), as longitudes, within 180 degrees of the origin, and latitudes."""
+        """Convert positions in meters, (n, 2), to longitudes and latitudes.
+
+        Longitudes are within 180 degrees of the origin's.
+        """
         return _unwrap_longitudes(
             np.column_stack(self._project(*coordinates.T, inverse=True)), self._longitude
         )

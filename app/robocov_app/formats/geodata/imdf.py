@@ -30,15 +30,15 @@ from robocov_app.formats.options import ReadOptions
 
 MAX_ARCHIVE_FILES = 1000
 MAX_OBJECTS = 200_000
-"""Largest number of JSON objects in the files together; a feature has about four."""
+"""Largest total number of JSON objects in the files. A feature has about four."""
 _REQUIRED_FILES = ("level", "unit")
 _READ_FILES = (*_REQUIRED_FILES, "opening", "fixture", "kiosk", "venue")
 _ZIP_MAGIC = b"PK\x03\x04"
 _ZIP_ENTRY_MAGIC = b"PK\x01\x02"
-"""Start of the entry of a file in the directory of a zip."""
+"""Signature of a file's entry in the directory of a zip archive."""
 _FILE_NAMES = tuple(f"{name}.geojson".encode() for name in ("level", "opening", "unit", "venue"))
 _MAX_LABEL_CHARACTERS = 80
-# Categories of units, up to the first dot.
+# Categories of units, up to the first dot: obstacles, units that robots cannot drive on, units without walls.
 _SOLID = {"brick", "column", "concrete", "drywall", "glass", "structure", "vegetation", "wood"}
 _NO_FLOOR = {"elevator", "escalator", "movingwalkway", "opentobelow", "stairs", "steps"}
 _OPEN = {
@@ -62,7 +62,7 @@ class _Level(NamedTuple):
 
 
 class _Archive:
-    """The GeoJSON files of an archive, by their names in IMDF without suffix."""
+    """The GeoJSON files of an archive, keyed by their names without suffix."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -76,7 +76,7 @@ class _Archive:
         self.files = {name: JsonFile(path / f"{name}.geojson", text) for name, text in texts.items()}
 
     def list_features(self, name: str) -> list[dict[str, Any]]:
-        """Return the features of a file, none if there is no such file."""
+        """Return the features of a file; an empty list if there is no such file."""
         file = self.files.get(name)
         if file is None:
             return []
@@ -96,19 +96,19 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def is_archive_folder(path: Path) -> bool:
-    """Return whether a path is a folder with the files of an archive in it."""
+    """Return whether a path is a folder that contains the files of an IMDF archive."""
     return path.is_dir() and all((path / f"{name}.geojson").is_file() for name in _REQUIRED_FILES)
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Read a level of a venue.
+    """Read the map of one level of a venue.
 
     Raises
     ------
     MapError
-        If the archive is broken, or has no level or no unit.
+        If the archive is corrupt, or has no level or no unit.
     ParameterError
-        If there is no such level as the option ``level`` names.
+        If the option ``level`` names a level that does not exist.
     """
     archive = _Archive(path)
     shapes = Shapes(archive.where, options)
@@ -142,7 +142,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _choose_role(name: str, feature: dict[str, Any], geometry: SourceGeometry) -> Role | None:
-    """Return the role of a geometry on the floor, or None if it has none.
+    """Return the role of a geometry on the floor, or None if the geometry cannot be used.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _choose_role(name: str, feature: dict[str, Any], geometry: SourceGeometry) -
 
 
 def _read_folder(path: Path) -> dict[str, bytes]:
-    """Return the content of the files of a folder that are read, by their names without suffix."""
+    """Return the content of the IMDF files in a folder, keyed by their names without suffix."""
     texts = {}
     remaining_bytes = files.MAX_TEXT_BYTES
     for name in _READ_FILES:
@@ -179,7 +179,7 @@ def _read_folder(path: Path) -> dict[str, bytes]:
 
 
 def _read_zip(path: Path) -> dict[str, bytes]:
-    """Return the content of the files of a zip archive that are read, by their names without suffix."""
+    """Return the content of the IMDF files in a zip archive, keyed by their names without suffix."""
     where = to_one_line(path)
     data = files.read_content(path, files.MAX_TEXT_BYTES)
     if data.count(_ZIP_ENTRY_MAGIC) > MAX_ARCHIVE_FILES:
@@ -189,12 +189,13 @@ def _read_zip(path: Path) -> dict[str, bytes]:
             return _unpack(archive, where)
     except MapError:
         raise
-    except Exception as error:  # of zipfile and its decompressors, which raise many kinds
+    except Exception as error:  # zipfile and its decompressors raise many kinds
         reason = to_one_line(error)[:80]
         raise MapError(f"{where}: expected a whole zip archive, got a broken one: {reason}") from None
 
 
 def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
+    """Return the content of the IMDF files in an open archive; raise MapError if they are too large."""
     texts: dict[str, bytes] = {}
     remaining_bytes = files.MAX_TEXT_BYTES
     for entry in archive.infolist():
@@ -205,7 +206,7 @@ def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
             continue
         if name in texts:
             raise MapError(f"{where}: expected one venue, got two files {entry_path.name}")
-        # The size in the directory is not trusted.
+        # The size stated in the archive is not trusted. One byte more shows that the limit is exceeded.
         with archive.open(entry) as file:
             texts[name] = file.read(remaining_bytes + 1)
         remaining_bytes -= len(texts[name])
@@ -216,7 +217,7 @@ def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
 
 
 def _parse_levels(archive: _Archive) -> dict[str, _Level]:
-    """Return the levels by their identifiers."""
+    """Return the levels of a venue, keyed by their identifiers."""
     levels = {}
     file = archive.files["level"]
     for k, feature in enumerate(archive.list_features("level")):
@@ -237,8 +238,13 @@ def _parse_levels(archive: _Archive) -> dict[str, _Level]:
 def _choose_floor(
     archive: _Archive, levels: dict[str, _Level], requested: str | None, shapes: Shapes
 ) -> float:
-    """Return the ordinal of the floor to be read: the requested name or number, or the ground floor."""
+    """Return the ordinal of the floor to be read.
+
+    `requested` is its name or number; with None, it is the floor nearest to the ground floor. If the venue
+    has several floors, a note lists them.
+    """
     used_ids = {_get_level_id(feature) for feature in archive.list_features("unit")}
+    # Only floors with units. `choose_floor` does not use their areas, here 1.
     floors = {level.ordinal: 1.0 for level_id, level in levels.items() if level_id in used_ids}
     if not floors:
         raise MapError(f"{archive.where}: expected units on its levels, got none")
@@ -269,7 +275,7 @@ def _has_name(level: _Level, name: str) -> bool:
 
 
 def _list_names(labels: Any) -> list[str]:
-    """Return the names in all languages in a member."""
+    """Return the names in all languages of an IMDF label."""
     if not isinstance(labels, dict):
         return []
     texts = [text for text in labels.values() if isinstance(text, str)]
@@ -301,7 +307,7 @@ def _get_category(feature: dict[str, Any]) -> str:
 def _collect_geometries(
     file: JsonFile, index: int, feature: dict[str, Any], shapes: Shapes
 ) -> list[SourceGeometry]:
-    """Return the geometries of a feature, with its names and its category as labels."""
+    """Return the geometries of a feature; its names and its category become their labels."""
     properties = feature["properties"]
     category = properties.get("category")
     labels = [*_list_names(properties.get("name")), *_list_names(properties.get("alt_name"))]
@@ -317,6 +323,6 @@ def _collect_geometries(
 
 
 def _straighten(geometry: SourceGeometry) -> SourceGeometry:
-    """Return the line from the first point of an opening to its last one."""
+    """Return the straight line from the first point of an opening to the last."""
     line = geometry.rings[0]
     return SourceGeometry("line", (line[[0, -1]],), geometry.labels, geometry.at)

@@ -1,4 +1,4 @@
-"""Crossings of edges: their number is limited, as polygons with millions of them take hours to compute."""
+"""Limit on the number of crossings of edges, because polygons with millions of crossings take hours."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,34 +11,34 @@ from robocov.arrays import Array
 from robocov.errors import MapError
 
 MAX_CROSSINGS = 30_000
-"""Maximum number of crossings of all edges of a file. A ring of some kB can cross itself millions of times,
-and to find all these points takes minutes and gigabytes."""
+"""Maximum number of crossings of all edges of a file. A ring of a few kB can cross itself millions of times,
+and finding all these points takes minutes and gigabytes."""
 _MAX_PAIRWISE_EDGES = 12
-"""Up to this number of edges, each is compared with each, which is faster than a search tree."""
+"""Up to this number of edges, all pairs are compared, which is faster than a search tree."""
 _MAX_SAMPLED_EDGES = 500
 """Number of edges whose crossings are counted for an estimate."""
 _EDGES_AT_ONCE = 20
 _MAX_COMPARISONS = 400_000
-"""Number of pairs of edges that are compared for an estimate."""
+"""Number of pairs of edges after which an estimate ends."""
 _MIN_COUNTED_CROSSINGS = 50
-"""After more crossings, an estimate above the limit is reliable."""
+"""Number of counted crossings above which an estimate is reliable enough to end early."""
 
 
 def extract_edges(lines: Iterable[BaseGeometry]) -> Array:
-    """Return start and end of each edge of lines and rings, (n, 2, 2)."""
+    """Return the start and end of each edge of lines and rings, (n, 2, 2)."""
     points, line = shapely.get_coordinates(lines, return_index=True)
     is_same_line = line[1:] == line[:-1]
     return np.stack([points[:-1][is_same_line], points[1:][is_same_line]], axis=1)
 
 
 def extract_sides(area: BaseGeometry) -> Array:
-    """Return start and end of each side of polygons, (n, 2, 2)."""
+    """Return the start and end of each side of polygons, (n, 2, 2)."""
     return extract_edges(shapely.get_rings(shapely.get_parts(area)))
 
 
 @dataclass
 class CrossingCounter:
-    """The number of crossings of edges in a file, an estimate if there are many edges.
+    """Counts the crossings of the edges in a file; with many edges, the count is an estimate.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class CrossingCounter:
     count: float = 0.0
 
     def add(self, lines: Iterable[BaseGeometry]) -> None:
-        """Count how often the edges of lines cross; edges that only meet do not count.
+        """Count how often the edges of lines cross; edges that merely touch are not counted.
 
         Raises
         ------
         MapError
-            If there are more than `MAX_CROSSINGS`.
+            If the total exceeds `MAX_CROSSINGS`.
         """
         edges = shapely.linestrings(extract_edges(lines))
         if len(edges) <= _MAX_PAIRWISE_EDGES:
@@ -69,7 +69,7 @@ class CrossingCounter:
             raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}")
 
     def _estimate(self, edges: Array) -> float:
-        """Estimate the number of crossings from those of a sample of edges."""
+        """Estimate the number of crossings from a random sample of edges."""
         tree = shapely.STRtree(edges)
         sample = np.random.default_rng(0).permutation(len(edges))[:_MAX_SAMPLED_EDGES]
         crossings = 0
@@ -80,7 +80,7 @@ class CrossingCounter:
             first, second = tree.query(edges[chunk])
             comparisons += len(first)
             crossings += int(shapely.crosses(edges[chunk[first]], edges[second]).sum())
-            # Each crossing belongs to two edges.
+            # Each crossing is found from both of its edges.
             estimate = crossings * len(edges) / (start + len(chunk)) / 2
             is_above = crossings > _MIN_COUNTED_CROSSINGS and self.count + estimate > MAX_CROSSINGS
             if comparisons > _MAX_COMPARISONS or is_above:

@@ -10,13 +10,13 @@ from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import MAX_SAGITTA_M
 
 CURVE_TOLERANCE_M = MAX_SAGITTA_M
-"""Maximum distance between a curve and its approximation, as for round obstacles."""
+"""Maximum distance between a curve and its approximation, the same as for round obstacles."""
 MAX_POINTS = 250_000
-"""Maximum number of points of a call. The largest circle, with a radius of 10 000 km, has 222 thousand."""
+"""Maximum number of points of one call. The largest circle, with a radius of 10 000 km, has 222 thousand."""
 _FIRST_STEPS = 8
-"""Number of steps between two breaks before steps are halved."""
+"""Initial number of steps between two breaks."""
 _MIDPOINT_SAFETY = 0.8
-"""Fraction of the tolerance for the midpoint of a step, where the curve need not be farthest away."""
+"""Fraction of the tolerance allowed at the midpoint of a step; the curve may deviate more elsewhere."""
 _MIN_ELLIPSE_POINTS = 8
 
 
@@ -35,7 +35,7 @@ def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS)
     Returns
     -------
     points : (k, 2) array
-        Points of all curves, each without its first one.
+        Points of all curves; the first point of each curve is omitted.
     count : (n,) array of int
         Number of points of each curve.
 
@@ -57,6 +57,7 @@ def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS)
     t = _build_fractions(count)[:, None]
     s = 1.0 - t
     points = s**3 * a + 3.0 * s**2 * t * b + 3.0 * s * t**2 * c + t**3 * d
+    # The last point of each curve is exact.
     points[np.cumsum(count) - 1] = control[:, 3]
     return points, count
 
@@ -77,14 +78,14 @@ def flatten_arcs(
     ----------
     centers, u, v : (n, 2) arrays
     starts, sweeps : (n,) arrays, rad
-        First angle, and angle to the last one.
+        Angle at the start, and signed angle from there to the end.
     tolerance, maximum
         See `flatten_beziers`.
 
     Returns
     -------
     points : (k, 2) array
-        Points of all arcs, each without its first one.
+        Points of all arcs; the first point of each arc is omitted.
     count : (n,) array of int
         Number of points of each arc.
 
@@ -93,11 +94,11 @@ def flatten_arcs(
     ValueError
         If there would be more points.
     """
-    # The longer half axis is the greater singular value of [u v].
+    # The longer half axis is the larger singular value of [u v].
     square = (u**2 + v**2).sum(axis=1)
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     radius = np.sqrt((square + np.sqrt(np.maximum(square**2 - 4.0 * area**2, 0.0))) / 2.0)
-    # The chord of an angle a is radius (1 - cos(a / 2)) from the arc.
+    # The chord of an angle a is at most radius (1 - cos(a / 2)) from the arc.
     step = 4.0 * np.arcsin(np.sqrt(np.minimum(0.5 * tolerance / np.maximum(radius, 1e-300), 0.5)))
     angle = np.abs(sweeps)
     count = _round_counts(np.maximum(angle / step, _MIN_ELLIPSE_POINTS * angle / math.tau), maximum)
@@ -109,7 +110,7 @@ def flatten_arcs(
 
 
 def flatten_arc(center: Array, u: Array, v: Array, *, start: float, sweep: float, tolerance: float) -> Array:
-    """Return the points of an elliptic arc without its first one, (k, 2); see `flatten_arcs`."""
+    """Return the points of an elliptic arc, (k, 2), except for the first one; see `flatten_arcs`."""
     points, _ = flatten_arcs(
         center[None], u[None], v[None], np.array([start]), np.array([sweep]), tolerance=tolerance
     )
@@ -117,15 +118,16 @@ def flatten_arc(center: Array, u: Array, v: Array, *, start: float, sweep: float
 
 
 def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
-    """Sample a curve, with steps that are halved until they are close to it.
+    """Sample a curve at points so close that the lines between them are within a tolerance.
 
     Parameters
     ----------
     curve : callable
         Returns points, (k, 2), at parameters, (k,).
     breaks : (n,) array
-        Increasing parameters between which the curve is smooth.
+        Increasing parameters between which the curve is smooth, including its start and end.
     tolerance : float
+        Maximum distance between the curve and the lines.
 
     Returns
     -------
@@ -155,7 +157,7 @@ def _build_fractions(count: IntArray) -> Array:
 
 
 def _round_counts(count: Array, maximum: int) -> IntArray:
-    """Return counts as integers of at least 1. Raises ValueError if their sum is too large."""
+    """Round counts up to integers of at least 1; raise ValueError if their sum exceeds `maximum`."""
     whole = np.ceil(np.clip(count, 1.0, maximum + 1.0))
     if not whole.sum() <= maximum:  # The sum may be nan.
         raise ValueError(f"expected at most {maximum} points, got more")

@@ -1,4 +1,4 @@
-"""Frames in the plane: (3, 3) matrices that transform homogeneous positions to the surrounding frame."""
+"""Coordinate frames in the plane: (3, 3) matrices that transform homogeneous positions to a parent frame."""
 
 import math
 
@@ -11,12 +11,12 @@ UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 def build_frame(x: float, y: float, turn: float) -> Array:
-    """Return the matrix, (3, 3), of a frame at a position and turned by an angle, rad."""
+    """Return the (3, 3) matrix of a frame at a position, rotated by the angle `turn`, rad."""
     cos = math.cos(turn)
     sin = math.sin(turn)
     return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
 
 
 def transform_points(matrix: Array, points: Array) -> Array:
-    """Return points, (k, 2), transformed by a matrix, (3, 3)."""
+    """Transform points, (k, 2), by a (3, 3) matrix."""
     return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])

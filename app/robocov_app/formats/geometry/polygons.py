@@ -1,4 +1,4 @@
-"""Operations on polygons: union, growth, rounding, and numbers with few decimals."""
+"""Operations on polygons: union, buffering and rounding; and formatting of coordinates."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -12,9 +12,9 @@ from robocov.arrays import Array
 from robocov.environment import GRID_M
 
 DEFAULT_DIGITS = 6
-"""Decimals of coordinates in meters: the free space is known to a micrometer."""
+"""Decimals of coordinates in meters: they are rounded to a micrometer."""
 _MITRE_LIMIT = 5.0
-"""Sharper corners are cut when an area is grown or shrunk."""
+"""Mitre limit of buffers: sharper corners are cut off."""
 
 
 def unite(areas: Sequence[BaseGeometry]) -> BaseGeometry:
@@ -22,8 +22,8 @@ def unite(areas: Sequence[BaseGeometry]) -> BaseGeometry:
 
     Notes
     -----
-    Without a grid, GEOS is ten times as fast, but may silently lose a part where edges almost coincide. So
-    it is checked that the union contains every corner.
+    Without a precision grid, GEOS is ten times as fast, but may silently lose a part where edges almost
+    coincide. So the union is checked to contain every corner, and computed on a grid if it does not.
     """
     union = shapely.union_all(areas)
     corners = shapely.points(shapely.get_coordinates(areas))
@@ -34,7 +34,7 @@ def unite(areas: Sequence[BaseGeometry]) -> BaseGeometry:
 
 
 def buffer_with_mitres(geometry: Any, distance: float) -> Any:
-    """Grow areas by a distance, or shrink them by a negative one, and keep their corners.
+    """Grow areas by a distance, or shrink them if it is negative, without rounding their corners.
 
     Parameters
     ----------
@@ -47,20 +47,25 @@ def buffer_with_mitres(geometry: Any, distance: float) -> Any:
 
     Notes
     -----
-    GEOS divides by the length of an edge, also where points are repeated, and drops such edges afterwards.
+    Warnings are suppressed: GEOS divides by the length of an edge even where points are repeated, and drops
+    such edges afterwards.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return shapely.buffer(geometry, distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
 
 
 def make_valid(area: BaseGeometry) -> BaseGeometry:
-    """Return a valid area; parts without an area are dropped."""
+    """Make an area valid; parts that collapse to lines or points are dropped."""
     valid: BaseGeometry = shapely.make_valid(area, method="structure", keep_collapsed=False)
     return valid
 
 
 def list_polygons(geometry: BaseGeometry) -> list[Polygon]:
-    """Return the polygons of a geometry, counter-clockwise, the largest first, without lines and points."""
+    """Return the polygons of a geometry, the largest first, oriented counter-clockwise.
+
+    Lines and points in the geometry are dropped.
+    """
+    # Twice, because a collection may contain multipolygons.
     flat = shapely.get_parts(shapely.get_parts(geometry))
     parts = [part for part in flat if isinstance(part, Polygon) and part.area > 0.0]
     parts.sort(key=lambda part: (-part.area, part.bounds))
@@ -99,13 +104,13 @@ def round_polygons(geometry: BaseGeometry, digits: int) -> MultiPolygon:
 
     rounded = shapely.transform(geometry, round_points)
     if not rounded.is_valid:
-        # A simplified wall may cross the boundary next to it, and GEOS does not round invalid geometries.
+        # A simplified wall may cross the boundary next to it, and GEOS cannot round invalid geometries.
         precise = shapely.set_precision(make_valid(geometry), 10.0**-digits)
         rounded = shapely.transform(precise, round_points)
     parts = list_polygons(rounded)
     tidy = [_tidy_polygon(part, digits) for part in parts]
     if not all(part.is_valid for part in tidy):
-        # Rings touched where a vertex was dropped.
+        # Rings touched at a vertex that was dropped.
         tidy = parts
     return to_multipolygon(MultiPolygon(tidy))
 
@@ -122,15 +127,15 @@ def tidy_ring(points: Array, digits: int) -> Array:
     Parameters
     ----------
     points : (k, 2) array
-        Vertices with this many decimals; the first one is not repeated.
+        Vertices, rounded to `digits` decimals; the first one is not repeated.
     digits : int
 
     Returns
     -------
     (m, 2) array
-        The other vertices, in their order. The enclosed area is the same.
+        The remaining vertices, in the same order. The enclosed area does not change.
     """
-    # As integers, whose products are exact.
+    # Products of integers are exact.
     positions = [tuple(point) for point in np.rint(points * 10.0**digits).astype(np.int64).tolist()]
     kept: list[int] = []
     for k in range(len(positions)):
@@ -139,7 +144,7 @@ def tidy_ring(points: Array, digits: int) -> Array:
         if kept and positions[kept[-1]] == positions[k]:
             continue
         kept.append(k)
-    # The same where the ring closes.
+    # The same check where the ring closes.
     while len(kept) > 2:
         if _is_straight(positions[kept[-2]], positions[kept[-1]], positions[kept[0]]):
             kept.pop()
@@ -151,18 +156,18 @@ def tidy_ring(points: Array, digits: int) -> Array:
 
 
 def _is_straight(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> bool:
-    """Return whether b is on the line through a and c, or equal to one of them."""
+    """Return whether b is on the line through a and c."""
     return (b[0] - a[0]) * (c[1] - b[1]) == (b[1] - a[1]) * (c[0] - b[0])
 
 
 def snap_to_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
-    """Return the polygons of a valid geometry with rounded coordinates, still valid; see `list_polygons`."""
+    """Round the coordinates of a valid geometry and return its polygons, still valid; see `list_polygons`."""
     precise = shapely.set_precision(geometry, 10.0**-digits)
     return list_polygons(shapely.transform(precise, lambda points: np.round(points, digits)))
 
 
 def format_decimal(value: float, digits: int) -> str:
-    """Return a number with at most this many decimals, and without trailing zeros.
+    """Format a number with at most `digits` decimals and without trailing zeros.
 
     Examples
     --------
@@ -181,6 +186,6 @@ def list_rings(polygon: Polygon) -> list[list[tuple[float, float]]]:
 
 
 def compute_free_area(boundary: BaseGeometry, obstacles: Iterable[BaseGeometry]) -> float:
-    """Return the area inside a boundary and outside obstacles as `Environment.free` has it, m²."""
+    """Return the area inside a boundary and outside obstacles, m², computed as for `Environment.free`."""
     blocked = shapely.union_all(list(obstacles), grid_size=GRID_M)
     return float(shapely.difference(boundary, blocked, grid_size=GRID_M).area)

@@ -1,11 +1,11 @@
-"""Arithmetic of arrays of plane vectors, (k, 2)."""
+"""Arithmetic on arrays of plane vectors, (k, 2)."""
 
 import numpy as np
 
 from robocov.arrays import Array
 
 _MIN_CROSS = 1e-200
-"""Lines whose directions have a smaller cross product are parallel."""
+"""Lines are parallel if the cross product of their directions is smaller."""
 
 
 def compute_cross(first: Array, second: Array) -> Array:
@@ -19,7 +19,7 @@ def compute_dot(first: Array, second: Array) -> Array:
 
 
 def project_onto_lines(points: Array, origins: Array, directions: Array) -> Array:
-    """Return the foot of the perpendicular from each point to a line.
+    """Project each point onto a line of its own.
 
     Parameters
     ----------

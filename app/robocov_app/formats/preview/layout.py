@@ -1,4 +1,4 @@
-"""Layout of the figure of an import: two arenas next to or above each other, captions, and lines of text."""
+"""Layout of the figure of an import: two arenas side by side or stacked, captions, and lines of text."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ LINE_HEIGHT_PX = 17.0
 """Height of a line of the report, at scale 1."""
 _MAX_WIDTH_PX = 1600
 _MIN_WIDTH_PX = 1040
-"""Width that the texts need."""
+"""Width that the text needs."""
 _MAX_ARENAS_HEIGHT_PX = 1000
 _MIN_HEIGHT_PX = 320
 _SCALE = 1.3
-"""Scale of texts and lines."""
+"""Scale of text and lines."""
 _TITLE_HEIGHT_PX = 66.0
 _CAPTION_HEIGHT_PX = 34.0
 _ROW_GAP_PX = 14
@@ -28,12 +28,12 @@ _CAPTION_GAP_PX = 12
 """All at scale 1."""
 _ARENA_COUNT = 2
 _MAX_LINES = 12
-"""Maximum number of lines of the report; more are counted."""
+"""Maximum number of lines of the report; the last one counts those that are omitted."""
 _CONTINUATION_INDENT = "    "
 
 
 class Caption(NamedTuple):
-    """The text above an arena: its name, and facts in a fainter color."""
+    """The text above an arena: a name, followed by facts in a fainter color."""
 
     name: str
     facts: str
@@ -46,7 +46,7 @@ class Panel(NamedTuple):
     ----------
     box : (left, top, width, height), px
     caption_width : float, px
-        Width of the space above it.
+        Width available for the caption above the arena.
     """
 
     box: PageBox
@@ -60,9 +60,9 @@ class ImportPage(NamedTuple):
     ----------
     page : FigurePage
     panels : list of Panel
-        The map as it was read, and as it became.
+        Positions of the map as read and of the map as imported.
     lines : list of str
-        Lines of the report, none wider than the page.
+        Lines of the report, wrapped to the width of the page.
     """
 
     page: FigurePage
@@ -73,7 +73,7 @@ class ImportPage(NamedTuple):
 def lay_out_page(
     theme: Theme, aspect: float, captions: Sequence[Caption], handles: list[Artist], lines: Sequence[str]
 ) -> ImportPage:
-    """Lay out the page of an import, as large as its contents.
+    """Compute the size of the page of an import, and the positions of its contents.
 
     Parameters
     ----------
@@ -90,8 +90,9 @@ def lay_out_page(
     Returns
     -------
     ImportPage
-        Empty, but for its size.
+        An empty page and the positions on it.
     """
+    # A first page only to measure text; its size does not matter.
     page = FigurePage((_MAX_WIDTH_PX, _MAX_WIDTH_PX), theme, _SCALE)
     margin = page.margin
     title_height = _TITLE_HEIGHT_PX * page.scale
@@ -105,12 +106,13 @@ def lay_out_page(
     rows = _ARENA_COUNT // columns
     max_arena_height = _MAX_ARENAS_HEIGHT_PX / rows
     max_arena_width = (_MAX_WIDTH_PX - margin) / columns - margin
-    # A map that is higher than wide needs no wide page.
+    # A map that is taller than wide does not need a wide page.
     arena_width = min(max_arena_width, max(aspect * max_arena_height, caption_width))
     arena_height = min(arena_width / aspect, max_arena_height)
     width = max(columns * (arena_width + margin) + margin, _MIN_WIDTH_PX)
     slot_width = min(max(arena_height * aspect, caption_width), (width - margin) / columns - margin)
     left = (width - columns * slot_width - (columns - 1) * margin) / 2
+    # A second page, of the final width, to measure the lines and the legend that determine the height.
     page = FigurePage((int(width), _MAX_WIDTH_PX), theme, _SCALE)
     lines = wrap_lines(page, lines, width - left - margin)
     lines_height = (LINE_HEIGHT_PX * len(lines) + _MARGIN_BELOW_LINES_PX) * page.scale
@@ -136,7 +138,7 @@ def measure_caption_indent(page: FigurePage, name: str) -> float:
 
 
 def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list[str]:
-    """Return lines of the report no wider than `max_width`, px, and not too many."""
+    """Wrap the lines of the report to `max_width`, px; if there are too many, the last one says how many."""
     wrapped: list[str] = []
     for line in lines:
         wrapped += _wrap_line(page, line, max_width)
@@ -147,7 +149,7 @@ def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list
 
 
 def _wrap_line(page: FigurePage, line: str, max_width: float) -> list[str]:
-    """Return a line, or several if it is too wide, all but the first one indented."""
+    """Break a line that is wider than `max_width`, px, into several; all but the first are indented."""
     if page.measure_text(line, points=SMALL) <= max_width:
         return [line]
     wrapped: list[str] = []

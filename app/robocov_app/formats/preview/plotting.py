@@ -1,4 +1,4 @@
-"""The figure of an import: the map as it was read and as it became, with the differences marked."""
+"""The figure of an import: the map as read and as imported, with the differences marked."""
 
 from pathlib import Path
 
@@ -35,13 +35,13 @@ from robocov_app.look.theme import LIGHT, Theme, get_theme
 _MARK_OPACITY = 0.55
 _EDGE_WIDTH_PT = 0.8
 _AREA_ORDER = 2
-"""Order in which areas are drawn: above the ground."""
+"""Drawing order of areas: above the ground."""
 _MARK_ORDER = 5
-"""Order in which positions and the passage are drawn: above everything else."""
+"""Drawing order of positions and of the narrowest passage: above everything else."""
 _PASSAGE_RING_PT = 20.0
-"""Diameter of the ring around a passage that is too short to be seen."""
+"""Diameter of the ring around the narrowest passage if it is too small to be seen."""
 _MIN_GROUPED_NUMBER = 9999.5
-"""Larger numbers are whole, with thin spaces between groups of digits."""
+"""Numbers from this one on are written without decimals, with thin spaces between groups of digits."""
 _THIN_SPACE = "\u202f"
 
 
@@ -53,7 +53,7 @@ def save_preview(foreign: ForeignMap, environment: Environment, report: ImportRe
     foreign, environment, report
         See `plot_import`.
     path : Path
-        A .png, .svg or .pdf.
+        File with the suffix .png, .svg or .pdf.
 
     Raises
     ------
@@ -69,17 +69,17 @@ def save_preview(foreign: ForeignMap, environment: Environment, report: ImportRe
 def plot_import(
     foreign: ForeignMap, environment: Environment, report: ImportReport, *, theme: Theme | str = LIGHT
 ) -> Figure:
-    """Plot a map as it was read and as it became, at the same scale, with the report.
+    """Plot a map as read and as imported, at the same scale, above the lines of the import report.
 
-    Marked are free space that is not in the map any more, solid areas that became free, and the narrowest
+    The figure marks free space that is no longer in the map, solid areas that became free, and the narrowest
     passage.
 
     Parameters
     ----------
     foreign : ForeignMap
-        The map as it was read.
+        The map as read.
     environment : Environment
-        The map as it became.
+        The map as imported.
     report : ImportReport
     theme : Theme or str
     """
@@ -130,7 +130,7 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
 
 
 def _write_caption(page: FigurePage, caption: Caption, left: float, top: float, width: float) -> None:
-    """Write a caption above an arena with a left and a top edge, px."""
+    """Write a caption above the arena whose left and top edges are given, px."""
     y = top - 14 * page.scale
     page.write(caption.name, left, y, points=TITLE, bold=True)
     indent = measure_caption_indent(page, caption.name)
@@ -138,7 +138,7 @@ def _write_caption(page: FigurePage, caption: Caption, left: float, top: float, 
 
 
 def _write_lines(layout: ImportPage) -> None:
-    """Write the lines of the report at the bottom of the page."""
+    """Write the lines of the report at the bottom of the page, from the last line upward."""
     page = layout.page
     left = _get_left(layout)
     for k, line in enumerate(reversed(layout.lines)):
@@ -147,10 +147,10 @@ def _write_lines(layout: ImportPage) -> None:
 
 
 def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport, theme: Theme) -> None:
-    """Draw the map as it was read, the lost free space, and the positions of parts that were left out."""
+    """Draw the map as read, the free space that was lost, and a position in each part that was left out."""
     outside = shapely.difference(comparison.region, comparison.before)
     _draw_area(axes, outside, theme.obstacle, theme.obstacle_edge)
-    # Free space has an edge also where it ends at the edge of the arena.
+    # Free space also has an edge where it ends at the edge of the arena.
     rings = shapely.get_rings(shapely.get_parts(comparison.before))
     edges = LineCollection(
         [shapely.get_coordinates(ring) for ring in rings],
@@ -228,7 +228,7 @@ def _draw_gap(axes: Axes, gap: Gap, theme: Theme) -> None:
 
 
 def _build_handles(environment: Environment, theme: Theme, comparison: ImportComparison) -> list[Artist]:
-    """Return the entries of the legend, of marks only if there are any."""
+    """Return the entries of the legend; marks have an entry only if the figure contains them."""
     handles = build_map_handles(environment, theme)
     if not comparison.lost.is_empty:
         area = _format_number(comparison.lost.area)
@@ -252,7 +252,7 @@ def _build_mark_handle(label: str, color: Color) -> Patch:
 
 
 def _format_number(value: float) -> str:
-    """Return a number with four significant digits, or whole if it is large."""
+    """Format a number with four significant digits, or without decimals if it is large."""
     if abs(value) < _MIN_GROUPED_NUMBER:
         return f"{value:.4g}"
     return f"{value:,.0f}".replace(",", _THIN_SPACE)

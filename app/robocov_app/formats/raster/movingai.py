@@ -1,7 +1,7 @@
 """MovingAI benchmark grids.
 
-Each cell is a letter: ``.`` and ``G`` are passable, and so is ``S``, swamp; ``@`` and ``O`` are out of
-bounds; ``T``, trees, and ``W``, water, are obstacles unless an option makes them free.
+Each cell is a letter: ``.``, ``G`` and ``S`` (swamp) are passable; ``@`` and ``O`` are out of bounds; ``T``
+(trees) and ``W`` (water) are obstacles unless an option makes them free.
 
 N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Computational Intelligence
 and AI in Games 4 (2012), 144-148.
@@ -24,11 +24,11 @@ from robocov_app.formats.options import ReadOptions, WriteOptions, get_or_defaul
 from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 1.0
-"""Side of a cell if no option gives it: the format has no unit."""
+"""Default side of a cell: files do not contain it."""
 _PASSABLE_CHARACTERS = b".GS"
 _SOLID_CHARACTERS = b"@O"
 _UNKNOWN_CHARACTER = 255
-"""Value in the table of characters for those that the format does not have."""
+"""Value in the table of characters for characters that are not part of the format."""
 _BLANKS = b" \t\r"
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MAX_HEADER_LINES = 19
@@ -44,7 +44,7 @@ class _Header:
     ----------
     columns, rows : int
     body : bytes
-        What follows the header.
+        The rows of cells, which follow the header.
     body_line : int
         Number of the first line of the body, from 1.
     """
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     Raises
     ------
     MapError
-        If the header is incomplete, or a row or a letter is wrong.
+        If the header is incomplete, a row has the wrong length, or a letter is unknown.
     """
     where = to_one_line(path)
     content = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(_BYTE_ORDER_MARK)
@@ -94,7 +94,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _build_character_table(options: ReadOptions) -> NDArray[np.uint8]:
-    """Return the kind of cell of each of the 256 characters."""
+    """Return a table, (256,), of the kind of cell that each character stands for."""
     table = np.full(256, _UNKNOWN_CHARACTER, np.uint8)
     table[list(_PASSABLE_CHARACTERS)] = FREE
     table[list(_SOLID_CHARACTERS)] = BLOCKED
@@ -127,7 +127,7 @@ def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
 
 
 def _parse_header(content: bytes, where: str) -> _Header:
-    """Parse the lines up to the one that says ``map``."""
+    """Parse the header, which ends with the line ``map``."""
     sizes: dict[str, int] = {}
     at = 0
     for number in range(1, _MAX_HEADER_LINES + 1):
@@ -154,7 +154,7 @@ def _parse_header(content: bytes, where: str) -> _Header:
 
 
 def _parse_header_line(words: list[str], sizes: dict[str, int], place: str) -> None:
-    """Check a line of the header, and add its height or width to `sizes`."""
+    """Parse a line of the header; a height or width is added to `sizes`."""
     key = words[0].lower()
     value = words[1] if len(words) == 2 else ""
     if key == "type" and value:
@@ -179,6 +179,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     """
     grid = build_grid(environment, options.cell)
     free = find_free_cells(environment, grid)
+    # One more column for the line ends. The top row comes first in the file.
     characters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
     characters[:, :-1][free[::-1]] = ord(".")
     characters[:, -1] = ord("\n")

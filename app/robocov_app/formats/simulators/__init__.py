@@ -1,1 +1,1 @@
-"""Formats of worlds of other simulators: ARGoS, IR-SIM and Stage."""
+"""World formats of other simulators: ARGoS, IR-SIM and Stage."""

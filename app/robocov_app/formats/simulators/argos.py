@@ -3,8 +3,8 @@
 C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for multi-robot systems, Swarm
 Intelligence 6 (2012), 271-295.
 
-Boxes and cylinders are obstacles, whether they can be moved or not. Other bodies are robots, and their
-positions are starts. Entities distributed by the methods ``grid`` and ``constant`` are placed. Those
+Boxes and cylinders are obstacles, whether or not they can be moved. Other bodies are robots, and their
+positions become starts. Entities distributed by the methods ``grid`` and ``constant`` are placed. Those
 distributed at random are left out and counted, because only ARGoS can compute their positions from the seed.
 """
 
@@ -27,7 +27,7 @@ from robocov_app.formats.options import ReadOptions
 MAX_PLACED_ENTITIES = 4_000
 """Largest number of entities that a file distributes in a grid or at one position."""
 _MAX_TILT_DEG = 1e-6
-"""Bodies that are turned about other axes than z by more are tilted."""
+"""Bodies rotated by more than this about an axis other than z are tilted."""
 _MAX_TAG_CHARACTERS = 30
 _MIN_LENGTH_M = 1e-6
 
@@ -66,7 +66,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:
-    """Place the entities of a <distribute>, or count them as left out if their positions are random."""
+    """Place the entities of a <distribute>, or count them as left out if ARGoS places them at random."""
     position = element.find_child("position")
     orientation = element.find_child("orientation")
     entity = element.find_child("entity")
@@ -106,7 +106,17 @@ def _compute_grid_positions(element: Element, quantity: int) -> Array:
 
 
 def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> None:
-    """Add a body at a position, (3,) m, turned about z, y and x by three angles, degrees."""
+    """Add a body as an obstacle or a robot.
+
+    Parameters
+    ----------
+    element : Element
+        The body.
+    position : (3,) array, m
+    angles : (3,) array, degrees
+        Angles of rotation about z, y and x.
+    shapes : Shapes
+    """
     tag = element.tag
     labels = [element.attributes.get("id", tag), tag]
     if not shapes.accept(labels):
@@ -114,6 +124,7 @@ def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> 
     if tag not in ("box", "cylinder"):
         shapes.robots.append((float(position[0]), float(position[1])))
         return
+    # Rotations by 180 degrees do not tilt boxes and cylinders.
     tilt = np.abs((angles[1:] + 90) % 180 - 90)
     if (tilt > _MAX_TILT_DEG).any():
         shapes.leave_out(tag, "that is tilted")

@@ -1,7 +1,7 @@
-"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in meters.
+"""HouseExpo floor plans: one JSON file per house, with the free space as one ring ``verts`` in meters.
 
-The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
-corners cut by a step or two of it. Doors and furniture are not in the format.
+The ring may be closed or open, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
+corners cut off by a step or two of it. The format has no doors and no furniture.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ from robocov_app.formats.geometry.shapes.enclosed_area import EnclosedArea, find
 from robocov_app.formats.options import ReadOptions
 
 _MIN_HOLE_M2 = 1e-4
-"""Smaller holes come from rounding."""
+"""Smaller holes are due to rounding."""
 _MAX_NAME_CHARACTERS = 60
 
 
@@ -77,7 +77,7 @@ def _is_coordinate(value: Any) -> bool:
 
 
 def _remove_small_holes(area: MultiPolygon) -> tuple[MultiPolygon, tuple[str, ...]]:
-    """Return an area without holes that come from rounding, and a line of the report about them."""
+    """Remove holes that are due to rounding; return the area, and the line of the report about them."""
     polygons: list[Polygon] = []
     small_holes: list[Polygon] = []
     for polygon in area.geoms:

@@ -1,9 +1,10 @@
-"""Lists of rings, as triangulation libraries take them: the first is the outline, the others are holes.
+"""Lists of rings, as accepted by triangulation libraries: the first is the outline, the others are holes.
 
 A file contains a list of rings, each a list of points [x, y]: the first ring is the outline of the free
-space, and the others are obstacles. It may also contain one ring alone, a list of such lists, or, flat, an
-object with ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and
-``dimensions``. There are no units: the option ``scale`` is the size of a unit in meters, 1 by default.
+space, and the others are obstacles. It may also contain a single ring, a list of such lists of rings, or
+earcut's flat structure: an object with ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first
+vertex of each) and ``dimensions``. There are no units: the option ``scale`` is the size of a unit in meters,
+1 by default.
 """
 
 import re
@@ -50,14 +51,14 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 class _RingParser:
-    """Parses the polygons in a file, each a list of rings, (k, 2) arrays."""
+    """Parses the polygons in a file. Each polygon is a list of rings, which are (k, 2) arrays."""
 
     def __init__(self, file: JsonFile, options: ReadOptions) -> None:
         self.file = file
         self.shapes = Shapes(file.where, options)
 
     def parse_polygons(self) -> list[list[Array]]:
-        """Return the polygons in the file, in its units."""
+        """Return the polygons in the file, in its units. The nesting of the lists tells the structure."""
         document = self.file.document
         if isinstance(document, dict):
             return [self._parse_flat_polygon(document)]
@@ -96,7 +97,7 @@ class _RingParser:
         return self.shapes.drop_heights(points)
 
     def _parse_flat_ring(self, value: Any, at: JsonPath, dimensions: int) -> Array:
-        """Return the points of a list of coordinates."""
+        """Return the points of a flat list of coordinates, `dimensions` of them for each point."""
         is_list = isinstance(value, list)
         if not is_list or len(value) % dimensions or len(value) < 3 * dimensions:
             raise self.file.build_error(at, value, f"at least 3 times {dimensions} numbers")
@@ -108,7 +109,7 @@ class _RingParser:
 
 
 def _measure_depth(value: Any) -> int:
-    """Return how deep lists are nested, by the first item of each."""
+    """Return how deeply lists are nested, judging by the first item of each."""
     depth = 0
     while isinstance(value, list) and value:
         depth += 1

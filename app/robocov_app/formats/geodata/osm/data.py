@@ -1,4 +1,4 @@
-"""The data of OpenStreetMap: nodes, ways and relations, without their meaning."""
+"""The data of OpenStreetMap: nodes, ways and relations, before their tags are interpreted."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ USED_TAGS = {
 }  # fmt: skip
 _LABEL_TAGS = ("name", "room", "indoor", "barrier", "building", "natural")
 _MAX_READINGS = 4
-"""Number of times that all vertices are used: areas are measured, doors found, shapes drawn."""
+"""Number of times that all vertices may be read: to measure areas, to find doors, and to draw shapes."""
 _FIRST_UNNUMBERED = 2**64
-"""First number of nodes that the file does not number: those of the data have at most 64 bits."""
+"""First number given to nodes without an id in the file. Ids of OpenStreetMap have at most 64 bits."""
 
 
 @dataclass(eq=False, slots=True)
@@ -34,7 +34,7 @@ class OsmElement:
     tags : dict of str to str
         Only those in `USED_TAGS`.
     members : list of int
-        Numbers of the nodes of a way, or of the ways of a relation.
+        Ids of the nodes of a way, or of the ways of a relation.
     """
 
     kind: str
@@ -49,7 +49,7 @@ class OsmElement:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the element: its name, the values of its main tags, and their keys."""
+        """Labels by which users select the element: its name, and the values and keys of its main tags."""
         values = [self.tags[key] for key in _LABEL_TAGS if key in self.tags]
         keys = [key for key in (*_LABEL_TAGS[1:], "waterway") if key in self.tags]
         labels = [to_one_line(label) for label in (*values, *keys) if label not in ("yes", "no")]
@@ -57,7 +57,7 @@ class OsmElement:
 
     @property
     def is_building(self) -> bool:
-        """Whether the element is a building that robots cannot pass; a roof stands on posts."""
+        """Whether the element is a building that blocks robots; they can pass below a mere roof."""
         return self.tags.get("building", "no") not in ("no", "roof")
 
 
@@ -72,7 +72,7 @@ class OsmData:
     Attributes
     ----------
     nodes, ways, relations : dict
-        Elements by number: only nodes with tags, and only relations that are areas (multipolygons).
+        Elements, keyed by id: only nodes with tags, and only relations that are areas (multipolygons).
     bounds : list of (west, south, east, north), degrees
     notes : list of str
         Lines for the report.
@@ -96,7 +96,7 @@ class OsmData:
         return [*self.nodes.values(), *self.ways.values(), *self.relations.values()]
 
     def add_node(self, number: int, longitude: float, latitude: float) -> None:
-        """Add the position of a node, degrees."""
+        """Add the position of a node, in degrees."""
         self._node_rows[number] = len(self._coordinates) // 2
         self._coordinates.extend((longitude, latitude))
         self._points = None
@@ -106,16 +106,17 @@ class OsmData:
         return number in self._node_rows
 
     def add_line(self, line: list[tuple[float, float] | None]) -> list[int]:
-        """Add nodes that the file does not number, and return numbers for them.
+        """Add nodes that have no id in the file, and return new ids for them.
 
         Parameters
         ----------
         line : list of (longitude, latitude) or None
-            None stands for a node that the file does not contain.
+            Position of each node, in degrees. None stands for a node outside the extract.
         """
         numbers = []
         for point in line:
             if point is None:
+                # An id that no node has, so that the way counts as incomplete.
                 numbers.append(-_FIRST_UNNUMBERED)
                 continue
             number = _FIRST_UNNUMBERED + len(self._coordinates) // 2
@@ -125,7 +126,7 @@ class OsmData:
         return numbers
 
     def add_element(self, element: OsmElement) -> None:
-        """Add an element, if it can be a part of a map."""
+        """Add an element, unless it is a node without tags or position, or a relation that is not an area."""
         if element.kind == "node" and element.tags and self.has_node(element.number):
             self.nodes[element.number] = element
         elif element.kind == "way":
@@ -139,18 +140,18 @@ class OsmData:
         return point
 
     def get_ways(self, element: OsmElement) -> list[OsmElement | None]:
-        """Return the ways of a relation, or a way itself; None for one that is missing in the file."""
+        """Return the ways of a relation, with None for missing ones; for a way, the way itself."""
         if element.kind == "relation":
             return [self.ways.get(number) for number in element.members]
         return [element]
 
     def get_lines(self, element: OsmElement) -> list[Array] | None:
-        """Return the (k, 2) longitudes and latitudes of each way of an element, or None if nodes are missing.
+        """Return the longitudes and latitudes, (k, 2), of each way of an element; None if a node is missing.
 
         Raises
         ------
         MapError
-            If vertices are used too often, because a way may be a part of many relations.
+            If vertices are read too often: one way may be a part of many relations.
         """
         ways = self.get_ways(element)
         self._vertices_used += sum(len(way.members) for way in ways if way is not None)

@@ -16,7 +16,7 @@ def to_point(data: OsmData, node: OsmElement) -> SourceGeometry:
 
 
 def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | None:
-    """Return a way as a line, or None, counted as left out, if nodes are missing."""
+    """Return a way as a line; if nodes are missing, count it as left out and return None."""
     lines = data.get_lines(way)
     if lines is None:
         shapes.leave_out("way", "that is not complete in the file")
@@ -25,7 +25,7 @@ def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | 
 
 
 def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeometry | None:
-    """Return the area of a way or relation, or None, counted as left out, if it has none."""
+    """Return a way or relation as a polygon; if it has no area, count it as left out and return None."""
     lines = data.get_lines(element)
     if lines is None:
         shapes.leave_out(element.kind, "that is not complete in the file")
@@ -42,6 +42,6 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
 
 
 def parse_width(tags: dict[str, str]) -> float | None:
-    """Return the tag ``width`` in meters, or None."""
+    """Return the value of the tag ``width`` in meters, or None if it is missing or invalid."""
     match = _WIDTH.fullmatch(tags.get("width", "").strip())
     return float(match[1]) if match else None

@@ -1,4 +1,4 @@
-"""Floors of buildings: rooms, corridors, walls and doors, as of Simple Indoor Tagging."""
+"""Floors of buildings: rooms, corridors, walls and doors, according to Simple Indoor Tagging."""
 
 import re
 
@@ -13,9 +13,9 @@ from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometr
 
 _SPACES: dict[str, Role] = {"room": "walled", "corridor": "open", "area": "open"}
 _STAIRS = {"stairs", "elevator", "escalator", "steps"}
-"""Values of tags of areas that robots cannot drive on."""
+"""Tag values of areas that robots cannot drive on."""
 _MIN_INDOOR_FRACTION = 0.5
-"""Fraction of the area of buildings above which an extract shows their inside."""
+"""An extract is read as indoors if its spaces cover at least this fraction of the area of its buildings."""
 _LEVEL_RANGE = re.compile(r"(-?\d{1,3}(?:\.\d+)?)(?:-(-?\d{1,3}(?:\.\d+)?))?")
 _MIN_LENGTH_M = 1e-9
 
@@ -45,7 +45,7 @@ def _is_stairs(tags: dict[str, str]) -> bool:
 
 
 def _choose_role(element: OsmElement) -> Role | None:
-    """Return the role of an element on a floor, or None if it has none."""
+    """Return the role of an element on a floor, or None if it is not a part of the floor."""
     tags = element.tags
     indoor = tags.get("indoor", "")
     if element.kind == "node":
@@ -66,7 +66,10 @@ def _choose_role(element: OsmElement) -> Role | None:
 
 
 def measure_floors(data: OsmData) -> dict[float, float]:
-    """Return the area of the spaces on each level that has any, in square degrees of the equator."""
+    """Return the total area of the spaces on each level that has spaces.
+
+    The areas serve for comparison only: they are in degrees of longitude times degrees of latitude.
+    """
     floors: dict[float, float] = {}
     for element in data.elements:
         if _choose_role(element) not in ("open", "walled"):
@@ -78,9 +81,13 @@ def measure_floors(data: OsmData) -> dict[float, float]:
 
 
 def _measure_area(data: OsmData, element: OsmElement) -> float:
-    """Return the area inside the ways of an element, exact for a single closed way, in square degrees."""
+    """Return the total area inside the ways of an element, in square degrees.
+
+    It is exact for a single closed way, and an estimate for several ways, each of which is closed here.
+    """
     area = 0.0
     for line in data.get_lines(element) or []:
+        # The shoelace formula, relative to the first point.
         x, y = (line - line[0]).T
         area += abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
     return area
@@ -93,7 +100,7 @@ def is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
     ----------
     data : OsmData
     floors : dict of float to float
-        Area of the spaces on each level, as of `measure_floors`.
+        Area of the spaces on each level, as returned by `measure_floors`.
     """
     buildings = [element for element in data.elements if element.is_building and element.kind != "node"]
     building_area = sum(_measure_area(data, building) for building in buildings)
@@ -101,7 +108,16 @@ def is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
 
 
 def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[FloorElement]:
-    """Return the elements of a level, in meters; those that are left out are counted in `shapes`."""
+    """Return the elements of a level, in meters.
+
+    Parameters
+    ----------
+    data : OsmData
+    floor : float
+        The level.
+    shapes : Shapes
+        Counts the elements that are left out, and collects notes.
+    """
     roles: list[Role] = []
     geometries: list[SourceGeometry] = []
     doors: list[OsmElement] = []
@@ -128,6 +144,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
     lost_doors = len(doors) - len(door_lines)
     if lost_doors:
         shapes.leave_out("door", "in no wall of this level", lost_doors)
+    # All together, so that they get the same origin.
     projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
     shapes_in_meters = projected[: len(geometries)]
     doors_in_meters = projected[len(geometries) :]
@@ -145,7 +162,10 @@ def _build_geometry(data: OsmData, element: OsmElement, role: Role, shapes: Shap
 
 
 def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[SourceGeometry]:
-    """Return doors as lines of three points, in degrees: the node before in its wall, its own, the next."""
+    """Return each door as a line of three points, in degrees.
+
+    They are the preceding node of its wall, the door, and the following node.
+    """
     neighbors = _find_neighbors({door.number for door in doors}, data, walls)
     lines = []
     for door in doors:
@@ -160,7 +180,7 @@ def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement])
 
 
 def _find_neighbors(doors: set[int], data: OsmData, walls: list[OsmElement]) -> dict[int, tuple[int, int]]:
-    """Return the nodes before and after each door in the first wall that contains it."""
+    """Return, for each door, the nodes before and after it in the first wall that contains it."""
     neighbors: dict[int, tuple[int, int]] = {}
     for wall in walls:
         for way in data.get_ways(wall):
@@ -175,17 +195,20 @@ def _get_adjacent_nodes(nodes: list[int], k: int) -> tuple[int, int]:
     """Return the nodes before and after node `k` of a way; at an open end, the node itself."""
     is_closed = len(nodes) > 2 and nodes[0] == nodes[-1]
     if is_closed:
-        # The first node is the last one, too.
+        # The first node is repeated at the end.
         side_count = len(nodes) - 1
         return nodes[(k - 1) % side_count], nodes[(k + 1) % side_count]
     return nodes[max(k - 1, 0)], nodes[min(k + 1, len(nodes) - 1)]
 
 
 def _build_opening(door: SourceGeometry) -> SourceGeometry:
-    """Return the line across an opening, in meters, of a door as of `_find_doors`."""
+    """Return the opening of a door: a line along its wall, as long as the door is wide.
+
+    `door` is a line as returned by `_find_doors`, converted to meters.
+    """
     before, middle, after = door.rings[0]
     direction = after - before
-    if not direction.any():
+    if not direction.any():  # the wall returns to where it came from
         direction = after - middle
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M

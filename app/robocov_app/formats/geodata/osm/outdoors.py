@@ -16,7 +16,7 @@ _GATES = ("gate", "lift_gate")
 
 
 def add_outdoors(data: OsmData, shapes: Shapes) -> None:
-    """Add everything on the ground to the shapes, and the bounds of the extract as the boundary."""
+    """Add the obstacles on the ground to `shapes`, and the bounds of the extract as the boundary."""
     geometries = _list_geometries(data, shapes)
     origin: Point | None = None
     if data.bounds:
@@ -33,7 +33,7 @@ def add_outdoors(data: OsmData, shapes: Shapes) -> None:
 
 
 def _list_geometries(data: OsmData, shapes: Shapes) -> list[SourceGeometry]:
-    """Return the obstacles on the ground, in degrees; those that are left out are counted."""
+    """Return the obstacles on the ground, in degrees; underground elements are counted as left out."""
     geometries = []
     for element in data.elements:
         if not _is_obstacle(element, is_water_free=shapes.options.water == "free"):
@@ -70,7 +70,7 @@ def _is_underground(tags: dict[str, str]) -> bool:
 
 
 def _build_geometry(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeometry | None:
-    """Return an obstacle as a point, a line or a polygon, or None if it is none of them."""
+    """Return an obstacle as a point, a line or a polygon, or None if it has no usable geometry."""
     tags = element.tags
     if _is_post(element):
         return to_point(data, element)

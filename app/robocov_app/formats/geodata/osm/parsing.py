@@ -1,7 +1,7 @@
 """Reading the data of OpenStreetMap from XML or from the JSON of Overpass.
 
-XML is written by openstreetmap.org, JOSM and osmium: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is the
-answer of Overpass to ``[out:json]``, also with ``out geom``, and the file ``map.json`` of the API:
+XML is written by openstreetmap.org, JOSM and osmium: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is
+what Overpass returns for ``[out:json]``, with or without ``out geom``, and the file ``map.json`` of the API:
 https://wiki.openstreetmap.org/wiki/OSM_JSON.
 """
 
@@ -37,7 +37,7 @@ def read_osm(path: Path) -> OsmData:
     Raises
     ------
     MapError
-        If the file is neither XML nor JSON of OpenStreetMap, or too large.
+        If the file is too large, or contains neither XML nor JSON of OpenStreetMap.
     """
     if files.starts_with(files.read_head(path), b"{"):
         return _read_json(path)
@@ -51,7 +51,7 @@ class _XmlReader:
     def __init__(self, where: str, content: bytes) -> None:
         self.where = where
         self.data = OsmData(where)
-        # Counting takes a moment, parsing seconds.
+        # Counting takes milliseconds, parsing a huge file takes seconds.
         files.require_vertices(content.count(b"<node"), where)
         files.require_vertices(content.count(b"<nd"), where)
         files.require_vertices(content.count(b"<tag") // 2, where)
@@ -79,7 +79,10 @@ class _XmlReader:
             self._refuse(f"<{name}>: {to_one_line(error)[:80]}")
 
     def _add(self, name: str, attributes: dict[str, str]) -> None:
-        """Add the content of an XML element; raise KeyError or ValueError for missing or wrong attributes."""
+        """Add the content of an XML element.
+
+        Raise KeyError for a missing attribute, and ValueError for an invalid one.
+        """
         if name == "bounds":
             self.data.bounds.append(_parse_bounds(attributes))
         elif self.depth == 2 and name in ("node", "way", "relation"):
@@ -92,6 +95,7 @@ class _XmlReader:
             self.element.tags[attributes["k"]] = attributes["v"]
 
     def _add_osm_element(self, kind: str, attributes: dict[str, str]) -> None:
+        """Start a node, way or relation, unless it was deleted; tags and members follow in its children."""
         number = int(attributes["id"])
         if attributes.get("action") == "delete" or attributes.get("visible") == "false":
             return
@@ -112,6 +116,7 @@ class _XmlReader:
 
 
 def _read_json(path: Path) -> OsmData:
+    """Read the data in a JSON file; a remark of Overpass, such as a timeout, becomes a note."""
     file = JsonFile(path)
     data = OsmData(file.where)
     document = file.document
@@ -134,10 +139,11 @@ def _read_json(path: Path) -> OsmData:
 
 
 def _add_json_element(data: OsmData, file: JsonFile, value: Any, at: JsonPath) -> None:
+    """Add a node, way or relation, unless it was deleted; other kinds of elements are skipped."""
     if not isinstance(value, dict):
         raise file.build_error(at, value, "an element of OpenStreetMap")
     kind = value.get("type")
-    if kind not in ("node", "way", "relation"):  # areas and counts of Overpass
+    if kind not in ("node", "way", "relation"):  # such as the areas and counts of Overpass
         return
     number = value.get("id")
     if type(number) is not int:
@@ -173,13 +179,14 @@ def _parse_json_point(file: JsonFile, value: Any, at: JsonPath) -> tuple[float, 
 
 
 def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
-    """Return the numbers of the nodes of a way, which may contain their positions (``out geom``)."""
+    """Return the ids of the nodes of a way, and add the positions that the way contains (``out geom``)."""
     numbers = value.get("nodes", [])
     if not isinstance(numbers, list) or not all(type(number) is int for number in numbers):
         raise file.build_error((*at, "nodes"), numbers, "a list of whole numbers")
     if "geometry" not in value:
         return numbers
     line = _parse_json_line(file, value["geometry"], (*at, "geometry"))
+    # A way may have positions without ids: its nodes get new ones.
     if len(line) != len(numbers):
         return data.add_line(line)
     for number, point in zip(numbers, line, strict=True):
@@ -190,7 +197,7 @@ def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], at: 
 
 
 def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
-    """Return the numbers of the ways of a relation, and add those that it contains itself (``out geom``)."""
+    """Return the ids of the ways of a relation, and add the ways that it contains (``out geom``)."""
     members = value.get("members", [])
     if not isinstance(members, list):
         raise file.build_error((*at, "members"), members, "a list of members")
@@ -212,7 +219,7 @@ def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], at: J
 
 
 def _parse_json_line(file: JsonFile, value: Any, at: JsonPath) -> list[tuple[float, float] | None]:
-    """Return the points of a line; points beyond the box of a query are null, hence None."""
+    """Return the points of a line, with None for points outside the query's bounding box."""
     if not isinstance(value, list):
         raise file.build_error(at, value, "a list of lat and lon")
     line: list[tuple[float, float] | None] = []
@@ -230,7 +237,7 @@ def _parse_bounds(value: Mapping[str, Any]) -> tuple[float, float, float, float]
 
 
 def _parse_degrees(value: Mapping[str, Any], key: str) -> float:
-    """Return a longitude or latitude; raise ValueError if it is wrong, KeyError if it is missing."""
+    """Return a longitude or latitude; raise ValueError if it is invalid, and KeyError if it is missing."""
     degrees = float(value[key])
     limit = 90.0 if key.endswith("lat") else 360.0
     if not abs(degrees) <= limit:

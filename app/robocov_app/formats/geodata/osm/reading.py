@@ -5,9 +5,9 @@ free) are solid; walls, fences, hedges and the like are walls with the width of 
 option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. Underground
 elements, roofs, and ways whose nodes are missing from the extract are left out.
 
-Indoors, as of https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging, rooms, corridors and areas of one
-level are free; rooms have walls, which doors open; ``indoor=wall`` is a wall; stairs and lifts are solid. The
-inside is read if the option ``level`` names a floor, or if spaces cover most of the area of the buildings.
+Indoors (https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging), the rooms, corridors and areas of one
+level are free; rooms have walls, interrupted by doors; ``indoor=wall`` is a wall; stairs and lifts are solid.
+The inside is read if the option ``level`` names a floor, or if spaces cover most of the buildings' area.
 """
 
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""Cells of grids: as free space (`grid_map`, `vectorize`), and the free space as cells (`rasterize`)."""
+"""Grid cells: conversion to free space (`grid_map`, `vectorize`) and from free space (`rasterize`)."""

@@ -1,4 +1,4 @@
-"""Restoration of corners that a coarse grid has cut off."""
+"""Restoration of the corners that a coarse grid cuts off."""
 
 import numpy as np
 import shapely
@@ -8,18 +8,18 @@ from robocov.arrays import Array
 from robocov_app.formats.geometry.vectors import intersect_lines
 
 _MAX_SHORT_SIDE = 1.5
-"""Sides up to this length, in tolerances, may belong to a cut corner."""
+"""Largest length of a side of a cut corner, in tolerances."""
 _MAX_CORNER_DISTANCE = 2.0
-"""Distance, in tolerances, of a cut corner's vertices from the corner."""
+"""Largest distance of the vertices of a cut corner from the restored one, in tolerances."""
 _MIN_SINE = 0.1
-"""Sine of the angle between two walls below which they are parallel."""
+"""Two walls are parallel if the sine of the angle between them is smaller."""
 
 
 def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
     """Restore the cut corners of a polygon.
 
-    A run of short sides becomes the point where the long sides before and after it meet, if the whole run is
-    near that point. Unlike simplification, it keeps the directions of the walls.
+    A run of short sides is replaced by the point where the long sides before and after it meet, if the whole
+    run is near that point. Unlike simplification, this preserves the directions of the walls.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
     Returns
     -------
     Polygon, m
-        The plan itself if the result would be invalid.
+        The sharpened polygon, or `plan` itself if the result would be invalid.
     """
     lines = (plan.exterior, *plan.interiors)
     rings = [_sharpen_ring(np.asarray(line.coords)[:-1], tolerance) for line in lines]
@@ -38,6 +38,7 @@ def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
 
 
 def _sharpen_ring(ring: Array, tolerance: float) -> Array:
+    """Restore the cut corners of a ring, (k, 2) m, whose first vertex is not repeated."""
     side = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(*side.T)
     long = np.flatnonzero(length > _MAX_SHORT_SIDE * tolerance)
@@ -46,6 +47,7 @@ def _sharpen_ring(ring: Array, tolerance: float) -> Array:
     following = np.roll(long, -1)
     corner, sine = intersect_lines(ring[long], side[long], ring[following], side[following])
     is_turn = np.abs(sine) > _MIN_SINE * length[long] * length[following]
+    # Run k: the vertices from the end of long side k to the start of the following one.
     runs = np.split(np.roll(ring, -long[0] - 1, axis=0), long[1:] - long[0])
     has_several = np.array([len(run) for run in runs]) > 1
     for k in np.flatnonzero(is_turn & has_several):

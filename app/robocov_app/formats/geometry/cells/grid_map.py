@@ -20,14 +20,14 @@ from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices,
 from robocov_app.formats.reports import format_area
 
 Cells: TypeAlias = NDArray[np.uint8]
-"""`FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first."""
+"""(rows, columns) array of `FREE`, `BLOCKED` and `UNKNOWN`, the top row first."""
 Meaning: TypeAlias = Literal["obstacle", "free", "cut"]
-"""Treatment of unknown cells; with "cut" the map ends around the known ones."""
+"""What unknown cells become. With "cut", the map ends at the edge of the known cells."""
 FREE = 0
 BLOCKED = 1
 UNKNOWN = 2
 RIM = 2
-"""Thickness, in cells, of the solid rim around the known cells if a map is cut to them."""
+"""Thickness, in cells, of the solid rim around the known cells with "cut"."""
 _WITH_CORNERS = np.ones((3, 3), dtype=bool)
 """Known cells that touch at a corner are connected."""
 
@@ -43,7 +43,7 @@ class GridFrame:
     origin : (x, y), m
         Lower left corner of the grid.
     yaw : float, rad
-        Angle by which the grid is turned around that corner.
+        Angle by which the grid is rotated about that corner.
     """
 
     cell: float
@@ -83,11 +83,11 @@ def build_grid_map(
         The file, for messages.
     name, description : str
     unknown : "obstacle", "free" or "cut"
-        Meaning of unknown cells; with "cut" the map ends around the known ones.
+        What unknown cells become. With "cut", the map ends at the edge of the known cells.
     unknown_name : str
-        Name of unknown cells in the report.
+        Word for unknown cells in the report.
     noise_cells : float
-        Obstacles of fewer cells are noise.
+        Obstacles smaller than this many cells are noise.
     repaired, notes : tuple of str
         Lines for the import report.
 
@@ -97,7 +97,7 @@ def build_grid_map(
         If no cell is free, the outline has too many vertices, or a coordinate is out of range.
     """
     _require_coordinates(cells, frame, where)
-    # Rows from the bottom, as the y axis.
+    # From here on the bottom row is first, in the direction of the y axis.
     is_unknown = cells[::-1] == UNKNOWN
     free = cells[::-1] == FREE
     if unknown == "free":
@@ -126,7 +126,7 @@ def build_grid_map(
 
 
 def _require_free_cell(free: BoolArray, is_unknown: BoolArray, unknown_name: str, where: str) -> None:
-    """Raise MapError if no cell is free."""
+    """Raise MapError if no cell is free, with a hint if unknown cells could be free."""
     if free.any():
         return
     hint = ""
@@ -144,7 +144,7 @@ def _require_coordinates(cells: Cells, frame: GridFrame, where: str) -> None:
 
 
 def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: str) -> str:
-    """Return the line of the import report about the cells."""
+    """Return the line of the import report about the numbers of free, blocked and unknown cells."""
     rows, columns = cells.shape
     free = _format_share(int(np.count_nonzero(cells == FREE)), cells.size)
     blocked = _format_share(int(np.count_nonzero(cells == BLOCKED)), cells.size)
@@ -157,7 +157,7 @@ def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: s
 
 
 def _format_share(number: int, total: int) -> str:
-    """Return a share of the cells in percent, never rounded to none or all."""
+    """Format a share of the cells in percent. A share other than 0 and 1 is not rounded to 0 or 100 %."""
     share = 100 * number / total
     if 0.0 < share < 0.1:
         return "<0.1 %"
@@ -167,14 +167,14 @@ def _format_share(number: int, total: int) -> str:
 
 
 def _find_main_island(known: BoolArray, free: BoolArray) -> BoolArray:
-    """Return the connected known cells with the most free ones."""
+    """Return the mask of the connected group of known cells that contains the most free cells."""
     island, count = ndimage.label(known, structure=_WITH_CORNERS)
     free_counts = np.bincount(island[free], minlength=count + 1)
     return np.asarray(island == int(free_counts.argmax()))
 
 
 def _describe_lost_cells(lost: BoolArray, cell: float) -> tuple[str, ...]:
-    """Return the line of the import report about free cells that are not in the map, if there are any."""
+    """Return the line of the import report about free cells outside the map, or nothing if there are none."""
     count = int(np.count_nonzero(lost))
     if not count:
         return ()
@@ -182,7 +182,7 @@ def _describe_lost_cells(lost: BoolArray, cell: float) -> tuple[str, ...]:
 
 
 def _build_rim(known: BoolArray, frame: GridFrame, where: str) -> Polygon:
-    """Return the outline of known cells and a rim around them, without holes, m."""
+    """Return the outline of the known cells and the rim around them, m, without holes."""
     wide = ndimage.binary_dilation(np.pad(known, RIM), structure=_WITH_CORNERS, iterations=RIM)
     outline = outline_cells(wide, lambda points: frame.place(points - RIM), where)
     return Polygon(outline.geoms[0].exterior)

@@ -1,4 +1,4 @@
-"""Rasterization of a map: cells are free if their center is, and walls thinner than a cell stay whole."""
+"""Rasterization of a map: cells are free if their center is, and walls thinner than a cell have no gaps."""
 
 import itertools
 import math
@@ -22,13 +22,13 @@ from robocov_app.formats.options import get_or_default
 from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 0.05
-"""Side of a cell, as in most maps of robots."""
+"""Side of a cell, as in most robot maps."""
 _MIN_PART_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
-"""Parts of the free space without space for a robot do not count."""
+"""Smaller parts of the free space are too small for a robot and are not counted."""
 _MAX_TRIED_CELLS = 16_000_000
-"""Size of the largest grid that is tried to keep passages that a coarser one loses."""
+"""Size of the largest grid that is tried in order to keep passages that a coarser grid closes."""
 _DIGITS = 6
-"""Decimals of a grid's corner: a micrometer."""
+"""Decimals of the corner of a grid, in m: it is rounded to a micrometer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class CellGrid:
     origin: tuple[float, float]
 
     def find_covered_cells(self, geometry: BaseGeometry, subdivision: int = 1) -> BoolArray:
-        """Find the cells whose center lies in polygons.
+        """Find the cells whose center lies inside polygons.
 
         Parameters
         ----------
@@ -67,7 +67,8 @@ class CellGrid:
         columns = self.columns * subdivision
         row, position = self._find_crossings(geometry, subdivision)
         is_inside = (row >= 0) & (row < rows)
-        # At each crossing, everything to the right changes between inside and outside.
+        # At each crossing, all cells to the right change between inside and outside. Two crossings in the
+        # same cell cancel, so only the parity of their number counts.
         changes = np.zeros((rows, columns + 1), np.uint8)
         column = np.clip(np.ceil(position[is_inside]).astype(np.intp), 0, columns)
         np.add.at(changes, (row[is_inside], column), 1)
@@ -75,7 +76,7 @@ class CellGrid:
         return np.bitwise_xor.accumulate(changes, axis=1)[:, :-1].astype(bool)
 
     def find_thin_walls(self, geometry: BaseGeometry) -> BoolArray:
-        """Find cells for walls between polygons that are too thin to contain the center of one.
+        """Find cells for the walls between polygons that are too thin to contain the center of a cell.
 
         Parameters
         ----------
@@ -89,8 +90,8 @@ class CellGrid:
         Notes
         -----
         This is the grid-intersection digitization of thin sets (Klette and Rosenfeld 2004, Digital Geometry,
-        chapter 2): one cell of each interval outside the polygons, along rows and columns of centers.
-        Together with the cells whose center is outside, they are connected where the outside is.
+        chapter 2): along each row and column of centers, one cell of each interval outside the polygons.
+        Together with the cells whose center is outside, these cells are connected wherever the walls are.
         """
         cells = np.zeros((self.rows, self.columns), dtype=bool)
         for oriented, is_transposed in ((cells, False), (cells.T, True)):
@@ -98,12 +99,13 @@ class CellGrid:
             order = np.lexsort((position, line))
             line = line[order]
             position = position[order]
-            # Along each line, entries and exits alternate; an exit is followed by the next entry.
+            # Along each line, entries into the polygons and exits from them alternate. A wall is between an
+            # exit and the following entry.
             number_on_line = np.arange(len(line)) - np.searchsorted(line, line)
             exits = np.flatnonzero(number_on_line % 2)
             if len(exits) and exits[-1] == len(line) - 1:
                 exits = exits[:-1]
-            # An interval that contains one center is that cell, however positions were rounded.
+            # A wall around a single center is that cell, regardless of how positions were rounded.
             is_narrow = np.ceil(position[exits + 1]) - np.ceil(position[exits]) <= 1
             exits = exits[(line[exits] == line[exits + 1]) & is_narrow]
             middle = np.rint((position[exits] + position[exits + 1]) / 2).astype(np.intp)
@@ -113,7 +115,15 @@ class CellGrid:
     def _find_crossings(
         self, area: BaseGeometry, subdivision: int = 1, *, transposed: bool = False
     ) -> tuple[IntArray, Array]:
-        """Return where sides cross the rows, or columns, of centers: which one, and the position on it."""
+        """Find where the sides of polygons cross the rows of cell centers, or the columns if `transposed`.
+
+        Returns
+        -------
+        line : (k,) array of int
+            Row of each crossing; column if `transposed`.
+        position : (k,) array
+            Position along it, in cells; the center of cell i is at i.
+        """
         sides = (extract_sides(area) - self.origin) / (self.cell / subdivision) - 0.5
         if transposed:
             sides = sides[..., ::-1]
@@ -131,24 +141,24 @@ class CellGrid:
 def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_CELLS) -> CellGrid:
     """Build a grid over the boundary of a map.
 
-    A map that was made of cells of the same size gets the same cells.
+    A map that was imported from cells of the same size gets the same cells again.
 
     Parameters
     ----------
     environment : Environment
     cell : float or None, m
-        Side of a cell; `DEFAULT_CELL_M` by default.
+        Side of a cell. None stands for `DEFAULT_CELL_M`.
     maximum : int
         Maximum number of cells.
 
     Raises
     ------
     ParameterError
-        If there would be more cells.
+        If the grid would have more cells.
     """
     cell = get_or_default(cell, DEFAULT_CELL_M)
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
-    # To a thousandth of a cell, so that a wall on the last line of cells does not need another one.
+    # An excess of less than a thousandth of a cell, due to rounding, does not add another column or row.
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
     rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
     if rows * columns > maximum:
@@ -161,8 +171,8 @@ def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_
 def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
     """Find the free cells of a grid.
 
-    A cell is free if its center is, and nothing solid is lost: no wall is too thin, and no pillar too small,
-    to block a cell. Where robots drive from cell to cell across a side, they drive on the map.
+    A cell is free if its center is, and if neither a thin wall nor a small pillar blocks it. So a robot that
+    moves between cells that share a side never passes through a wall of the map.
 
     Parameters
     ----------
@@ -194,7 +204,7 @@ def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
 
 
 def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolArray) -> tuple[str, ...]:
-    """Describe which free space is lost in cells, or divided, and which cells would keep it.
+    """Describe which parts of the free space the cells lose or divide, and which cell size would keep them.
 
     Parameters
     ----------
@@ -223,7 +233,10 @@ def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolA
 
 
 def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) -> str:
-    """Return which parts of the free space are lost or divided in cells; empty if none is."""
+    """Describe how many parts of the free space the cells lose, and whether they divide any.
+
+    The result is empty if the cells have the same parts as the map.
+    """
     parts = np.array(environment.free.geoms)
     parts = parts[shapely.area(parts) >= _MIN_PART_AREA_M2]
     islands, _ = ndimage.label(free)
@@ -232,6 +245,8 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
     is_single_part_whole = len(parts) == len(large) == 1
     if len(parts) == 0 or is_single_part_whole:
         return ""
+    # Each connected group of free cells ("island") belongs to the part of the map nearest to it. A part
+    # without islands is lost; a part with several is divided.
     centers = _find_island_cells(islands, large, grid)
     pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centers)), minlength=len(parts))
     losses = []
@@ -245,7 +260,10 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
 
 
 def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: CellGrid) -> Array:
-    """Return the center of the first cell of each chosen island, (n, 2) m."""
+    """Return the center of the first cell of each chosen island, (n, 2) m.
+
+    `islands` holds the number of the island of each cell, from 1 on; `chosen` holds indices from 0 on.
+    """
     windows = ndimage.find_objects(islands)
     cells = []
     for island in chosen.tolist():
@@ -256,7 +274,7 @@ def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: Cel
 
 
 def _iterate_smaller_sizes(cell: float) -> Iterator[float]:
-    """Yield round sizes below that of a cell, m, the largest first."""
+    """Yield round cell sizes (5, 2 or 1 times a power of ten) below that of a cell, m, the largest first."""
     for power in itertools.count(math.floor(-math.log10(cell))):
         for digit in (5, 2, 1):
             size = round(digit * 10.0**-power, power)
@@ -271,7 +289,7 @@ def describe_unsupported(environment: Environment, *, names: bool = True) -> tup
     ----------
     environment : Environment
     names : bool
-        Whether the format cannot store names of obstacles, as most cannot.
+        Whether to include names of obstacles, which most formats cannot store.
     """
     unsupported = []
     if environment.starts:
@@ -284,12 +302,12 @@ def describe_unsupported(environment: Environment, *, names: bool = True) -> tup
 def build_grid_report(
     name: str, files: tuple[Path, ...], environment: Environment, grid: CellGrid, free: BoolArray
 ) -> ExportReport:
-    """Build the report on a map that was exported as free cells, (rows, columns).
+    """Build the report on a map that was exported as a grid of cells.
 
     Parameters
     ----------
     name : str
-        The format.
+        Name of the format.
     files : tuple of Path
     environment : Environment
     grid : CellGrid

@@ -9,19 +9,19 @@ from scipy import ndimage
 from robocov.arrays import BoolArray
 
 MAX_STROKE_PIXELS = 200
-"""Wider shapes are no strokes; the halo of a strip grows with this."""
+"""Wider shapes are not strokes. The overlap of the strips grows with this width."""
 _CORNER_DISTANCE = 0.3
-"""Distance, in widths, to which an opening by a disc stays away from square corners, with some margin."""
+"""Distance, in widths, between a square corner and its opening by a disc, with some margin."""
 _STRIP_CELLS = 1_000_000
-"""Number of cells processed at once, which bounds the memory."""
+"""Number of cells processed at once, to limit the memory."""
 _SQUARE = np.ones((2, 2), dtype=bool)
 
 
 def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
     """Remove shapes that are narrower than a width.
 
-    This is the opening by a disc of that width (Serra 1982, Image Analysis and Mathematical Morphology),
-    grown back into the corners that the disc does not reach.
+    This is the morphological opening by a disc of that width (Serra 1982, Image Analysis and Mathematical
+    Morphology), extended into the corners that the disc does not reach.
 
     Parameters
     ----------
@@ -31,10 +31,12 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
     Returns
     -------
     kept : (rows, columns) array of bool
+        The cells of wider shapes.
     """
     if width <= 1:
         return solid.copy()
     kept = np.empty_like(solid)
+    # Strips overlap by as much as the result of a cell depends on its surroundings.
     halo = 3 * width
     rows = max(_STRIP_CELLS // solid.shape[1], halo)
     for top in range(0, len(solid), rows):
@@ -46,12 +48,16 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
 
 
 def _open(solid: BoolArray, width: int, *, above: bool, below: bool) -> BoolArray:
-    """Open a strip of a raster by a disc; `above`, `below`: whether it reaches the edge of the image."""
+    """Open a strip of a raster by a disc.
+
+    `above` and `below` say whether the strip contains the first and the last row of the image.
+    """
     # Beyond the edge of the image nothing is solid, so that a frame along the edge is thin, too.
     margin_above = width if above else 0
     margin_below = width if below else 0
     padded = np.pad(solid, ((margin_above, margin_below), (width, width)))
-    # A disc around a corner of cells has an even width: it is a disc around a cell, after a square of four.
+    # A disc of even width is centered on a corner of cells. It is composed of a disc around a cell and a
+    # square of 2 x 2 cells.
     is_even = width % 2 == 0
     core = padded
     if is_even:
@@ -67,7 +73,7 @@ def _open(solid: BoolArray, width: int, *, above: bool, below: bool) -> BoolArra
 
 
 def _compute_distance(cells: BoolArray) -> NDArray[np.float64]:
-    """Return the distance of each cell to the nearest one that is not set; infinite where there is none."""
+    """Return the distance of each cell to the nearest false cell; infinite if there is none."""
     if cells.all():
         return np.full(cells.shape, np.inf)
     return np.asarray(ndimage.distance_transform_edt(cells))

@@ -1,8 +1,8 @@
-"""The outline of free cells of a grid as polygons.
+"""The outline of the free cells of a grid as polygons.
 
-Free cells are connected through their sides, never through a corner only: no robot passes there. So
-obstacles that touch at a corner are connected (free cells are 4-connected, obstacles 8-connected), and
-the outline joins them by a neck: polygons that touch in a point are neither open nor closed to algorithms.
+Free cells are connected through their sides, never through a corner only, where no robot can pass. So
+obstacles that touch at a corner are connected (free cells are 4-connected, obstacles 8-connected). The
+outline joins such obstacles by a small neck, because polygons that touch in a point are invalid or ambiguous.
 """
 
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from robocov.errors import MapError
 from robocov_app.formats.files import require_vertices
 
 NECK = 1 / 32
-"""Length, in cells, by which the corners of two free cells are cut where obstacles touch."""
+"""Length, in cells, by which the corners of the two free cells are cut off where obstacles touch."""
 _STRIP = 512
-"""Number of rows processed at once, which bounds the memory."""
+"""Number of rows processed at once, to limit the memory."""
 
 
 def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
@@ -58,7 +58,7 @@ def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str)
     Parameters
     ----------
     cells : (rows, columns) array of bool
-        At least one is true. The bottom row first.
+        The bottom row first. At least one cell must be true.
     place : callable
         Converts positions in the grid, (n, 2) in cells from its lower left corner, to positions in m.
     where : str
@@ -78,7 +78,7 @@ def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str)
 
 
 def count_polygon_vertices(area: MultiPolygon) -> int:
-    """Return the number of vertices of polygons; the first of a ring counts once."""
+    """Return the number of vertices of polygons; the repeated first vertex of a ring is not counted."""
     ring_count = sum(1 + len(part.interiors) for part in area.geoms)
     return int(shapely.get_num_coordinates(area)) - ring_count
 
@@ -107,16 +107,17 @@ def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
     if not len(corners.row):
         return MultiPolygon()
     order, starts = _connect_rings(_pair_vertically(corners), corners.is_north_east_free)
-    # The free cell at the first corner of a ring is north-east of it, or the ring is a hole.
+    # At the first corner of an outer ring, the free cell is north-east of it. If that cell is not free, the
+    # ring is a hole, and the cell south-west of the corner is free.
     first = order[starts]
     hole = np.where(corners.is_north_east_free[first], 0, 1)
     part = ndimage.label(free)[0][corners.row[first] - hole, corners.column[first] - hole]
-    # The rings of a part come together; the first one has the lowest corner, so it is the outer ring.
+    # Sort the rings by part. The first ring of each part has the lowest corner, so it is the outer one.
     rank = np.argsort(part, kind="stable")
     length = np.diff(starts, append=len(order))[rank]
     vertex = order[concatenate_ranges(starts[rank], length)]
     ring = np.arange(len(rank)).repeat(length)
-    # Every other side of a ring is horizontal.
+    # Horizontal and vertical sides of a ring alternate.
     is_leaving_vertically = concatenate_ranges(hole[rank], length) % 2 == 0
     points, is_distinct = _place_necks(corners, vertex, is_leaving_vertically)
     rings = shapely.linearrings(points[is_distinct], indices=ring.repeat(is_distinct.sum(axis=1)))
@@ -132,11 +133,11 @@ class _Corners(NamedTuple):
     column, row : array of int
         Position. Where two corners coincide, the one with the side to the west is first.
     is_west, is_north : array of bool
-        Whether the sides of the outline go west and north.
+        Whether the horizontal side at the corner goes west, and the vertical one north.
     neck : array
-        Length of the neck.
+        Length of the neck, in cells; 0 where no obstacles touch.
     is_north_east_free : array of bool
-        Whether the cell north-east is free.
+        Whether the cell north-east of the corner is free.
     """
 
     column: IntArray
@@ -148,11 +149,12 @@ class _Corners(NamedTuple):
 
 
 def _pair_vertically(corners: _Corners) -> IntArray:
-    """Return for each corner the other end of its vertical side."""
+    """Return, for each corner, the index of the corner at the other end of its vertical side."""
     index = np.arange(len(corners.row))
     # Along a line, sides connect the first corner to the second, the third to the fourth, and so on.
     upward = np.lexsort((corners.is_north, corners.row, corners.column))
     vertical = np.empty_like(index)
+    # index ^ 1 swaps 0 and 1, 2 and 3, and so on.
     vertical[upward] = upward[index ^ 1]
     return vertical
 
@@ -160,7 +162,15 @@ def _pair_vertically(corners: _Corners) -> IntArray:
 def _place_necks(
     corners: _Corners, vertex: IntArray, is_leaving_vertically: BoolArray
 ) -> tuple[Array, BoolArray]:
-    """Return the two ends of the neck of each vertex, (k, 2, 2), and which of them are distinct, (k, 2)."""
+    """Return the points of each vertex: two where its corner is cut off by a neck, otherwise one.
+
+    Returns
+    -------
+    points : (k, 2, 2) array
+        Both points of each vertex, in the order of the ring.
+    is_distinct : (k, 2) array of bool
+        Which of them to use; the second equals the first where there is no neck.
+    """
     column, row, is_west, is_north, neck, _ = corners
     beside = np.column_stack([column + np.where(is_west, -neck, neck), row])[vertex]
     above = np.column_stack([column, row + np.where(is_north, neck, -neck)])[vertex]
@@ -173,7 +183,7 @@ def _place_necks(
 
 
 def _find_corners(free: BoolArray, where: str) -> _Corners:
-    """Find the corners of the outline of free cells. Raises MapError if there are too many."""
+    """Find the corners of the outline of free cells; raise MapError if there are too many."""
     strips = []
     count = 0
     for low in range(0, len(free) + 1, _STRIP):
@@ -183,6 +193,7 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
         south_east = strip[:-1, 1:]
         north_west = strip[1:, :-1]
         north_east = strip[1:, 1:]
+        # At a double corner, two free cells and two obstacles meet crosswise.
         is_double = (south_west == north_east) & (south_east == north_west) & (south_west != south_east)
         is_corner = south_west ^ south_east ^ north_west ^ north_east | is_double
         # Two corners at the same point have a neck of two vertices each.
@@ -209,9 +220,9 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
 
 
 def _connect_rings(vertical: IntArray, is_outer: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the corners ring by ring, and the index of the first corner of each ring.
+    """Return the indices of the corners ring by ring, and where each ring starts in them.
 
-    From there an outer ring leaves along its horizontal side, a hole along the vertical one.
+    The first side of an outer ring is horizontal, that of a hole is vertical.
     """
     # Lists are faster than arrays for single elements.
     vertical_ends = vertical.tolist()
@@ -226,6 +237,7 @@ def _connect_rings(vertical: IntArray, is_outer: BoolArray) -> tuple[IntArray, I
             is_unvisited[corner] = 0
             order.append(corner)
             if is_horizontal:
+                # Corners are sorted along each row, so both ends of a horizontal side are neighbors.
                 corner = corner ^ 1
             else:
                 corner = vertical_ends[corner]

@@ -1,1 +1,1 @@
-"""Conversion of foreign maps to an `environment`: cleaning, boundary and obstacles, starts."""
+"""Conversion of a foreign map to an `environment`: cleaning, boundary, obstacles and starts."""

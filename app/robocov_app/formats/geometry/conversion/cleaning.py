@@ -1,8 +1,8 @@
-"""Removal of hairs from a free space, and the deviation between two free spaces.
+"""Removal of hairs from a free space, and the difference between two free spaces.
 
-A hair is a slit in the free space, or a spur of it, that is thinner than the decimals of a map but longer
-than walls may move. Rounding would silently close it, and the report would say that a wall moved by its
-length. So hairs are removed first, and counted.
+A hair is a slit in the free space, or a spur of it, that is thinner than the resolution of the coordinates
+but longer than walls may move. Rounding would silently close it, and the report would say that a wall moved
+by the hair's length. So hairs are removed first, and counted.
 """
 
 from collections.abc import Sequence
@@ -19,11 +19,11 @@ from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 _DIGITS = 9
-"""Decimals of distances in meters; smaller ones are rounding errors."""
+"""Decimals of distances in meters; smaller differences are rounding errors."""
 _OVERLAP_M = 2 * GRID_M
-"""Distance by which fillings and cuts extend beyond a hair."""
+"""Distance by which the area that is filled or removed extends beyond a hair."""
 _MAX_SAMPLES = 4_000
-"""Number of points along walls whose distances are measured."""
+"""Approximate number of points along walls at which distances are measured."""
 
 
 class Cleaned(NamedTuple):
@@ -35,7 +35,7 @@ class Cleaned(NamedTuple):
     number : int
         Number of hairs that were removed.
     area : float, m²
-        Their area.
+        Total area of these hairs.
     """
 
     free: MultiPolygon
@@ -49,9 +49,9 @@ class Deviation(NamedTuple):
     Attributes
     ----------
     area : float, m²
-        Area that is free in one of them only.
+        Area that is free in only one of them.
     distance : float, m
-        Maximum distance by which walls have moved.
+        Largest distance by which walls have moved.
     """
 
     area: float
@@ -59,7 +59,7 @@ class Deviation(NamedTuple):
 
 
 def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
-    """Remove slits and spurs that are thinner than a width and longer than a length.
+    """Remove slits and spurs that are thinner than `width` and longer than `length`.
 
     Parameters
     ----------
@@ -86,7 +86,9 @@ def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
 
 
 def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
-    """Measure the Hausdorff distance between the walls of two free spaces, at vertices and along edges.
+    """Measure the area that differs between two free spaces, and the distance between their walls.
+
+    The latter is the Hausdorff distance, measured at the vertices and at points along long edges.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
 
 
 def _sample_walls(area: MultiPolygon) -> Array:
-    """Return points on the walls of an area, (n, 2) m: its vertices, and some along long edges."""
+    """Return points on the walls of an area, (n, 2) m: its vertices, and points along long edges."""
     vertices = shapely.get_coordinates(area)
     spare = _MAX_SAMPLES - len(vertices)
     if spare > 0:
@@ -116,21 +118,22 @@ def _sample_walls(area: MultiPolygon) -> Array:
 
 
 def _select_long(geometry: BaseGeometry, length: float) -> Array:
-    """Return the polygons of a geometry that are longer than a length in meters."""
+    """Return the polygons of a geometry that are longer than `length`, m, without slivers due to rounding."""
     pieces = np.array(to_multipolygon(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
+    # Area over perimeter is half the width of a thin polygon.
     is_rounding = shapely.area(pieces) < 1e-3 * GRID_M * shapely.length(pieces)
     return np.asarray(pieces[(np.hypot(right - x, top - y) > length) & ~is_rounding])
 
 
 def _close(area: BaseGeometry, width: float) -> BaseGeometry:
-    """Fill gaps that are narrower than a width, m."""
+    """Fill the gaps in an area that are narrower than `width`, m."""
     closed: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, width / 2), -width / 2)
     return closed
 
 
 def _open(area: BaseGeometry, width: float) -> BaseGeometry:
-    """Remove parts that are narrower than a width, m."""
+    """Remove the parts of an area that are narrower than `width`, m."""
     opened: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, -width / 2), width / 2)
     return opened
 

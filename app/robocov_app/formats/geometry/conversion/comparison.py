@@ -1,4 +1,4 @@
-"""Comparison of a foreign map with the environment that was made from it, for previews."""
+"""Comparison of a foreign map with the environment built from it, for previews."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from robocov_app.formats.geometry.polygons import make_valid
 from robocov_app.formats.reports import ImportReport
 
 _MAX_GAP_VERTICES = 20_000
-"""Maps with more vertices are not searched for their narrowest passage, which would take too long."""
+"""Maximum number of vertices for which the narrowest passage is searched, because the search takes long."""
 _MIN_DIFFERENCE_WIDTH = 2.0
-"""Differences narrower than this many tolerances are walls that have moved."""
+"""Differences narrower than this, in tolerances, are walls that have moved and are not shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class ImportComparison:
     lost, opened : shapely geometry, m
         Free space that became solid, and the reverse, except for walls that have moved.
     region : shapely geometry, m
-        Convex, around all of it.
+        Convex hull of the map before and after.
     gap : Gap or None
-        The narrowest passage of the environment, unless its computation would take too long.
+        The narrowest passage of the environment, or None if it would take too long to find.
     """
 
     before: BaseGeometry
@@ -44,13 +44,13 @@ class ImportComparison:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Lower left and upper right corner of all of it, m."""
+        """Bounding box of the region: left, bottom, right, top, m."""
         x, y, right, top = self.region.bounds
         return x, y, right, top
 
 
 def compare_maps(foreign: ForeignMap, environment: Environment, report: ImportReport) -> ImportComparison:
-    """Compare a foreign map with the environment that was made from it.
+    """Compare a foreign map with the environment built from it.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _subtract(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> Mu
     """Return the difference of two areas without the slivers along walls that have moved."""
     parts = shapely.get_parts(shapely.difference(first, second))
     parts = parts[shapely.area(parts) > 0.0]
-    # For a long strip, this is its width.
+    # The width of a long strip is twice its area divided by its perimeter.
     width = 2.0 * shapely.area(parts) / shapely.length(parts)
     min_width = max(_MIN_DIFFERENCE_WIDTH * tolerance, 1e-3) / 2
     return MultiPolygon(parts[width > min_width].tolist())

@@ -1,4 +1,4 @@
-"""Parameters of the conversion of a foreign map, and its state."""
+"""Parameters of the conversion of a foreign map, and the state of a conversion in progress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robocov_app.formats.geometry.simplification.simplify import DEFAULT_TOLERAN
 from robocov_app.formats.options import Options, get_or_default
 
 _MAX_GRID_M = 1e-4
-"""Coordinates are rounded to this, or to a hundredth of a cell if that is finer."""
+"""Coordinates are rounded to a multiple of this, or of a hundredth of a cell if that is finer."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,10 @@ class Conversion:
 
     @property
     def clearance(self) -> float:
-        """Distance from walls at which a robot starts, m; map files require it for the usual robot."""
+        """Smallest distance between a wall and the center of a robot at its start, m.
+
+        It is at least the distance that map files require for a robot of the default radius.
+        """
         return max(DEFAULT_RADIUS_M, self.radius) * (1 + MIN_START_GAP_RADII)
 
     @property
@@ -105,12 +108,12 @@ class Conversion:
 
     @property
     def grid(self) -> float:
-        """Distance between two neighboring coordinates of the map, m."""
+        """Resolution of the coordinates of the map, m."""
         return 10.0**-self.digits
 
     @property
     def tolerance(self) -> float:
-        """Distance by which walls may move, m. Where cells are larger than robots, each cell counts."""
+        """Distance by which walls may move, m: at most a cell, and at most the diameter of a robot."""
         if self.shaping.simplify is not None:
             return self.shaping.simplify
         if self.foreign.cell is None:

@@ -35,14 +35,14 @@ MAX_OBSTACLES = 8_000
 MAX_VERTICES = 50_000
 """Maps with more obstacles or vertices would take many seconds to build."""
 _MAX_CHECKED_VERTICES = 10_000
-"""In larger free spaces, primitives are not restored and regions out of reach are not reported."""
+"""In free spaces with more vertices, primitives are not restored and unreachable regions are not reported."""
 _MAX_NAME_CHARACTERS = 100
 _MAX_DESCRIPTION_CHARACTERS = 10_000
 _MIN_REPORTED_MOVE_M = 1e-3
 
 
 def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
-    """Convert a foreign map to an environment.
+    """Convert a foreign map to an environment, and report what was changed.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _build_report(
 
 
 def _remove_hairs(free: MultiPolygon, conversion: Conversion) -> Cleaned:
-    """Remove parts that are thinner than the decimals of a map; cells have none."""
+    """Remove hairs, which are thinner than the resolution of coordinates; outlines of cells have none."""
     if conversion.foreign.cell is not None:
         return Cleaned(free)
     width = 2 * conversion.grid
@@ -148,13 +148,13 @@ def _choose_boundary(
     selection: PartSelection,
     conversion: Conversion,
 ) -> Polygon | None:
-    """Return the boundary around the parts that remain, or None if it is the outline of these.
+    """Return the boundary around the parts that stay, or None if their outline is the boundary.
 
-    A boundary counts as far as the free space reaches it. If walls separate all of the free space from it,
-    the area behind them does not matter: it would make the known region larger than the area that robots can
-    cover, and draw them to the walls. The boundary is then the inner edge of the walls, in all formats. Only
-    a boundary that the file or the user names remains, unless the user chooses another part of the free
-    space.
+    A boundary is used only if the free space reaches it. If walls separate all of the free space from it, the
+    area behind the walls is not part of the map: it would make the known region larger than the area that
+    robots can cover, and would attract them to the walls. The boundary is then the inner edge of the walls,
+    in all formats. A boundary that the file or the user names is an exception: it stays, unless the user
+    chooses another part of the free space.
     """
     foreign = conversion.foreign
     shaping = conversion.shaping
@@ -175,14 +175,14 @@ def _choose_boundary(
 
 
 def _simplify(before: MultiPolygon, read: MultiPolygon, conversion: Conversion) -> SimplifiedSpace:
-    """Return the free space with fewer vertices, rounded; walls move by the tolerance at most."""
+    """Return the free space with fewer vertices, rounded; walls move by at most the tolerance."""
     foreign = conversion.foreign
     tolerance = conversion.tolerance
     _report_large_cells(conversion)
     sharp = before
     if foreign.cut_corners:
         sharp = MultiPolygon([sharpen_corners(part, tolerance) for part in before.geoms])
-    # Where all steps together move walls too far, the next attempt does less.
+    # If sharpening and simplification together move walls too far, the next attempt does less.
     attempts = [(sharp, tolerance), (sharp, tolerance / 2), (before, tolerance / 2), (before, 0.0)]
     for plan, allowed in attempts:
         simple = simplify_free_space(plan, allowed, foreign.cell, conversion.radius)
@@ -211,7 +211,7 @@ def _report_deviation(deviation: Deviation, free: MultiPolygon, conversion: Conv
 
 
 def _report_unreachable(environment: Environment, conversion: Conversion) -> None:
-    """Report regions that a robot cannot reach from the largest one."""
+    """Note the regions that a robot cannot reach from the largest one."""
     if shapely.get_num_coordinates(environment.free) > _MAX_CHECKED_VERTICES:
         return
     areas = sorted((room.area for room in find_rooms(environment.free, conversion.radius)), reverse=True)
@@ -231,5 +231,5 @@ def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversio
         starts=build_starts(free, conversion),
         description=foreign.description[:_MAX_DESCRIPTION_CHARACTERS],
     )
-    # The rules of map files are applied, so that every imported map can be saved and loaded.
+    # Written and read again, so that the rules of map files hold and every imported map can be saved.
     return from_json(to_json(environment), conversion.where)

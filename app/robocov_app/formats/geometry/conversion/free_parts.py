@@ -15,23 +15,23 @@ from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.reports import format_area
 
 MAX_FILE_ROBOTS = 1000
-"""Number of robots of a file that are considered."""
+"""Number of robots in a file that are considered."""
 _TINY_AREA_M2 = 0.01
 _MANY_TINY_OBSTACLES = 10
-"""As many obstacles smaller than `_TINY_AREA_M2` are probably noise, which the report mentions."""
+"""This many obstacles smaller than `_TINY_AREA_M2` are probably noise, and the report says so."""
 _MIN_KEPT_SHARE = 0.5
-"""If less of the free area stays, the report offers other parts."""
+"""If a smaller share of the free area stays, the report offers other parts."""
 _LARGE_PART_SHARE = 0.1
-"""If a dropped part has more of the free area, the report offers it, too."""
+"""If a dropped part is a larger share of the free area, the report offers it, too."""
 _MAX_OFFERED_PARTS = 3
 _MIN_PAGE_EDGE_SHARE = 0.2
-"""The largest part may be the paper around a plan if it runs along as much of the edge of the page."""
+"""The largest part may be the paper around a plan if it borders on this fraction of the edge of the page."""
 _MIN_PLAN_SHARE = 0.05
-"""A plan is at least as large, as a fraction of the paper; a smaller part is the inside of an obstacle."""
+"""Minimum area of a plan, as a fraction of the paper's. A smaller part is the inside of an obstacle."""
 _HOLLOW_SHARE = 0.1
-"""Fraction of the page of the bounding box of an obstacle that may be the walls of a plan."""
+"""An obstacle may be the walls of a plan if its bounding box covers at least this fraction of the page."""
 _MAX_HOLLOW_FILL = 0.5
-"""Such an obstacle fills at most this fraction of its bounding box."""
+"""Walls of a plan fill at most this fraction of their bounding box."""
 
 
 class PartSelection(NamedTuple):
@@ -41,9 +41,9 @@ class PartSelection(NamedTuple):
     ----------
     parts : list of Polygon, m
     others : tuple of (x, y), m
-        A position in each large part that was dropped, as the option ``inside`` takes it.
+        A position in each large part that was dropped, for the option ``inside``.
     is_enclosed : bool
-        Whether an enclosed part stays instead of the largest one, which is the paper around a plan.
+        Whether an enclosed part stays because the largest part is the paper around a plan.
     """
 
     parts: list[Polygon]
@@ -97,7 +97,11 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
 
 
 def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
-    """Fill the holes of parts that are too small to be obstacles, and report them."""
+    """Fill the holes that are too small to be obstacles, and report them.
+
+    Specks are holes below the minimum area that the user or the format sets; crumbs are even smaller and due
+    to rounding.
+    """
     cell = conversion.foreign.cell
     min_area = conversion.min_obstacle_area
     max_crumb = MAX_CRUMB_M2 if cell is None else min(MAX_CRUMB_M2, cell * cell / 2)
@@ -132,7 +136,7 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
 
 
 def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], where: str) -> int:
-    """Return the index of the part that contains a position; MapError if none does."""
+    """Return the index of the part that contains a position; raise MapError if none does."""
     distance = shapely.distance(parts, shapely.Point(position))
     nearest = int(np.argmin(distance))
     if distance[nearest] > 0.0:
@@ -146,7 +150,7 @@ def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], whe
 
 
 def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
-    """Return the index of the part with most of the file's robots, or of the largest part."""
+    """Return the index of the part with the most robots of the file; without robots, of the largest part."""
     robots = conversion.foreign.robots[:MAX_FILE_ROBOTS]
     if not robots:
         return 0
@@ -159,7 +163,11 @@ def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
 
 
 def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> int | None:
-    """Return the index of the largest enclosed part if the largest part is the paper around a plan."""
+    """Return the index of the largest enclosed part, or None if the largest part is not paper around a plan.
+
+    An enclosed part does not touch the edge of the page. A note reports the decision; another one warns if
+    the walls of a plan seem to be open.
+    """
     page = conversion.foreign.page
     if page is None or conversion.foreign.robots:
         return None
@@ -189,7 +197,7 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
 def _report_dropped_parts(
     parts: NDArray[np.object_], stays: BoolArray, conversion: Conversion
 ) -> tuple[tuple[float, float], ...]:
-    """Report the parts that do not stay; return a position in each one that the report offers."""
+    """Report the parts that were dropped; return a position in each one that the report offers."""
     dropped: list[Polygon] = parts[~stays].tolist()
     if not dropped:
         return ()
@@ -217,7 +225,10 @@ def _report_dropped_parts(
 
 
 def _has_hollow_obstacle(part: Polygon, min_box_area: float) -> bool:
-    """Return whether a hole of a part fills little of its bounding box, of at least that area in m²."""
+    """Return whether a part has a hole that fills little of its bounding box.
+
+    Only holes whose bounding box has at least the area `min_box_area`, m², are considered.
+    """
     holes = shapely.polygons(shapely.get_rings(part)[1:])
     low_x, low_y, high_x, high_y = shapely.bounds(holes).reshape(-1, 4).T
     box_areas = (high_x - low_x) * (high_y - low_y)
@@ -226,7 +237,7 @@ def _has_hollow_obstacle(part: Polygon, min_box_area: float) -> bool:
 
 
 def _measure_length_along(part: Polygon, page: Polygon) -> float:
-    """Measure how much of the outline of a part runs along the edge of a page, an upright rectangle, m."""
+    """Return the length of the outline of a part, m, that runs along the edge of a rectangular page."""
     sides = extract_sides(part)
     low_x, low_y, high_x, high_y = page.bounds
     slack = 1e-6 * max(high_x - low_x, high_y - low_y)
@@ -239,7 +250,7 @@ def _measure_length_along(part: Polygon, page: Polygon) -> float:
 
 
 def _choose_position_in(part: Polygon) -> tuple[float, float]:
-    """Return a position in a part, to the centimeter."""
+    """Return a position in a part, rounded to the centimeter."""
     point = shapely.point_on_surface(part)
     return round(point.x, 2) + 0.0, round(point.y, 2) + 0.0
 

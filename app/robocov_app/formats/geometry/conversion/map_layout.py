@@ -1,4 +1,4 @@
-"""The boundary and the obstacles that a free space leaves."""
+"""The boundary of a free space, and the obstacles between the two."""
 
 from typing import NamedTuple
 
@@ -26,16 +26,18 @@ from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace
 
 
 class MapLayout(NamedTuple):
-    """A boundary and the obstacles in it.
+    """A boundary and the obstacles inside it.
 
     Attributes
     ----------
     boundary : Polygon, m
         Without holes.
     solid : list of Polygon, m
+        Obstacles that are polygons.
     primitives : list of circles and walls
+        Obstacles that are circles or walls.
     deviation : Deviation
-        Distance by which walls have moved, and the area that changed.
+        Distance by which walls have moved, and area that has changed.
     """
 
     boundary: Polygon
@@ -44,7 +46,7 @@ class MapLayout(NamedTuple):
     deviation: Deviation
 
     def compute_free(self) -> MultiPolygon:
-        """Return the free space as `Environment` computes it, m."""
+        """Return the free space between the obstacles, m, computed in the same way as by `Environment`."""
         primitives = [primitive.polygon for primitive in self.primitives]
         blocked = shapely.union_all([*self.solid, *primitives], grid_size=GRID_M)
         return to_multipolygon(shapely.difference(self.boundary, blocked, grid_size=GRID_M))
@@ -57,17 +59,17 @@ def build_layout(
     read: MultiPolygon,
     conversion: Conversion,
 ) -> MapLayout:
-    """Build a boundary and polygons in it that leave a simplified free space.
+    """Build the boundary and the obstacles around a simplified free space.
 
     Parameters
     ----------
     drawing : SimplifiedSpace
     outer : Polygon or None, m
-        The boundary; None for the outline of the free space.
+        The boundary. None stands for the outline of the free space.
     before : MultiPolygon, m
-        The free space before it was simplified.
+        The free space before simplification.
     read : MultiPolygon, m
-        The whole free space of the file.
+        The whole free space in the file.
     conversion : Conversion
 
     Returns
@@ -104,12 +106,12 @@ def build_boundary(
     ----------
     free : MultiPolygon, m
     base : Polygon or None, m
-        The boundary, whose holes do not count. None for the outline of the free space, or for the convex hull
-        of several parts.
+        The boundary; its holes are ignored. None stands for the outline of the free space, or for the convex
+        hull of several parts.
     hull : bool
-        Whether the boundary is the convex hull of that.
+        Whether to replace the boundary by its convex hull.
     margin : float, m
-        Thickness of the solid margin around it.
+        Thickness of the solid margin by which the boundary is extended.
     digits : int
         Number of decimals of coordinates.
 
@@ -123,7 +125,7 @@ def build_boundary(
     if base is None and len(parts) == 1 and not hull and margin == 0.0:
         return Polygon(parts[0].exterior), [Polygon(hole) for hole in parts[0].interiors]
     if base is not None:
-        # The boundary is rounded first: where it coincides with the free space, it does so afterwards, too.
+        # The boundary is rounded first, so that it still coincides with the free space where it did before.
         rounded = fill_holes(round_polygons(base, digits))
         boundary = fill_holes(round_polygons(shapely.union(rounded, free), digits))
     elif len(parts) > 1:
@@ -141,7 +143,7 @@ def build_boundary(
 
 
 def build_polygon_obstacles(solid: list[Polygon], conversion: Conversion) -> list[PolygonObstacle]:
-    """Build obstacles from polygons, the largest first; those too small for a map are dropped."""
+    """Build obstacles from polygons, the largest first; polygons too small for a map are dropped."""
     large = [part for part in solid if _measure_narrower_side(part) >= MIN_SIZE_M]
     if len(large) < len(solid):
         count = format_count(len(solid) - len(large), "obstacle")
@@ -156,7 +158,7 @@ def build_polygon_obstacles(solid: list[Polygon], conversion: Conversion) -> lis
 
 
 def normalize_ring(ring: BaseGeometry, digits: int) -> Ring:
-    """Return the vertices of a closed ring as maps have them: counter-clockwise from the leftmost one."""
+    """Return the rounded vertices of a ring in a canonical order: counter-clockwise from the leftmost one."""
     points = np.round(shapely.get_coordinates(ring)[:-1], digits) + 0.0
     points = tidy_ring(points, digits)
     if not shapely.is_ccw(ring):
@@ -171,10 +173,10 @@ def _measure_narrower_side(part: Polygon) -> float:
 
 
 def _fill_notches(outline: Polygon, conversion: Conversion) -> Polygon:
-    """Return the outline of a free space without the notches that walls of the file have cut.
+    """Fill the notches that walls of the file cut into the outline of a free space.
 
-    These walls remain obstacles. They lie in the convex hull of the outline, so that the region that robots
-    know is the same.
+    The walls then become obstacles inside the outline. Only notches inside the convex hull are filled, so
+    that the region that robots know stays the same.
     """
     outline = Polygon(outline.exterior)
     walls = [wall for wall in conversion.foreign.primitives if isinstance(wall, WallObstacle)]
@@ -191,10 +193,10 @@ def _fill_notches(outline: Polygon, conversion: Conversion) -> Polygon:
 
 
 def _remove_slivers(solid: list[Polygon], solid_before: BaseGeometry, tolerance: float) -> list[Polygon]:
-    """Remove slivers between a boundary and a free space along it.
+    """Remove slivers between a boundary and the free space next to it.
 
-    The walls of the two have moved apart there: a sliver is thinner than walls may move, and was not solid
-    before.
+    Slivers arise where simplification moved the boundary and the outline of the free space apart: they are
+    thinner than the tolerance, and were not solid before.
     """
     if not solid or tolerance == 0.0:
         return solid

@@ -1,4 +1,4 @@
-"""Circles and walls of a file that remain circles and walls instead of polygons."""
+"""Circles and walls in a file that stay circles and walls instead of becoming polygons."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,9 +28,9 @@ from robocov_app.formats.geometry.polygons import round_polygons
 from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace
 
 MAX_PRIMITIVES = 5_000
-"""Of more circles and walls, to compare them takes seconds: then all of them become polygons."""
+"""With more circles and walls, all become polygons, because comparing them would take seconds."""
 _MAX_POCKET_DISTANCE_M = 1e-3
-"""Distance from a pocket to the primitives next to it."""
+"""Primitives within this distance of a pocket are next to it."""
 _MAX_ROUNDS = 5
 """Number of attempts to find primitives that leave no pockets."""
 _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
@@ -39,18 +39,18 @@ _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 def restore_primitives(
     layout: MapLayout, drawing: SimplifiedSpace, before: MultiPolygon, conversion: Conversion
 ) -> MapLayout:
-    """Replace polygons of a layout by the circles and walls that they consist of.
+    """Replace polygons of a layout by the circles and walls of which they consist.
 
-    Polygons stay where a pocket would be left between a primitive and its surroundings, and all of them stay
-    if walls would have moved by more than the tolerance.
+    A polygon stays if its primitives would leave a pocket, a tiny enclosed piece of free space, next to them.
+    All polygons stay if walls would have moved by more than the tolerance.
 
     Parameters
     ----------
     layout : MapLayout
     drawing : SimplifiedSpace
-        The free space that the layout leaves.
+        The simplified free space, which the layout surrounds.
     before : MultiPolygon, m
-        The free space before it was simplified.
+        The free space before simplification.
     conversion : Conversion
 
     Returns
@@ -72,10 +72,10 @@ def restore_primitives(
         if next_to_pockets:
             rejected |= next_to_pockets
             continue
-        # Removes the vertices at which removed polygons started.
+        # Removes the vertices where the boundary met polygons that are gone now.
         boundary = round_polygons(candidate.boundary.simplify(0.0), conversion.digits).geoms[0]
         deviation = measure_deviation(before, candidate.compute_free())
-        # A circle stays within its sagitta, for any number of sides.
+        # A circle and its polygon may differ by the sagitta of the polygon's sides.
         limit = conversion.tolerance + conversion.grid + MAX_SAGITTA_M
         if deviation.distance > max(limit, layout.deviation.distance):
             return layout
@@ -106,10 +106,11 @@ def _match_primitives(
     rejected: frozenset[Primitive],
     conversion: Conversion,
 ) -> MapLayout:
-    """Return a layout with primitives in place of the polygons that they consist of, in their order.
+    """Return a layout in which primitives replace the polygons that consist of them.
 
-    Polygons that consist of several primitives stay, or all of them, if a robot would have more than
-    `max_rooms` separate regions.
+    The replacement must not divide the free space into more than `max_rooms` regions between which a robot
+    cannot move. If it does, only polygons that are a single primitive are replaced; if that does not help
+    either, the layout is returned unchanged. Primitives in `rejected` are not used.
     """
     rounded_primitives = {
         transform_numbers(primitive, lambda value: round(value, conversion.digits) + 0.0): primitive
@@ -118,11 +119,11 @@ def _match_primitives(
     usable = [shape for shape in rounded_primitives if _fits_map(shape) and shape not in rejected]
     if not usable or len(usable) > MAX_PRIMITIVES:
         return layout
-    # The exact primitives, as a circle of a slightly different radius may have another number of sides.
+    # Polygons are compared with the exact primitives: a rounded circle may have another number of sides.
     exact = [rounded_primitives[primitive] for primitive in usable]
     slack = tolerance + conversion.grid
     matches = _find_matches(layout, exact, usable, slack)
-    # Several primitives may have a gap among them that was filled.
+    # Second attempt: only polygons that are one primitive, because gaps between several may have been filled.
     for max_count in (len(usable), 1):
         used = {index for match in matches if len(match) <= max_count for index in match}
         primitives = [usable[index] for index in sorted(used)]
@@ -138,11 +139,12 @@ def _match_primitives(
 def _find_matches(
     layout: MapLayout, exact: list[Primitive], usable: list[Primitive], slack: float
 ) -> list[set[int]]:
-    """Return the primitives that each polygon of a layout consists of; none where they do not match.
+    """Return, for each polygon of a layout, the indices of the primitives that it consists of.
 
-    Inside the boundary, polygon and primitives must cover the same area: neither reaches farther than twice
-    the slack beyond the other, as corners may, and their areas differ by no more than the slack all along the
-    outline. The primitives must have fewer points.
+    The set is empty if the polygon does not consist of primitives. Inside the boundary, polygon and
+    primitives must cover the same area: neither extends beyond the other by more than twice the slack, as
+    may happen at corners, and the area in only one of them is at most the slack times the outline's length.
+    The primitives must have fewer points than the polygon.
     """
     covered = np.array([primitive.polygon for primitive in exact], dtype=object)
     shapely.prepare(layout.boundary)
@@ -167,7 +169,7 @@ def _find_matches(
 
 
 def _find_pockets(layout: MapLayout) -> Array:
-    """Return parts of the free space that are no larger than rounding errors."""
+    """Return the parts of the free space that are so small that they are due to rounding."""
     parts = shapely.get_parts(layout.compute_free())
     area = shapely.area(parts)
     is_pocket: BoolArray = area < min(MAX_CRUMB_M2, area.max(initial=0.0))
@@ -182,7 +184,7 @@ def _get_points(primitive: Primitive) -> Array:
 
 
 def _fits_map(primitive: Primitive) -> bool:
-    """Return whether a primitive is neither too small, nor too large, nor too far away for a map file."""
+    """Return whether the size and the position of a primitive are within the limits of map files."""
     points = _get_points(primitive)
     if isinstance(primitive, CircleObstacle):
         sizes = [primitive.radius]

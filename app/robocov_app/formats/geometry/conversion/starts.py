@@ -1,4 +1,4 @@
-"""Positions at which robots can start: rooms, the roomiest point, and the starts of a converted map."""
+"""Positions where robots can start: rooms, the roomiest point, and the starts of a converted map."""
 
 import math
 
@@ -15,7 +15,7 @@ from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.simplification.narrow_gaps import count_ray_crossings
 
 _MAX_SQUARES = 1024
-"""Number of squares of each size that the search for the roomiest point subdivides."""
+"""Maximum number of squares of each size in the search for the roomiest point."""
 _MAX_RAY_CROSSINGS = 5_000_000
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
 _MAX_DISC_RADIUS_M = 2.0
@@ -23,7 +23,7 @@ _MIN_DISC_RADIUS_M = 0.02
 
 
 def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
-    """Find the regions in which the center of a robot can move, without tiny ones.
+    """Find the regions in which the center of a robot can move, except for tiny ones.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
     Returns
     -------
     list of Polygon, m
-        A robot cannot move from one to another.
+        The regions; a robot cannot move from one to another.
     """
     inner = free.buffer(-radius, quad_segs=4)
     return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
@@ -43,15 +43,15 @@ def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
 def find_roomiest_point(
     free: Polygon, tolerance: float, sufficient: float = math.inf
 ) -> tuple[tuple[float, float], float]:
-    """Find the point that is farthest from all walls.
+    """Find the point of a free space that is farthest from its walls.
 
     Parameters
     ----------
     free : Polygon, m
     tolerance : float, m
-        Another point may be farther from the walls by this much.
+        Accuracy of the distance: no other point is farther from the walls by more than this.
     sufficient : float, m
-        The search ends at the first point that is as far from the walls.
+        The search ends as soon as it finds a point at this distance from the walls.
 
     Returns
     -------
@@ -61,7 +61,8 @@ def find_roomiest_point(
 
     Notes
     -----
-    Squares that may contain a better point are divided into four, the most promising `_MAX_SQUARES` of them.
+    The area is covered with squares. In each round, those that may contain a better point than the best
+    center so far are divided into four. The number of squares is limited; the most promising ones are used.
     """
     sides = shapely.linestrings(extract_sides(free))
     walls = STRtree(sides)
@@ -76,6 +77,7 @@ def find_roomiest_point(
         if distance.max() > best:
             best = float(distance.max())
             point = centers[distance.argmax()]
+        # No point of a square is farther from the walls than its center by more than half its diagonal.
         reachable = distance + side * math.sqrt(0.5)
         order = np.argsort(-reachable, kind="stable")[:max_squares]
         required = best + tolerance
@@ -88,14 +90,14 @@ def find_roomiest_point(
 
 
 def _limit_squares(free: Polygon, sides: Array) -> int:
-    """Return a number of squares whose centers can be quickly tested for being inside."""
+    """Return how many squares to use: fewer if testing which centers are inside takes long."""
     _, low_y, _, high_y = free.bounds
     crossings = count_ray_crossings(sides, np.linspace(low_y, high_y, _MAX_SQUARES))
     return max(min(_MAX_SQUARES, _MAX_SQUARES * _MAX_RAY_CROSSINGS // max(crossings, 1)), 16)
 
 
 def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[Array, float]:
-    """Return the centers, (n, 2) m, and the side, m, of squares that cover the bounding box of a polygon."""
+    """Cover the bounding box of a polygon with squares; return their centers, (n, 2) m, and their side, m."""
     low_x, low_y, high_x, high_y = free.bounds
     width = high_x - low_x
     height = high_y - low_y
@@ -109,6 +111,7 @@ def require_room(parts: list[Polygon], conversion: Conversion) -> None:
     clearance = conversion.clearance
     widest = 0.0
     for part in parts:
+        # No point of a part is farther from its walls than the radius of the disc of the same area.
         if math.sqrt(part.area / math.pi) > widest:
             _, distance = find_roomiest_point(part, clearance / 50, clearance)
             widest = max(widest, distance)
@@ -127,7 +130,7 @@ def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartS
     part = free.geoms[0]
     # A finer tolerance would hardly move the start.
     (x, y), distance = find_roomiest_point(part, max(0.01, math.sqrt(part.area) / 500))
-    # The disc contains the centers of robots: the radius of one stays between it and the walls.
+    # The disc contains the centers of robots, so it keeps the clearance of a robot from the walls.
     radius = min(distance - conversion.clearance, _MAX_DISC_RADIUS_M)
     uniform = UniformStart()
     starts: dict[str, StartSpec] = {"uniform": uniform}
@@ -146,7 +149,10 @@ def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartS
 
 
 def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Array:
-    """Return those positions of the file's robots that are free and apart from each other, (n, 2) m."""
+    """Return the positions of the file's robots where robots fit without touching a wall or each other.
+
+    Positions are an (n, 2) array, m. Of two that are too close, the first one in the file is used.
+    """
     robots = conversion.foreign.robots
     clearance = conversion.clearance
     positions = np.array(list(dict.fromkeys(robots))[:MAX_FILE_ROBOTS])

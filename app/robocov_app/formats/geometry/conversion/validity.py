@@ -1,4 +1,4 @@
-"""Valid polygons from the polygons of a reader, which may cross themselves or each other."""
+"""Repair of the polygons in a file, which may cross themselves or each other."""
 
 import numpy as np
 import shapely
@@ -11,13 +11,13 @@ from robocov_app.formats.geometry.polygons import list_polygons, make_valid, to_
 from robocov_app.formats.reports import format_area
 
 MAX_CRUMB_M2 = 1e-4
-"""Smaller obstacles and parts are rounding errors."""
+"""Obstacles and parts of the free space with a smaller area are rounding errors."""
 _MIN_COORDINATE_M = 1e-100
-"""Coordinates nearer to zero become zero, as in map files; GEOS would divide by zero."""
+"""Coordinates closer to zero become zero, as in map files. Otherwise GEOS might divide by zero."""
 
 
 def build_valid_boundary(conversion: Conversion) -> MultiPolygon | None:
-    """Return the parts of the boundary of a foreign map without holes, m; None if there is none."""
+    """Return the parts of the boundary of a foreign map, m, without holes; None if it has no boundary."""
     boundary: BaseGeometry | None = conversion.foreign.boundary
     if boundary is None:
         return None
@@ -35,7 +35,7 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
     ----------
     conversion : Conversion
     boundary : MultiPolygon or None, m
-        Free space outside of it is dropped, and reported.
+        Free space outside the boundary is dropped, and reported.
 
     Returns
     -------
@@ -72,8 +72,9 @@ def _round_to_zero(coordinates: np.ndarray) -> np.ndarray:
 
 
 def _describe_invalidity(geometry: BaseGeometry) -> str:
-    """Return why a geometry is invalid, and where."""
+    """Describe why a geometry is invalid, and where."""
     reason: str = shapely.is_valid_reason(geometry)
+    # GEOS writes, for example, "Self-intersection[1 2]".
     problem, _, position = reason.partition("[")
     x, _, y = position.rstrip("]").partition(" ")
     if not y:

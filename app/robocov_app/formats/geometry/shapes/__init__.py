@@ -1,1 +1,1 @@
-"""Shapes of drawings: their `collection` by a reader, and the `interpretation` of them as free space."""
+"""Shapes of drawings: their `collection` by a reader, and their `interpretation` as free space."""

@@ -21,15 +21,16 @@ from robocov_app.formats.geometry.shapes.snapping import (
 from robocov_app.formats.options import get_or_default
 
 DEFAULT_AROUND_M = 1.0
-"""Distance from the shapes to the rectangle around them."""
+"""Distance between the shapes and the rectangle that is built around them."""
 _MAJORITY = 0.5
-"""A boundary contains more of the other shapes; walls that are a boundary leave as much of it open."""
+"""A boundary contains more than this fraction of the other shapes. If it is the outer edge of walls, at least
+this fraction of its area is open."""
 _MAX_AREA_RATIO = 0.999
-"""Two outlines with a higher ratio of their areas are the same; neither lies in the other."""
+"""If the areas of two outlines differ by less than this ratio, neither is taken to lie in the other."""
 
 
 def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary | None:
-    """Find the boundary of a drawing by its format, by its name, or by the shapes in it.
+    """Find the boundary of a drawing, which the format, its name or the shapes in it determine.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary |
     Raises
     ------
     MapError
-        If the user names a boundary that encloses nothing.
+        If the boundary that the user names encloses no area.
     """
     if drawing.world is not None:
         return Boundary(drawing.world)
@@ -60,13 +61,13 @@ def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary |
 
 
 def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozenset()) -> Boundary:
-    """Find the outer edge of the walls of a drawing, else build a rectangle around everything.
+    """Return the outer edge of the walls of a drawing, or a rectangle around everything if there is none.
 
     Parameters
     ----------
     drawing : Drawing
     floors : frozenset of ClosedOutline
-        Outlines that are no walls.
+        Outlines that are not walls.
 
     Returns
     -------
@@ -85,12 +86,12 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
 
 
 def _find_outer_edge(drawing: Drawing, floors: frozenset[ClosedOutline]) -> Polygon | None:
-    """Return the area within the walls of a drawing, if it is mostly open and contains most of them."""
+    """Return the area enclosed by the walls of a drawing, if it is mostly open and contains most walls."""
     edges = [edge for outline in drawing.outlines if outline in floors for edge in outline.edges]
     lines = [line for line in (*drawing.lines, *edges) if line.role != "free"]
     areas = [outline.area for outline in drawing.outlines if outline not in floors]
     solid = _unite_exactly([*areas, *(line.solid for line in lines)])
-    if solid.is_empty:  # Everything is thinner than the grid.
+    if solid.is_empty:  # everything is thinner than the precision grid
         return None
     filled_parts = [Polygon(part.exterior) for part in solid.geoms]
     largest = int(np.argmax([part.area for part in filled_parts]))
@@ -102,12 +103,15 @@ def _find_outer_edge(drawing: Drawing, floors: frozenset[ClosedOutline]) -> Poly
 
 
 def _find_named_boundary(drawing: Drawing) -> Boundary | None:
-    """Return the boundary with that name. Raises MapError if the one that the user names has no area."""
+    """Return the boundary with the name that the user gave, or "boundary"; None if there is none.
+
+    Raise MapError if the user gave the name of shapes that enclose no area.
+    """
     given_name = drawing.options.boundary
     name = given_name or BOUNDARY
     outlines = frozenset(outline for outline in drawing.outlines if _has_label(outline.labels, name))
     lines = frozenset(line for line in drawing.lines if _has_label(line.labels, name))
-    # In the order of the file, as the order of a set differs from run to run.
+    # In the order of the file, because the order of a set differs from run to run.
     paths = [LineString(line.points) for line in drawing.lines if line in lines]
     noded = shapely.union_all(join_line_ends(paths, drawing.snap))
     rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
@@ -126,9 +130,9 @@ def _has_label(labels: Sequence[str], name: str) -> bool:
 
 
 def _find_largest_outline(drawing: Drawing) -> Boundary | None:
-    """Return the largest outline with its continuation, if most other shapes lie in it."""
+    """Return the largest outline and its continuation as the boundary, if most other shapes lie in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
-    # Walls drawn as a single shape have rooms as holes.
+    # An outline with large holes is not a boundary: it is all walls as one shape, with the rooms as holes.
     if largest.area.area < _MAJORITY * largest.filled_area:
         return None
     members = _find_continuation(drawing, largest)
@@ -143,7 +147,10 @@ def _find_largest_outline(drawing: Drawing) -> Boundary | None:
 
 
 def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOutline]:
-    """Return the largest outline, other parts of its geometry, and adjacent outlines that contain others."""
+    """Return the largest outline and the outlines that continue it.
+
+    These are other parts of its geometry, and outlines next to it that contain further outlines.
+    """
     outlines = np.array(drawing.outlines, dtype=object)
     areas = np.array(drawing.areas, dtype=object)
     tree = STRtree(areas)
@@ -165,13 +172,16 @@ def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOu
 
 
 def _find_containers(areas: Array, tree: STRtree) -> set[int]:
-    """Return which areas another area lies in."""
+    """Return the indices of the areas that contain another area."""
     inner, outer = _find_nested_pairs(areas, tree)
     return set(outer[inner != outer].tolist())
 
 
 def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
-    """Return the indices of pairs of areas; most of the first lies in the larger second."""
+    """Find all pairs of areas of which most of the first lies in the second, larger one.
+
+    Two arrays of indices are returned: of the inner areas, and of the outer areas.
+    """
     inner, outer = tree.query(areas, "intersects")
     size = shapely.area(areas)
     is_smaller = size[inner] < _MAX_AREA_RATIO * size[outer]
@@ -183,7 +193,7 @@ def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
 
 
 def _find_covering_outline(drawing: Drawing) -> Boundary | None:
-    """Return the largest outline if all others lie wholly in it."""
+    """Return the largest outline, with other parts of its geometry, if all others lie entirely in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
     members = {
         outline for outline in drawing.outlines if outline.whole != "" and outline.whole == largest.whole
@@ -197,7 +207,10 @@ def _find_covering_outline(drawing: Drawing) -> Boundary | None:
 
 
 def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
-    """Return the outlines that do not lie in a larger one, if any other does or if there is only one."""
+    """Return the outlines that do not lie in a larger one as the boundary.
+
+    None is returned if there are several outlines and none lies in another.
+    """
     areas = np.array(drawing.areas, dtype=object)
     inner, _ = _find_nested_pairs(areas, STRtree(areas))
     is_inner = np.zeros(len(areas), dtype=bool)
@@ -210,14 +223,14 @@ def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
 
 
 def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[ClosedOutline]) -> Boundary:
-    """Return a boundary of several outlines, or of the largest one alone."""
+    """Build a boundary from `members`, which are several outlines or the largest one alone."""
     if len(members) == 1:
         source = "the only closed outline"
         if len(drawing.outlines) > 1:
             name = f", {quote(largest.labels[0])}," if largest.labels else ""
             source = f"the largest closed outline{name} of {largest.filled_area:.4g} m²"
         return Boundary(largest.area, source, frozenset(members))
-    # In the order of the file, as the order of a set differs from run to run.
+    # In the order of the file, because the order of a set differs from run to run.
     areas = [outline.area for outline in drawing.outlines if outline in members]
     joined = close_gaps(areas, drawing.snap)
     source = f"{len(members)} closed outlines that contain the others, together {joined.area.area:.4g} m²"
@@ -226,13 +239,13 @@ def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[Closed
 
 
 def _contains_most(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
-    """Return whether most of the inner shapes lie in the outer one, each judged by one point on it."""
+    """Return whether most of the inner shapes lie in the outer one; one point of each shape decides."""
     shapely.prepare(outer)
     return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > _MAJORITY)
 
 
 def _unite_exactly(areas: Sequence[BaseGeometry]) -> MultiPolygon:
-    """Return the union of areas; a single one stays exactly as it is."""
+    """Return the union of areas; a single area is not rounded."""
     areas = [area for area in areas if not area.is_empty]
     if len(areas) == 1:
         return to_multipolygon(areas[0])

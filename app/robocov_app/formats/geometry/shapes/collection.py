@@ -1,4 +1,4 @@
-"""Collection of the shapes in a file, and the map that they describe."""
+"""Collection of the shapes in a file, and construction of the map that they describe."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -36,13 +36,13 @@ __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
 DEFAULT_THICKNESS_M = 0.1
 """Width of walls that are drawn as lines without a width."""
 _MAX_RELATIVE_THINNING = 1e-6
-"""Relative width by which rounding may make a shape thinner."""
+"""Fraction of its width by which rounding may make a shape thinner."""
 _DIGITS = 9
-"""Decimals of coordinates: shapes smaller than a nanometer have no size."""
+"""Decimals of coordinates in meters: shapes smaller than a nanometer vanish."""
 
 
 class Shapes:
-    """The shapes of a file, checked, counted, and selected by name.
+    """The shapes of a file. They are checked, counted, and selected by name as they are added.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Shapes:
     outlines : list of ClosedOutline
     lines : list of WallLine
     pillars : list of CircleObstacle
-        Obstacles, also if outlines are free.
+        Round obstacles. They are solid even if outlines are free.
     labels : LabelFilter
     omissions : Omissions
     repairs : Repairs
@@ -85,20 +85,20 @@ class Shapes:
         self._crossings = CrossingCounter(where)
 
     def accept(self, labels: Iterable[str]) -> bool:
-        """Return whether a shape with these labels is read; else it is counted as left out."""
+        """Return whether to read a shape with these labels; if not, count it as left out."""
         is_accepted = self.labels.accepts(labels)
         if not is_accepted:
             self.leave_out("shape", "by their names (--only, --skip)")
         return is_accepted
 
     def add_all(self, geometries: Iterable[SourceGeometry]) -> None:
-        """Add geometries whose coordinates are meters, and join their lines."""
+        """Add geometries with coordinates in meters, and join their lines."""
         for geometry in geometries:
             self.add(geometry)
         self.join_lines()
 
     def add(self, geometry: SourceGeometry) -> None:
-        """Add a geometry whose coordinates are meters. Raises MapError if one is out of range."""
+        """Add a geometry with coordinates in meters; raise MapError if a coordinate is out of range."""
         if not self.accept(geometry.labels):
             return
         if geometry.kind == "point":
@@ -137,9 +137,10 @@ class Shapes:
         rule : str
             See `enclosed_area.find_enclosed_area`.
         at : str
-            Position in the file, for messages.
+            Place in the file, for messages.
         thing : str
-            Kind of shape, for the count of those left out because they enclose no area. Not counted if empty.
+            Kind of shape, for the report if it is left out because it encloses no area. If empty, such a
+            shape is not reported.
         whole : str
             See `SourceGeometry`.
         paint : Paint
@@ -185,13 +186,13 @@ class Shapes:
         return len(self.outlines) + len(self.lines)
 
     def add_edges(self, lines: Sequence[WallLine]) -> None:
-        """Add the stroke of the outline that was added last; it counts only if the outline is free."""
+        """Add the stroke of the outline that was added last; it is a wall only if the outline is free."""
         last = self.outlines[-1]
         edges = tuple(replace(line, order=last.order) for line in lines)
         self.outlines[-1] = replace(last, edges=edges)
 
     def add_line(self, line: WallLine, *, at: str = "") -> None:
-        """Add a wall. Raises MapError if a coordinate or the width is out of range."""
+        """Add a wall; raise MapError if a coordinate or the width is out of range."""
         (points,) = self._check_rings([line.points], at)
         width = max(line.width, 0.0)
         place = ": ".join(filter(None, (self.where, at, "width")))
@@ -205,7 +206,7 @@ class Shapes:
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a point, (2,) m, which is a pillar if the option ``pillar`` is given."""
+        """Add a point, (2,) m; it becomes a pillar if the option ``pillar`` is given, else it is left out."""
         ((x, y),) = self._check_rings([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
@@ -213,7 +214,7 @@ class Shapes:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, get_obstacle_name(labels)))
 
     def join_lines(self) -> None:
-        """Join lines of the same width and labels whose ends meet, so that their corners are whole."""
+        """Join lines of the same width and labels whose ends meet, so that their corners are filled."""
         groups: dict[tuple[float, tuple[str, ...]], list[LineString]] = {}
         for line in self.lines:
             groups.setdefault((line.width, line.labels), []).append(LineString(line.points))
@@ -224,7 +225,7 @@ class Shapes:
                 self.lines.append(WallLine(np.asarray(path.coords), width, labels))
 
     def drop_thin_outlines(self, width: float) -> None:
-        """Drop outlines that are nowhere as wide as a width in meters, and count them."""
+        """Drop outlines that are everywhere narrower than `width`, m, and count them as left out."""
         if not width > 0.0 or not self.outlines:
             return
         areas = [outline.area for outline in self.outlines]
@@ -239,7 +240,7 @@ class Shapes:
     def build_polygon(
         self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = ""
     ) -> SourceGeometry:
-        """Build a polygon of a format that requires closed rings; rings that are not closed are counted."""
+        """Build a polygon of a format that requires closed rings; open rings are counted as repaired."""
         rings = tuple(rings)
         unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
         if unclosed:
@@ -247,7 +248,7 @@ class Shapes:
         return SourceGeometry("polygon", rings, labels, at, whole=whole)
 
     def drop_heights(self, points: Array) -> Array:
-        """Return points without their third coordinates, (k, 2), and count these."""
+        """Return points without their third coordinate, (k, 2); the report mentions dropped coordinates."""
         self.omissions.add_heights(points[:, 2:3])
         return points[:, :2]
 
@@ -262,12 +263,12 @@ class Shapes:
         return [*areas, *(LineString(line.points) for line in self.lines)]
 
     def count_vertices(self, number: int) -> None:
-        """Count vertices. Raises MapError if the file has too many."""
+        """Count vertices; raise MapError if the file has too many."""
         self.vertices += number
         files.require_vertices(self.vertices, self.where)
 
     def _check_rings(self, rings: Sequence[Array], at: str) -> list[Array]:
-        """Count and round the points of rings. Raises MapError if a coordinate is out of range."""
+        """Count and round the points of rings; raise MapError if a coordinate is out of range."""
         self.count_vertices(sum(map(len, rings)))
         for ring in rings:
             is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
@@ -289,23 +290,23 @@ class Shapes:
         overlap: bool = False,
         world: MultiPolygon | None = None,
     ) -> ForeignMap:
-        """Build the map that the shapes stand for, by the rules of `geometry.shapes.interpretation`.
+        """Build the map that the shapes describe, by the rules of `geometry.shapes.interpretation`.
 
         Parameters
         ----------
         name, description : str
         solid : bool
-            Whether closed outlines are solid unless the option ``outlines`` is given. Otherwise they are free
-            space, except for those that lie in a larger one.
+            Whether closed outlines are solid if the option ``outlines`` is not given. If False, they are free
+            space, except for those inside a larger one.
         overlap : bool
-            Outlines may overlap and are all free, as JuPedSim's accessible areas.
+            Whether outlines may overlap and are all free, like JuPedSim's accessible areas.
         world : MultiPolygon or None, m
             The free space without the shapes, if the format defines it.
 
         Raises
         ------
         MapError
-            If there are no shapes, if the boundary has no area, or if they cross too often.
+            If there are no shapes, if they cross too often, or if the boundary has no area.
         ParameterError
             If the options contain a name that the file does not have.
         """
@@ -338,7 +339,7 @@ class Shapes:
         )
 
     def find_surrounding(self) -> Boundary:
-        """Find the outer edge of the shapes as walls, else build a rectangle around them."""
+        """Return the outer edge of the shapes, taken as walls, or a rectangle around them."""
         return find_surrounding(self._build_drawing(None))
 
     def _build_drawing(self, world: MultiPolygon | None) -> Drawing:
@@ -354,7 +355,7 @@ class Shapes:
 
 
 def note_colors(shapes: Shapes, key: ColorKey) -> None:
-    """Note how often colors with a declared role occur, and which colors there are if none of them does."""
+    """Note how often declared colors occur; if none of a role does, note which colors the file has."""
     painted: list[ClosedOutline | WallLine] = [*shapes.outlines, *shapes.lines, *_list_edges(shapes)]
     for role in ("free", "solid"):
         declared = [color for color, its_role in key.entries if its_role == role]
@@ -374,10 +375,10 @@ def _list_edges(shapes: Shapes) -> list[WallLine]:
 
 
 def _list_paint(shapes: Shapes) -> tuple[Painted, ...]:
-    """Return everything that has a color, the lowest first."""
+    """Return all shapes that have a color, from bottom to top."""
     layers = [outline.paint_layer for outline in shapes.outlines if outline.color is not None]
     lines = [*shapes.lines, *_list_edges(shapes)]
     layers += [line.paint_layer for line in lines if line.color is not None]
-    # A fill and its own stroke, which is on top, have the same order; the sort keeps theirs.
+    # A fill and its stroke have the same order. The sort is stable, so the stroke stays on top.
     layers.sort(key=lambda layer: layer.order)
     return tuple(Painted(layer.area, layer.color) for layer in layers if layer.color is not None)

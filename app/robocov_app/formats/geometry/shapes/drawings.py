@@ -21,9 +21,9 @@ class Boundary:
     Attributes
     ----------
     area : MultiPolygon, m
-        Including its holes.
+        Area of the boundary, which may have holes.
     source : str
-        Description for the import report; empty where the format defines the whole boundary.
+        Description for the import report; empty if the format defines the boundary.
     outlines, lines : frozenset
         The shapes that it consists of.
     is_named : bool
@@ -31,7 +31,7 @@ class Boundary:
     gaps : str
         Description of the gaps between its outlines that were closed, for the import report.
     is_guess : bool
-        Whether nothing in the drawing marks it.
+        Whether nothing in the drawing marks it as the boundary.
     """
 
     area: MultiPolygon
@@ -44,7 +44,7 @@ class Boundary:
 
 
 def get_outlines(boundary: Boundary | None) -> frozenset[ClosedOutline]:
-    """Return the outlines that a boundary consists of, none if there is no boundary."""
+    """Return the outlines that a boundary consists of; an empty set if there is no boundary."""
     return frozenset() if boundary is None else boundary.outlines
 
 
@@ -59,7 +59,7 @@ class Drawing:
     outlines : sequence of ClosedOutline
     lines : sequence of WallLine
     pillars : sequence of CircleObstacle
-        Obstacles, also if outlines are free.
+        Round obstacles. They are solid even if outlines are free.
     options : ReadOptions
     world : MultiPolygon or None, m
         The free space without the shapes, if the format defines it.
@@ -106,7 +106,7 @@ class InterpretationReport:
     notes: list[str] = field(default_factory=list)
 
     def join_areas(self, areas: Sequence[BaseGeometry], snap: float) -> MultiPolygon:
-        """Unite areas, close the hairline gaps between them, and report these."""
+        """Unite areas, close the hairline gaps between them, and report how many were closed."""
         joined = close_gaps(areas, snap)
         if joined.number:
             self.repaired.append(joined.describe())
@@ -115,7 +115,7 @@ class InterpretationReport:
 
 @dataclass(eq=False)
 class Interpretation:
-    """Map content that was recognized in a drawing.
+    """The map content recognized in a drawing.
 
     Attributes
     ----------

@@ -16,9 +16,9 @@ from robocov_app.formats.geometry.crossings import CrossingCounter, extract_edge
 from robocov_app.formats.geometry.polygons import make_valid, to_multipolygon, unite
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
-"""Other rings are holes in the first one, or one of SVG's ``fill-rule``."""
+"""Which area rings enclose: with "holes", further rings are holes in the first; else SVG's ``fill-rule``."""
 _MAX_RAY_PAIRS = 500_000
-"""Number of pairs of a ray and an edge compared at once, which bounds the memory."""
+"""Number of pairs of a ray and an edge that are compared at once, to limit the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,11 @@ class EnclosedArea:
     Attributes
     ----------
     area : MultiPolygon, m
-        Valid, the largest part first; empty if the rings enclose nothing.
+        Valid area, with the largest part first; empty if the rings enclose nothing.
     invalidity : str or None
         Why the rings of a polygon with holes were invalid, and where.
     lost_holes : dict of str to int
-        Number of holes that take nothing away, by the reason.
+        Number of holes that remove no area, by reason.
     """
 
     area: MultiPolygon
@@ -48,10 +48,10 @@ def find_enclosed_area(
     Parameters
     ----------
     rings : sequence of (k, 2) arrays, m
-        Closed or not.
+        The rings; their first point may be repeated at the end.
     rule : "holes", "evenodd" or "nonzero"
     crossings : CrossingCounter or None
-        Crossings in the file so far.
+        Counter of the crossings in the file so far.
 
     Returns
     -------
@@ -72,6 +72,7 @@ def find_enclosed_area(
     rings = [ring for ring, is_usable in zip(rings, has_three, strict=True) if is_usable]
     plain = Polygon(rings[0], rings[1:])
     if (rule == "holes" or len(rings) == 1) and plain.is_valid:
+        # +lost drops the reasons with a count of zero.
         return EnclosedArea(to_multipolygon(plain), lost_holes=+lost)
     lines = [shapely.linearrings(ring) for ring in rings]
     crossings.add(lines)
@@ -85,13 +86,13 @@ def find_enclosed_area(
 
 
 def _has_three_points(ring: Array) -> bool:
-    """Return whether a ring has three different points; ten times as fast as sorting them."""
+    """Return whether a ring has at least three different points; ten times as fast as `np.unique`."""
     others = ring[(ring != ring[:1]).any(axis=1)]
     return bool((others != others[:1]).any())
 
 
 def _subtract_holes(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
-    """Return the first ring without the others, and count those that take nothing away."""
+    """Subtract all other rings from the first one; count in `lost` those that remove no area."""
     areas = [make_valid(Polygon(ring)) for ring in rings]
     # The parts of rings that run along themselves may share an edge.
     areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
@@ -106,7 +107,7 @@ def _subtract_holes(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
 
 
 def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
-    """Return the area that closed lines fill by a rule for paths."""
+    """Return the area that closed lines fill by the rule "evenodd" or "nonzero"."""
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.union_all(lines))))
     if not len(faces):
         return MultiPolygon()
@@ -121,15 +122,15 @@ def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     faces = faces[np.concatenate(is_filled)]
     try:
         return to_multipolygon(shapely.coverage_union_all(faces))
-    except shapely.GEOSException:  # Rounding has folded very thin faces over others.
+    except shapely.GEOSException:  # very thin faces overlap others, due to rounding
         return to_multipolygon(shapely.union_all(faces, grid_size=GRID_M))
 
 
 def _test_winding(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
-    """Return which points, (m, 2), are inside, by a fill rule.
+    """Return which points, (m, 2), are inside by a fill rule.
 
-    These are the points that the edges wind around, or, by evenodd, from which a ray to the right crosses
-    an odd number of edges.
+    A ray from the point to the right crosses an odd number of edges (evenodd), or crosses upward and downward
+    edges a different number of times (nonzero).
     """
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     rays = shapely.linestrings(np.stack([points, far], axis=1))
@@ -139,6 +140,7 @@ def _test_winding(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule
     end = edges[near, 1]
     is_upward = (start[:, 1] <= point[:, 1]) & (point[:, 1] < end[:, 1])
     is_downward = (end[:, 1] <= point[:, 1]) & (point[:, 1] < start[:, 1])
+    # Positive if the point is to the left of the edge.
     left = (end[:, 0] - start[:, 0]) * (point[:, 1] - start[:, 1])
     left = left - (point[:, 0] - start[:, 0]) * (end[:, 1] - start[:, 1])
     sign = np.zeros(len(ray), dtype=int)

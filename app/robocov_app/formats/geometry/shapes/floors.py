@@ -1,4 +1,4 @@
-"""Floors: outlines of a drawing that are free among solid ones, by their color or their nesting."""
+"""Floors: outlines of a drawing that are free although others are solid, by their color or nesting."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,20 +20,20 @@ from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline
 from robocov_app.formats.reports import format_area
 
 _MIN_BACKGROUND_SHARE = 0.98
-"""Fraction of the page that its background covers."""
+"""Minimum fraction of the page that a background covers."""
 
 
 @dataclass(frozen=True, eq=False)
 class Floors:
-    """Outlines that are free among solid ones.
+    """Outlines that are free although others are solid.
 
     Attributes
     ----------
     outlines : frozenset of ClosedOutline
     layers : sequence of PaintLayer
-        Paint that uncovers the ground below it.
+        Paint of the floors, which makes the area below it free.
     is_slab : bool
-        Whether the boundary is solid itself, except for the floors on it.
+        Whether the boundary itself is solid, except for the floors on it.
     """
 
     outlines: frozenset[ClosedOutline]
@@ -43,7 +43,7 @@ class Floors:
 
 @dataclass(frozen=True, eq=False)
 class NestedAreas:
-    """A boundary in which outlines are free and solid in turns, and the solid area in it."""
+    """A boundary in which nested outlines are alternately free and solid, and the solid area in it."""
 
     boundary: Boundary
     solid: PaintLayer
@@ -52,7 +52,7 @@ class NestedAreas:
 def find_floors(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
 ) -> Floors:
-    """Find the floors of a drawing: fills of a color that is declared free, or else pale ones.
+    """Find the floors of a drawing: fills of a color that the user declared free, and pale fills.
 
     Parameters
     ----------
@@ -87,7 +87,10 @@ def find_floors(
 def find_nested_areas(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport
 ) -> NestedAreas | None:
-    """Divide the outlines of a drawing, which are free and solid in turns; None if there are none."""
+    """Find the free and the solid area of nested outlines, which are alternately free and solid.
+
+    Without a boundary, the larger of both areas is free. None is returned if there are no outlines.
+    """
     used = get_outlines(boundary)
     others = [outline for outline in drawing.outlines if outline not in used]
     areas = [outline.area for outline in others if outline.role is None]
@@ -96,7 +99,7 @@ def find_nested_areas(
     odd, even = split_alternating(areas)
     if boundary is not None:
         report.notes.append("areas in an odd number of outlines within the boundary are solid")
-        return NestedAreas(boundary, PaintLayer(odd, -1))
+        return NestedAreas(boundary, PaintLayer(odd, -1))  # order -1: below all other paint
     if odd.area >= even.area:
         number = "an odd number"
         free = odd
@@ -112,7 +115,7 @@ def find_nested_areas(
 
 
 def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:
-    """Return the region as a layer of paint if only floors are free."""
+    """Return the region as a solid layer if only floors are free; otherwise None."""
     if boundary is None:
         return None
     has_declared = any(outline.role == "free" for outline in floors.outlines)
@@ -123,7 +126,7 @@ def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors
 
 
 def is_background(drawing: Drawing, boundary: Boundary | None) -> bool:
-    """Return whether the boundary is a filled rectangle without a stroke, as large as the page."""
+    """Return whether the boundary is only the background of the page: a fill of its size without a stroke."""
     if drawing.page is None or boundary is None or boundary.is_named or len(boundary.outlines) != 1:
         return False
     (outline,) = boundary.outlines
@@ -133,7 +136,7 @@ def is_background(drawing: Drawing, boundary: Boundary | None) -> bool:
 
 
 def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
-    """Return whether a boundary is a dark area that pale floors are painted on, or declared solid."""
+    """Return whether a boundary is solid: declared so, or a dark area with pale floors painted on it."""
     if boundary.is_named or len(boundary.outlines) != 1:
         return False
     (outline,) = boundary.outlines
@@ -145,7 +148,7 @@ def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _PaleFloors:
-    """Outlines that are floors by their color, and why, for the import report."""
+    """Outlines that are floors because of their color, and the reason for the import report."""
 
     outlines: list[ClosedOutline]
     reason: str
@@ -157,7 +160,10 @@ def _find_pale_floors(
     outlines: Sequence[ClosedOutline],
     undecided: Sequence[ClosedOutline],
 ) -> _PaleFloors:
-    """Return undecided outlines with something darker on them, those like these, and unseen ones."""
+    """Return the undecided outlines that are floors by their color.
+
+    They have something darker painted on them, resemble outlines that have, or cannot be seen on the ground.
+    """
     marks = [outline.paint_layer for outline in outlines]
     lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
     marks += [PaintLayer(LineString(line.points), line.order, line.color) for line in lines]
@@ -170,7 +176,7 @@ def _find_pale_floors(
 
 
 def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
-    """Return whether an outline has the pale color of the ground and no stroke: it only covers others."""
+    """Return whether an outline is invisible on the ground: it has the same pale color and no stroke."""
     ground = [background.color for background in get_outlines(boundary)]
     return is_pale(outline.color) and not outline.edges and outline.color in (ground or [WHITE])
 
@@ -181,7 +187,7 @@ def _report_pale(
     floors: _PaleFloors,
     report: InterpretationReport,
 ) -> None:
-    """Report which pale paint was taken as floor, and which as solid."""
+    """Note which pale fills are taken as floors, and which pale paint is taken as solid."""
     rest = [outline for outline in undecided if outline not in floors.outlines]
     pale = [outline.color for outline in rest if is_pale(outline.color)]
     pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]

@@ -1,26 +1,26 @@
-"""Interpretation of a drawing: find the boundary, classify the other shapes, subtract them, report.
+"""Interpretation of a drawing: find the boundary, classify the other shapes, and subtract the obstacles.
 
-Closed outlines are either *free space*, all of them together; or they are *solid*, except for the boundary.
+Closed outlines are either all *free space*, or they are all *solid*, except for the boundary.
 Lines and pillars are obstacles in both cases. The boundary is, in this order,
 
-1. the shape with the name, id, class or layer of the option ``boundary``, or "boundary". Lines of that name
-   are the boundary if they enclose an area. Outlines around it are frames, and left out;
+1. the shape whose name, id, class or layer is that of the option ``boundary``, or else "boundary". Lines of
+   that name are the boundary if they enclose an area. Outlines around the boundary are frames, and left out;
 2. the largest closed outline, with its continuations, if it is the only shape, or if it contains more than
-   half of the others. Continuations are the other parts of its geometry, if this is cut at the antimeridian,
-   for example, and outlines next to it, edge to edge, that contain other outlines;
+   half of the others. Continuations are other parts of its geometry, as when it is cut at the antimeridian,
+   and outlines next to it, edge to edge, that contain other outlines;
 3. the outer edge of the walls, if they enclose an area that is mostly open;
 4. a rectangle around everything, at the distance of the option ``around``.
 
-If the colors of a drawing are known, a fill covers the shapes that were painted before it, and colors that
-the user declares free are free. Floors are pale fills with something darker painted on them, and others of
-their color or of the size of a room; pale fills in the color of the ground, without a stroke; and all pale
-fills on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free
-and solid in turns, from the outside in.
+If the colors of a drawing are known, a fill covers the shapes that were painted before it, and fills of a
+color that the user declares free are free. Pale fills are free, as floors, in three cases: something darker
+is painted on them, or they have the color of such a fill or the size of a room; they have the color of the
+ground and no stroke; or the boundary is dark, which makes the boundary itself solid. If the option
+``outlines`` is "nested", outlines are alternately free and solid, from the outside in.
 
-In drawings whose outlines are free by default, 2 is different: if an outline is in a larger one, the boundary
-is all outlines that are in no other, and those that are in another one are obstacles.
+In drawings whose outlines are free by default, rule 2 is different: if some outlines lie in larger ones, the
+boundary consists of all outlines that are not in another one, and those that are become obstacles.
 
-If walls separate the free space from the boundary, it ends at the walls: see
+If walls separate the free space from the boundary, the map ends at the walls: see
 `geometry.conversion.environment`.
 """
 
@@ -58,7 +58,7 @@ from robocov_app.formats.geometry.shapes.painting import PaintLayer, uncover
 from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline, WallLine
 
 _MAX_EXTENT_M = 10.0 * MAX_SIZE_M
-"""Shapes farther apart belong to no map, and their union would take seconds."""
+"""Largest extent of all shapes together. Shapes farther apart cannot be one map."""
 
 
 def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation:
@@ -68,11 +68,11 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     ----------
     drawing : Drawing
     solid : bool
-        What closed outlines are unless the option ``outlines`` is given. True: solid. False: free, but solid
-        where rule 1 or 2 finds a boundary of others, or where there are only lines.
+        Whether closed outlines are solid if the option ``outlines`` is not given. If False, they are free,
+        unless rule 1 or 2 finds a boundary of other outlines, or there are only lines.
     overlap : bool
-        Outlines may overlap and are all free, as JuPedSim's accessible areas: then rule 2 holds only if all
-        others lie wholly in the largest one.
+        Whether outlines may overlap and are all free, like JuPedSim's accessible areas. Rule 2 then applies
+        only if all others lie entirely in the largest one.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
 
 
 def require_size(bounds: Iterable[float], where: str, maximum: float = MAX_SIZE_M) -> None:
-    """Raise MapError if bounds, m, are larger than any map."""
+    """Raise MapError if bounds (left, bottom, right, top), m, are larger than a map may be."""
     x, y, right, top = bounds
     if max(right - x, top - y) > maximum:
         expected = f"expected at most {MAX_SIZE_M / 1000:g} km"
@@ -129,11 +129,11 @@ def require_size(bounds: Iterable[float], where: str, maximum: float = MAX_SIZE_
 
 
 def _require_measurable(drawing: Drawing) -> None:
-    """Raise MapError if shapes are too far apart, or cross too often, for their union to be computed."""
+    """Raise MapError if shapes are too far apart or cross too often to compute their union in time."""
     everything = [*drawing.areas, *drawing.paths]
     if drawing.world is not None:
         everything.append(drawing.world)
-    # One of many parts may be a map, if they are not too far from each other.
+    # The shapes may extend beyond the size of a map, because only one of several parts need become the map.
     require_size(shapely.total_bounds(everything), drawing.where, _MAX_EXTENT_M)
     rings = shapely.get_rings(shapely.get_parts(drawing.areas))
     CrossingCounter(drawing.where).add([*rings, *drawing.paths])
@@ -151,7 +151,7 @@ def _are_solid(drawing: Drawing, boundary: Boundary | None, *, solid: bool) -> b
 def _build_region(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
 ) -> MultiPolygon:
-    """Return the area that is free without any obstacle, m. Raises MapError if it is empty."""
+    """Return the area that would be free without obstacles, m; raise MapError if it is empty."""
     if are_solid:
         assert boundary is not None
         region = boundary.area
@@ -181,11 +181,11 @@ class _Obstacles:
     walls : sequence of WallLine
     pillars : sequence of CircleObstacle
     layers : sequence of PaintLayer
-        The paint of all of them.
+        The paint of all obstacles.
     count : int
-        Number of outlines that are not around the whole region.
+        Number of outlines, without those that surround the whole region.
     outside : int
-        Number of shapes that do not meet the region, and of outlines around all of it.
+        Number of shapes outside the region, and of outlines that surround all of it.
     """
 
     outlines: Sequence[ClosedOutline]
@@ -197,7 +197,7 @@ class _Obstacles:
 
     @property
     def primitives(self) -> tuple[Primitive, ...]:
-        """The circles and walls, as obstacles of a map."""
+        """The circles, walls and pillars as obstacles of a map."""
         circles = [outline.circle for outline in self.outlines if outline.circle is not None]
         walls = [wall for line in self.walls if (wall := line.wall) is not None]
         return (*circles, *walls, *self.pillars)
@@ -206,7 +206,10 @@ class _Obstacles:
 def _find_obstacles(
     drawing: Drawing, boundary: Boundary | None, region: MultiPolygon, floors: Floors, *, are_solid: bool
 ) -> _Obstacles:
-    """Return the obstacles in a region, m, that has the given boundary."""
+    """Return the obstacles in a region, m, whose boundary is given.
+
+    Outlines are obstacles if `are_solid`; otherwise only those whose color the user declared solid are.
+    """
     used = Boundary(region) if boundary is None else boundary
     excluded = used.outlines | floors.outlines
     others = [outline for outline in drawing.outlines if outline not in excluded]
@@ -219,7 +222,7 @@ def _find_obstacles(
     is_frame = shapely.covered_by(region, blocks)
     layers = [outline.paint_layer for outline, frames in zip(outlines, is_frame, strict=True) if not frames]
     layers += [line.paint_layer for line in walls]
-    # Pillars have no paint that could be covered.
+    # Nothing is painted over pillars, so their order is infinite.
     layers += [PaintLayer(pillar.polygon, np.inf) for pillar in drawing.pillars]
     is_inside = shapely.intersects(region, [layer.area for layer in layers])
     return _Obstacles(
@@ -247,15 +250,15 @@ def _choose_outer(
     *,
     are_solid: bool,
 ) -> MultiPolygon | None:
-    """Return the boundary of the map, without holes; None where it is the outline of the free space."""
+    """Return the boundary of the map without holes, or None if it is the outline of the free space."""
     world = drawing.world
-    # The free space of a grid has an outline of its own.
+    # A free space with holes or several parts comes from a grid; its outline is the boundary.
     is_grid = world is not None and (len(world.geoms) > 1 or len(world.geoms[0].interiors) > 0)
     if boundary is not None and not is_grid and (are_solid or boundary.area is not region):
         return fill_area_holes(boundary.area)
     has_walls = bool(obstacles.walls or obstacles.pillars)
     if has_walls and len(region.geoms) == len(free.geoms) == 1:
-        # Walls that start at the edge are no part of it.
+        # Walls that start at the edge cut notches into the free space; they are not part of the boundary.
         return fill_area_holes(region)
     return None
 
@@ -268,10 +271,10 @@ def _describe(
     *,
     are_solid: bool,
 ) -> None:
-    """Report the boundary, and the meaning of the other shapes."""
+    """Report gaps that were closed in the boundary, and what the other shapes were taken for."""
     if boundary is not None and boundary.gaps:
         report.repaired.append(boundary.gaps)
-    # Where the format defines the whole boundary, outlines need no note.
+    # If the format defines the boundary, it also defines what outlines are: no note is needed.
     is_found = boundary is None or boundary.source != ""
     if is_found and obstacles.count:
         count = format_count(obstacles.count, "closed outline")

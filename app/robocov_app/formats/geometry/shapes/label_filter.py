@@ -14,9 +14,9 @@ class LabelFilter:
     Attributes
     ----------
     only : set of str, or None
-        Labels that are read, in lower case; None for all.
+        Labels of the shapes to read, in lower case. None stands for all shapes.
     skip : set of str
-        Labels that are left out, in lower case.
+        Labels of the shapes to leave out, in lower case.
     """
 
     def __init__(self, where: str, options: ReadOptions) -> None:
@@ -29,20 +29,20 @@ class LabelFilter:
         self._known: dict[str, str] = {}
 
     def register(self, labels: Iterable[str]) -> set[str]:
-        """Remember labels of the file, and return them as they are compared, in lower case."""
+        """Remember that labels occur in the file, and return them in lower case, as they are compared."""
         folded = {label.casefold(): label for label in labels}
         self._known |= folded
         return set(folded)
 
     def accepts(self, labels: Iterable[str]) -> bool:
-        """Remember labels of the file, and return whether a shape with these labels is read."""
+        """Remember that labels occur in the file, and return whether to read a shape with these labels."""
         folded = self.register(labels)
         if self.only is not None and not self.only & folded:
             return False
         return not self.skip & folded
 
     def require_known_names(self) -> None:
-        """Raise ParameterError if the options contain a name that the file does not have."""
+        """Raise ParameterError if an option contains a name that does not occur in the file."""
         options = self._options
         boundary = () if options.boundary is None else (options.boundary,)
         given = {"boundary": boundary, "only": options.only or (), "skip": options.skip or ()}

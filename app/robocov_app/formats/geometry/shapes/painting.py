@@ -1,4 +1,4 @@
-"""Paint of drawings: which filled shapes are floors, and which areas they leave of the shapes below them."""
+"""Paint of drawings: which filled shapes are floors, and what remains visible of the shapes below them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area
 
 _MIN_ROOM_SHARE = 0.5
-"""Pale fills of this fraction of the area of the smallest evident floor have the size of a room."""
+"""A pale fill has the size of a room if its area is this fraction of the smallest evident floor's or more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +26,9 @@ class PaintLayer:
     ----------
     area : shapely geometry, m
     order : float
-        Layers of a higher order are painted later, on top of lower ones.
+        Layers with a higher order are painted later, on top of others.
     color : Color or None
-        Color as it is seen on white; None where it is not known.
+        Color on a white page, or None if it is unknown.
     """
 
     area: BaseGeometry
@@ -47,22 +47,22 @@ def is_pale(color: Color | None) -> bool:
 
 
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
-    """Decide which filled shapes are floors, by the paint on them.
+    """Decide from the paint on filled shapes which of them are floors.
 
-    Furniture and walls are not painted onto a pale obstacle. So a pale fill with something darker on it is a
-    floor, and so are fills of its color, and pale fills of the size of a room: rooms often have different
-    colors.
+    Nobody draws furniture or walls on an obstacle. So a pale fill with something darker on it is evidently a
+    floor. If there is such a fill, all fills of its color are floors, too, and so are pale fills of the size
+    of a room, because rooms often have different colors.
 
     Parameters
     ----------
     fills : sequence of PaintLayer
     marks : sequence of PaintLayer
-        Everything that is painted; pale marks do not count.
+        Everything that is painted; pale marks are ignored.
 
     Returns
     -------
     list of bool
-        One for each fill.
+        Whether each fill is a floor.
     """
     is_marked = _find_fills_with_marks(fills, marks)
     if not is_marked.any():
@@ -77,7 +77,7 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
 
 
 def _find_fills_with_marks(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
-    """Return for each fill whether it is pale and has darker paint on it."""
+    """Return, for each fill, whether it is pale and has darker paint on it."""
     is_marked = np.zeros(len(fills), dtype=bool)
     darker = [mark for mark in marks if mark.color is not None and not is_pale(mark.color)]
     if not darker:
@@ -92,7 +92,7 @@ def _find_fills_with_marks(fills: Sequence[PaintLayer], marks: Sequence[PaintLay
 
 
 def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[BaseGeometry]:
-    """Return the areas of solids without the floors that are painted on top of them, m."""
+    """Return the areas of solids, m, without the floors painted on top of them."""
     if not floors:
         return [solid.area for solid in solids]
     tree = shapely.STRtree([floor.area for floor in floors])
@@ -111,12 +111,12 @@ def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[
 
 
 def split_alternating(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon]:
-    """Split the union of areas by the number of areas that overlap.
+    """Split the union of areas by how many of the areas overlap.
 
     Returns
     -------
     odd, even : MultiPolygon, m
-        What lies in an odd number of areas, and in an even number of at least two.
+        What lies in an odd number of areas, and what lies in an even number of two or more.
     """
     parts = shapely.get_parts(shapely.get_parts(areas))
     rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(parts)]

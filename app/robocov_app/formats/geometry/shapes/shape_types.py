@@ -1,4 +1,4 @@
-"""Shapes of drawings: geometries as a file has them, and the outlines and walls in meters made of them."""
+"""Shapes of drawings: geometries as in a file, and the outlines and walls in meters built from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,21 +25,22 @@ BOUNDARY = "boundary"
 
 @dataclass(frozen=True, eq=False)
 class SourceGeometry:
-    """A geometry of a file, before the units of its coordinates are known.
+    """A geometry in a file, before the unit of its coordinates is known.
 
     Attributes
     ----------
     kind : "polygon", "line" or "point"
     rings : tuple of (k, 2) arrays
+        Rings of a polygon; a line or a point is a single array.
     labels : tuple of str
     at : str
-        Position in the file, for messages.
+        Place in the file, for messages.
     rule : str
         See `enclosed_area.find_enclosed_area`.
     width : float or None, m
         Width of a line, if the file gives it.
     whole : str
-        Position of the geometry that this is a part of, if it is one of several parts.
+        If this is one of several parts of a geometry: the place of that geometry in the file.
     """
 
     kind: Kind
@@ -60,19 +61,19 @@ class ClosedOutline:
     area : MultiPolygon, m
         Valid.
     labels : tuple of str
-        The most specific one first.
+        Names of the shape, the most specific one first.
     circle : CircleObstacle or None
-        The disc that the outline is, if it is one.
+        The disc, if the outline is a circle.
     whole : str
         See `SourceGeometry`.
     color : Color or None
-        Color of the fill as it is seen on white, if known.
+        Color of the fill on a white page, if known.
     role : str or None
-        Role that the user has declared for this color.
+        Role that the user declared for this color.
     order : int
-        Outlines and lines of a higher order are painted later.
+        Outlines and lines with a higher order are painted later.
     edges : tuple of WallLine
-        The stroke, which is a wall only if the outline is free.
+        The stroke of the outline, which is a wall only if the outline is free.
     """
 
     area: MultiPolygon
@@ -86,26 +87,26 @@ class ClosedOutline:
 
     @property
     def paint_layer(self) -> PaintLayer:
-        """The fill."""
+        """The fill as a layer of paint."""
         return PaintLayer(self.area, self.order, self.color)
 
     @property
     def filled_area(self) -> float:
-        """Area including holes, m²."""
+        """Area of the outline including its holes, m²."""
         return float(sum(Polygon(part.exterior).area for part in self.area.geoms))
 
 
 @dataclass(frozen=True, eq=False)
 class PenStroke:
-    """A line drawn by a pen that a transform has stretched, so that it is not round.
+    """A line drawn with a pen that a transform has stretched, so that its width depends on the direction.
 
     Attributes
     ----------
     points : (k, 2) array
-        In the units of the pen.
+        Vertices, in the units of the pen.
     width : float
     matrix : (3, 3) array
-        Transform from these units to meters.
+        Transform from the pen's units to meters.
     """
 
     points: Array
@@ -127,7 +128,7 @@ class WallLine:
     mitre_limit : float
         See `robocov.environment.WallObstacle`.
     stretched : PenStroke or None
-        Where the width depends on the direction.
+        The stroke, if its width depends on the direction.
     color, role, order
         See `ClosedOutline`.
     """
@@ -145,7 +146,7 @@ class WallLine:
 
     @cached_property
     def solid(self) -> BaseGeometry:
-        """Area that the wall covers, m."""
+        """Area that the line covers, m."""
         stroke = self.stretched
         if stroke is None:
             return self._buffer(self.points, self.width)
@@ -162,16 +163,20 @@ class WallLine:
 
     @property
     def paint_layer(self) -> PaintLayer:
-        """The stroke."""
+        """The stroke as a layer of paint."""
         return PaintLayer(self.solid, self.order, self.color)
 
     @property
     def wall(self) -> WallObstacle | None:
-        """The line as an obstacle, except for its corners; None if its ends cannot be those of one."""
+        """The line as an obstacle of a map, which may differ at its corners.
+
+        None if an obstacle cannot represent it, because its ends are round or its width varies.
+        """
         if self.stretched is not None or self.cap == "round":
             return None
         points = self.points.copy()
         if self.cap == "square":
+            # A square cap extends each end by half the width.
             for end, inner in ((0, 1), (-1, -2)):
                 vector = points[end] - self.points[inner]
                 points[end] += vector / max(np.hypot(*vector), 1e-300) * self.width / 2
@@ -181,8 +186,8 @@ class WallLine:
     def measure_widths(self) -> tuple[float, float]:
         """Return the smallest and the largest width of the segments, m.
 
-        They differ where the pen is stretched: a line along the stretch is as wide as the pen, and a line
-        across it is wider.
+        They differ if the pen is stretched: a line along the stretch is as wide as the pen, and a line across
+        it is wider.
         """
         stroke = self.stretched
         if stroke is None:
@@ -192,14 +197,14 @@ class WallLine:
         if not len(segments):
             return self.width, self.width
         linear = stroke.matrix[:2, :2]
-        # The area of a strip grows with the determinant, and its length depends on its direction.
+        # Width is area over length: the area of a strip grows by the determinant, its length by `stretch`.
         stretch = np.hypot(*(segments @ linear.T).T) / np.hypot(*segments.T)
         widths = stroke.width * abs(np.linalg.det(linear)) / np.maximum(stretch, 1e-300)
         return float(widths.min()), float(widths.max())
 
 
 def get_obstacle_name(labels: Sequence[str]) -> str | None:
-    """Return the name of an obstacle with these labels; layer 0 of a drawing is no name."""
+    """Return the name of an obstacle with these labels, or None. Layer "0" of a DXF file is not a name."""
     if not labels or labels[0] == "0":
         return None
     return to_one_line(labels[0])[:MAX_LABEL_CHARACTERS].strip() or None

@@ -1,11 +1,11 @@
 """Closing of hairline gaps between outlines of free space.
 
-Rooms that are drawn one by one often miss each other by a rounding error. Such a gap is no wall, but it would
-divide the free space. A gap between two outlines is closed
+Rooms that are drawn one by one are often separated by a rounding error. Such a gap is not a wall, but it
+would divide the free space. A gap between two outlines is closed
 
-- if it is narrower than `robocov.mapfile.models.MIN_SIZE_M`, as no obstacle of a map is that thin, or
-- if it is narrower than the snapping tolerance and lies between parts that the file does not connect in
-  another way. Where a door leads through it, it is a wall, however thin.
+- if it is narrower than `robocov.mapfile.models.MIN_SIZE_M`, because no obstacle of a map is that thin, or
+- if it is narrower than the snapping tolerance and separates parts that are not connected elsewhere. If a
+  door leads through the gap, it is a wall, however thin.
 
 Only gaps between outlines are closed. Slits and holes in a single outline, lines, and solid outlines
 are drawn on purpose and stay.
@@ -26,17 +26,17 @@ from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 DEFAULT_SNAP_M = 0.01
-"""Thinner than any wall of a building."""
+"""Default snapping tolerance, thinner than any wall of a building."""
 MAX_DEFAULT_SNAP = 1e-3
-"""Fraction of the larger side of a drawing, as a table-top arena has thin walls."""
+"""Largest default tolerance, as a fraction of a drawing's larger side: a table-top arena has thin walls."""
 _OVERLAP_M = 2 * GRID_M
-"""Distance by which the filling of a gap extends into its surroundings."""
+"""Distance by which the filling of a gap overlaps its surroundings."""
 _REACH = 1.01
-"""Distance, in tolerances, within which the neighbors of an outline are searched."""
+"""Distance, in tolerances, within which an outline is close to another one."""
 _MIN_LENGTH = 3.0
-"""Length of a gap, in tolerances; next to a corner, at most two of them are near."""
+"""Minimum length of a gap, in tolerances. Where only corners are close, the length is at most two."""
 _MAX_WIDENING = 0.25
-"""Number of tolerances by which the middle half of a gap may widen."""
+"""Maximum variation of the width along the middle half of a gap, in tolerances."""
 
 
 class ClosedGaps(NamedTuple):
@@ -46,7 +46,7 @@ class ClosedGaps(NamedTuple):
     ----------
     area : MultiPolygon, m
     number : int
-        Number of gaps.
+        Number of gaps that were closed.
     widest : float, m
         Width of the widest gap.
     """
@@ -56,14 +56,14 @@ class ClosedGaps(NamedTuple):
     widest: float = 0.0
 
     def describe(self) -> str:
-        """Return a line for the import report."""
+        """Return the line of the import report about the gaps."""
         width = f"{1000 * self.widest:.2g} mm"
         size = f"{width} wide" if self.number == 1 else f"the widest {width}"
         return f"{format_count(self.number, 'gap')} between outlines closed, {size} (--snap 0 keeps them)"
 
 
 def compute_default_snap(areas: Sequence[BaseGeometry]) -> float:
-    """Return the snapping tolerance, m, for areas if the user gives none."""
+    """Return the snapping tolerance, m, that is used for areas if the user gives none."""
     if not len(areas):
         return DEFAULT_SNAP_M
     left, low, right, high = shapely.total_bounds(areas)
@@ -91,7 +91,8 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
     area = union_on_grid(outlines)
     if snap <= 0.0 or not _are_close(outlines, snap):
         return ClosedGaps(area)
-    # Gaps thinner than any obstacle of a map are closed everywhere, others where they divide the area.
+    # First close the gaps thinner than any obstacle of a map, between all outlines. Wider gaps are then
+    # closed only between the parts that are still separate.
     hairline_width = min(snap, MIN_SIZE_M)
     hairlines = _find_gaps(outlines, hairline_width)
     area = _fill(area, hairlines, hairline_width)
@@ -107,6 +108,7 @@ class _Gaps(NamedTuple):
     Attributes
     ----------
     surroundings : (n,) array of areas, m
+        Area around each gap.
     widths : (n,) array, m
     """
 
@@ -115,14 +117,14 @@ class _Gaps(NamedTuple):
 
 
 def union_on_grid(areas: Sequence[BaseGeometry]) -> MultiPolygon:
-    """Return the union of areas, m, to the micrometer."""
+    """Return the union of areas, m, with coordinates rounded to the micrometer."""
     # Uniting before rounding is ten times as fast.
     return to_multipolygon(shapely.set_precision(unite(areas), GRID_M))
 
 
 def are_edge_to_edge(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> bool:
-    """Return whether two areas touch along an edge, within a tolerance in meters, and do not overlap."""
-    if shapely.relate_pattern(first, second, "2********"):
+    """Return whether two areas touch along an edge, within a tolerance, m, without overlapping."""
+    if shapely.relate_pattern(first, second, "2********"):  # the interiors have an area in common
         return False
     reach = shapely.buffer(second, _REACH * tolerance + GRID_M)
     wall = shapely.intersection(shapely.boundary(first), reach)
@@ -130,13 +132,13 @@ def are_edge_to_edge(first: BaseGeometry, second: BaseGeometry, tolerance: float
 
 
 def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineString]:
-    """Move ends of lines that are closer to each other than a tolerance, m, to the same point."""
+    """Move the ends of lines that are within a tolerance, m, of each other to the same point."""
     if not lines:
         return []
     ends = [shapely.get_point(lines, 0), shapely.get_point(lines, -1)]
     points = np.concatenate(ends)
     index, neighbor = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
-    # All ends that are close to each other move to the first one in the file.
+    # Each end moves to the first one in the file among those close to it.
     first = np.full(len(points), len(points))
     np.minimum.at(first, index, neighbor)
     joined = shapely.get_coordinates(points[first])
@@ -150,13 +152,16 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
 
 
 def _are_close(outlines: Array, snap: float) -> bool:
-    """Return whether any two outlines are closer to each other than the tolerance."""
+    """Return whether any two outlines are within the tolerance of each other."""
     first, second = STRtree(outlines).query(outlines, predicate="dwithin", distance=snap)
     return bool((first != second).any())
 
 
 def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
-    """Return the gaps between pairs of polygons that are everywhere narrower than a tolerance."""
+    """Return the gaps between pairs of polygons that are narrower than a tolerance, m.
+
+    `walls` is the part of one polygon's boundary along a gap. The gap's width is measured at three points.
+    """
     first, second = STRtree(parts).query(parts, predicate="dwithin", distance=tolerance)
     is_ordered = first < second
     first = first[is_ordered]
@@ -167,28 +172,28 @@ def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
     walls = shapely.intersection(shapely.boundary(parts[first]), reach[second])
     walls = np.array([_find_longest(wall) for wall in walls], dtype=object)
     widths = np.stack([_measure_distances(walls, parts[second], place) for place in (0.25, 0.5, 0.75)])
-    # Where only corners are near, as of rooms across a crossing of gaps, there is nothing to close,
+    # If only corners are close, as those of diagonal rooms where two gaps cross, there is no gap to close.
     is_gap = shapely.length(walls) > _MIN_LENGTH * tolerance
-    # and neither where the parts touch, or where the wall between them is a wedge.
+    # If the parts touch, or the wall between them is a wedge, there is none either.
     is_gap &= (widths[1] > 0.0) & (np.ptp(widths, axis=0) <= _MAX_WIDENING * tolerance)
     surroundings = shapely.intersection(reach[first[is_gap]], reach[second[is_gap]])
     return _Gaps(surroundings, widths[1, is_gap])
 
 
 def _find_longest(wall: BaseGeometry) -> BaseGeometry:
-    """Return the longest line of a geometry; an empty one if there is none."""
+    """Return the longest line in a geometry, or an empty line if there is none."""
     lines = [part for part in shapely.get_parts(shapely.line_merge(wall)) if isinstance(part, LineString)]
     return max(lines, key=shapely.length, default=LineString())
 
 
 def _measure_distances(walls: Array, parts: Array, fraction: float) -> Array:
-    """Return the distances, (n,) m, from a point on each wall, at a fraction of its length, to a part."""
+    """Return the distance, (n,) m, from a point on each wall, at a fraction of its length, to its part."""
     points = shapely.line_interpolate_point(walls, fraction, normalized=True)
     return np.asarray(np.nan_to_num(shapely.distance(points, parts)))
 
 
 def _find_narrow(area: MultiPolygon, width: float) -> Array:
-    """Return the parts outside an area that are narrower than a width in meters."""
+    """Return the gaps in an area that are narrower than `width`, m."""
     grown = buffer_with_mitres(area, width / 2)
     closed = buffer_with_mitres(grown, -width / 2)
     pieces = shapely.get_parts(shapely.difference(closed, area))
@@ -196,7 +201,7 @@ def _find_narrow(area: MultiPolygon, width: float) -> Array:
 
 
 def _fill(area: MultiPolygon, gaps: _Gaps, width: float) -> MultiPolygon:
-    """Return an area united with gaps up to a width in meters."""
+    """Fill gaps in an area that are narrower than `width`, m."""
     if not len(gaps.widths):
         return area
     around = shapely.union_all(gaps.surroundings)

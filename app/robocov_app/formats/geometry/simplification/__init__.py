@@ -1,1 +1,1 @@
-"""Simplification of free space, without closing passages or changing sizes."""
+"""Simplification of free space that closes no passages and preserves the sizes of obstacles."""

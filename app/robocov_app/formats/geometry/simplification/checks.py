@@ -1,4 +1,4 @@
-"""Checks that a simplified outline keeps its sizes, crosses nothing, and leaves gaps open."""
+"""Checks that a simplified outline keeps its areas, crosses nothing, and leaves gaps open."""
 
 from collections import Counter
 
@@ -13,15 +13,15 @@ from robocov_app.formats.geometry.simplification.ring_vertices import RingVertic
 from robocov_app.formats.geometry.vectors import compute_cross, compute_dot
 
 MAX_OUTLINE_CHANGE = 0.1
-"""Fraction of its area by which an outline, or a thin part, may change."""
+"""Fraction by which the area of an outline, or of a thin part, may change."""
 MAX_AREA_CHANGE = 0.02
-"""Fraction of the whole free area by which that may change."""
+"""Fraction by which the whole free area may change."""
 _THIN_AREA_SLACK = 0.5
 """Area by which a thin part may change in addition to `MAX_OUTLINE_CHANGE`, in squared tolerances."""
 
 
 class SimplificationCheck:
-    """Checks of a drawing of an outline; the answers select vertices of the outline, (k,).
+    """Checks of a simplified drawing of an outline. The results are masks of the outline's k vertices.
 
     Parameters
     ----------
@@ -30,16 +30,16 @@ class SimplificationCheck:
     allowed : (k,) array, m
         Tolerance at each vertex of the outline; 0 where it must stay.
     tolerance : float, m
-        The tolerance where nothing was wrong so far.
+        The initial tolerance, which applies where no problem has been found so far.
     width : float, m
         Diameter of a robot.
     problems : Counter
-        Counts problems by their kind where the tolerance is still the whole one.
+        Counts problems by kind, where the tolerance is still the initial one.
 
     Attributes
     ----------
     side : (k,) array of int
-        Side of the drawing that stands for each vertex, by its first vertex.
+        Side of the drawing that represents each vertex of the outline, as the index of the side's start.
     """
 
     def __init__(
@@ -61,6 +61,7 @@ class SimplificationCheck:
         self.side = self._assign_sides()
 
     def _assign_sides(self) -> IntArray:
+        """Return, for each vertex of the outline, the side of the drawing that represents it."""
         drawing = self.drawing
         ring = self.outline.ring
         order = np.argsort(drawing.source, kind="stable")
@@ -70,14 +71,14 @@ class SimplificationCheck:
         return np.asarray(order[np.where(index < drawing.starts[ring], last[ring], index)])
 
     def find_misdrawn(self) -> tuple[BoolArray, BoolArray]:
-        """Find rings whose area has changed too much, and vertices that are too far from the drawing.
+        """Find rings whose area has changed too much, and vertices too far from the drawing.
 
         Returns
         -------
         wrong : (k,) array of bool
-            Vertices of rings with another area.
+            Vertices of rings whose area has changed too much.
         far : (k,) array of bool
-            The farthest of the vertices that a side replaces, if it is beyond the tolerance.
+            For each side, the farthest of the vertices that it represents, if it is beyond the tolerance.
         """
         allowed = self.allowed
         far = self._find_far()
@@ -95,12 +96,12 @@ class SimplificationCheck:
         return wrong, far
 
     def _find_far(self) -> BoolArray:
-        """Return for each vertex whether it is the farthest of its side and farther away than allowed."""
+        """Select, for each side, the farthest of the vertices that it represents, if it is too far away."""
         drawing = self.drawing
         points = self.outline.points
         allowed = self.allowed
         distance = np.full(len(points), np.inf)
-        # Where a corner was restored, the side before or after may be the nearer one.
+        # Next to a restored corner, the preceding or the following side may be closer.
         for side in (self.side, drawing.before[self.side], drawing.after[self.side]):
             start = drawing.points[side]
             vector = drawing.sides[side]
@@ -120,7 +121,7 @@ class SimplificationCheck:
         if not len(thin.areas):
             return wrong
         changes = self._measure_area_changes()
-        # A side counts once, also if it replaces several vertices of the part.
+        # A side is counted once, even if it represents several vertices of a part.
         pairs = np.unique(np.column_stack([thin.part, self.side[thin.vertex]]), axis=0)
         change = np.bincount(pairs[:, 0], changes[pairs[:, 1]], minlength=len(thin.areas))
         limit = MAX_OUTLINE_CHANGE * thin.areas + _THIN_AREA_SLACK * self.tolerance**2
@@ -132,17 +133,17 @@ class SimplificationCheck:
         return wrong & (self.allowed > 0.0)
 
     def _measure_area_changes(self) -> Array:
-        """Return the change of the area of its ring by each side of the drawing, (m,) m².
+        """Return by how much each side of the drawing changes the area of its ring, (m,) m².
 
-        This is the signed area between the side and the run of the outline that it stands for. The sum over a
-        ring is the difference of the areas of the rings.
+        This is the signed area between the side and the run of the outline that it represents. Summed over a
+        ring, it is the total change of the ring's area.
         """
         outline = self.outline
         drawing = self.drawing
         first = drawing.vertex
         last = drawing.vertex[drawing.after]
-        # Areas along the outline are summed up from the first vertex of the ring; a run that passes that
-        # vertex needs the sum over the whole ring, too.
+        # Areas along the outline are summed up from the first vertex of each ring. A run that passes this
+        # vertex also needs the sum over the whole ring.
         local = outline.points - outline.points[outline.starts[outline.ring]]
         total = np.append(0.0, np.cumsum(compute_cross(local, local[outline.after])))
         run = total[last] - total[first]
@@ -163,7 +164,7 @@ class SimplificationCheck:
         -------
         polygons : MultiPolygon, m
         wrong : (k,) array of bool
-            All False if the polygons are valid.
+            Vertices near the crossings. All False if the polygons are valid.
         """
         outline = self.outline
         allowed = self.allowed
@@ -182,12 +183,12 @@ class SimplificationCheck:
         if (allowed[wrong] == self.tolerance).any():
             self.problems["point"] += int(np.count_nonzero(is_crossing))
         if not wrong.any():
-            # A ring lies where it must not, without crossing anything.
+            # A ring is in the wrong place without crossing anything, such as a hole outside its polygon.
             wrong = allowed > 0.0
         return polygons, wrong
 
     def find_closed_gaps(self, polygons: MultiPolygon) -> BoolArray | None:
-        """Find the surroundings of gaps that a robot does not pass any more.
+        """Find the vertices around gaps through which a robot no longer fits.
 
         Parameters
         ----------
@@ -199,7 +200,7 @@ class SimplificationCheck:
         (k,) array of bool, or None if there are too many gaps to check
         """
         drawing = self.drawing
-        # A side from or to the midpoint of a short side stands for all of that.
+        # A side that starts or ends at the midpoint of a short side represents the whole short side.
         first = drawing.vertex
         last = np.ceil(drawing.source[drawing.after]).astype(np.intp)
         paths = self._build_paths(first, last)
@@ -219,7 +220,7 @@ class SimplificationCheck:
         return wrong
 
     def _build_paths(self, first: IntArray, last: IntArray) -> Array:
-        """Return the run of the outline that each side of the drawing stands for, as linestrings."""
+        """Return the run of the outline that each side of the drawing represents, as (m,) linestrings."""
         outline = self.outline
         starts = outline.starts[self.drawing.ring]
         size = outline.size[self.drawing.ring]
@@ -229,7 +230,7 @@ class SimplificationCheck:
         return np.asarray(shapely.linestrings(outline.points[index], indices=line))
 
     def _choose_loose(self, vertices: IntArray, middle: Array) -> IntArray:
-        """Return the vertices around a gap that may still move, those near its middle if there are any."""
+        """Return the vertices around a gap that may still move; those near its middle if there are any."""
         loose = vertices[self.allowed[vertices] > 0.0]
         distance = np.hypot(*(self.outline.points[loose] - middle).T)
         nearby: IntArray = loose[distance <= self.width + 3 * self.tolerance]

@@ -1,4 +1,4 @@
-"""Gaps between walls that a robot passed before the walls were moved, and does not pass any more."""
+"""Gaps between walls through which a robot fitted before the walls were moved, but no longer fits."""
 
 import numpy as np
 import shapely
@@ -7,22 +7,24 @@ from shapely import MultiPolygon, STRtree
 from robocov.arrays import Array, IntArray
 
 _SIDES_AT_ONCE = 2048
-"""Number of sides compared at once, which bounds the memory."""
+"""Number of sides compared at once, to limit the memory."""
 _MAX_GAPS = 200_000
 _MAX_RAY_CROSSINGS = 300_000_000
-"""Number of sides crossed by the rays that decide which points are inside."""
+"""Maximum number of sides crossed by the rays that decide which points are inside."""
 _PASSABLE = 1 + 1e-6
-"""A gap must be wider than a robot by this factor to be passable."""
+"""A robot fits through a gap that is wider than the robot by this factor."""
 
 
 def count_ray_crossings(sides: Array, y: Array) -> int:
-    """Count how often sides cross horizontal lines: the cost of deciding which points are inside.
+    """Count how often sides cross horizontal lines.
+
+    The count is the cost of deciding which points at these heights are inside the sides.
 
     Parameters
     ----------
     sides : (n,) array of LineString
     y : (m,) array, m
-        Heights of the lines.
+        Heights of the horizontal lines.
     """
     bounds = shapely.bounds(sides)
     low = np.sort(bounds[:, 1])
@@ -40,11 +42,11 @@ def find_closed_gaps(
     Parameters
     ----------
     sides : (m, 2, 2) array, m
-        Start and end of each side of the walls as they are now.
+        Start and end of each side of the simplified walls.
     paths : (m,) array of LineString, m
-        The walls that each side stands for, as they were.
+        The run of the original walls that each side represents.
     free : MultiPolygon, m
-        The free space as it is now.
+        The simplified free space.
     width : float, m
         Diameter of a robot.
     moved : float, m
@@ -53,9 +55,9 @@ def find_closed_gaps(
     Returns
     -------
     pairs : (p, 2) array of int
-        The sides on both sides of each gap.
+        Indices of the two sides that form each gap.
     middles : (p, 2) array, m
-        Middles of the gaps.
+        Midpoints of the gaps.
 
     None is returned if there are too many gaps to check.
     """
@@ -75,27 +77,30 @@ def find_closed_gaps(
     windows = shapely.box(*(middles - reach).T, *(middles + reach).T)
     first = shapely.intersection(paths[pairs[:, 0]], windows)
     second = shapely.intersection(paths[pairs[:, 1]], windows)
-    # A wall that does not reach into the window was farther away.
+    # A wall outside the window was farther away: its distance is nan.
     distance_before = np.nan_to_num(shapely.distance(first, second), nan=np.inf)
     is_closed = distance_before > width * _PASSABLE
     return pairs[is_closed], middles[is_closed]
 
 
 def _find_narrow_pairs(sides: Array, lines: Array, width: float, moved: float) -> IntArray | None:
-    """Return pairs of sides that are closer than a robot is wide, (p, 2); None if they are too many."""
+    """Return the pairs of sides, (p, 2), between which a robot does not fit; None if there are too many.
+
+    Pairs that were too close before the walls moved are left out.
+    """
     tree = STRtree(lines)
     pairs = np.empty((0, 2), dtype=np.intp)
     for start in range(0, len(lines), _SIDES_AT_ONCE):
         chunk = lines[start : start + _SIDES_AT_ONCE]
         first, second = tree.query(chunk, predicate="dwithin", distance=width)
         first += start
-        # Neighbors meet in a corner.
+        # Adjacent sides meet at a corner and form no gap.
         is_apart = (first < second) & (sides[first, 1] != sides[second, 0]).any(axis=1)
         is_apart &= (sides[second, 1] != sides[first, 0]).any(axis=1)
         first = first[is_apart]
         second = second[is_apart]
         distance = shapely.distance(lines[first], lines[second])
-        # Two walls that are far closer now were close before.
+        # Each wall moved by at most `moved`: walls that are even closer were too close before.
         is_narrow = (distance < width) & (distance > width - 2 * moved)
         pairs = np.concatenate([pairs, np.column_stack([first[is_narrow], second[is_narrow]])])
         if len(pairs) > _MAX_GAPS:

@@ -1,4 +1,4 @@
-"""The outline of a free space before it is simplified, and the drawings of it with fewer vertices."""
+"""The outline of a free space before simplification, and drawings of it with fewer vertices."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -15,22 +15,22 @@ from robocov_app.formats.geometry.simplification.stairs import fit_walls, replac
 from robocov_app.formats.geometry.vectors import compute_dot
 
 _MAX_AREA_LOSS = 0.02
-"""Fraction of its area that a ring may lose or gain before the area is restored."""
+"""If the area of a ring changes by more than this fraction, it is restored."""
 _FULL_TOLERANCE_SIZE = 16
-"""Rings of the area of a square of this many tolerances get the whole tolerance, smaller ones less."""
+"""Rings as large as a square with a side of this many tolerances get the full tolerance, others less."""
 _MIN_TOLERANCE_CELLS = 0.4
-"""Tolerance, in cells, that even the smallest rings get."""
+"""Minimum tolerance, in cells, even for the smallest rings."""
 _MAX_RIGHT_ANGLE_COSINE = 1e-5
 _MAX_LINE_VERTICES = 1024
-"""Number of vertices between two fixed ones; the recursion of Douglas and Peucker may be as deep."""
+"""Maximum number of vertices between two fixed ones, which limits the recursion depth of Douglas-Peucker."""
 _MAX_THIN_WIDTH = 1.5
-"""Parts narrower than this many tolerances are thin."""
+"""Maximum width of a thin part, in tolerances."""
 _MIN_THIN_LENGTH = 2.5
-"""Thin parts shorter than this many tolerances are bumps."""
+"""Minimum length of a thin part, in tolerances; shorter ones are bumps."""
 _MIN_THIN_WIDTH = 0.01
-"""Thin parts narrower than this many tolerances are rounding errors."""
+"""Minimum width of a thin part, in tolerances; narrower ones are rounding errors."""
 _MAX_THIN_VERTICES = 80_000
-"""Outlines with more vertices are not searched for thin parts, which would take many seconds."""
+"""Maximum number of vertices for which thin parts are searched, because the search takes long."""
 
 
 class ThinParts(NamedTuple):
@@ -49,21 +49,21 @@ class ThinParts(NamedTuple):
 
 
 class OriginalOutline(RingVertices):
-    """All vertices of polygons.
+    """The outline of polygons, with all their vertices.
 
     Parameters
     ----------
     polygons : list of Polygon, m
     cell : float or None, m
-        Longer side of the cells that these polygons are the outline of, if any. The necks at which
-        obstacles touch are then replaced by the corners between them.
+        Longer side of the cells, if the polygons are an outline of cells. The necks between obstacles that
+        touch are then replaced by single corners.
 
     Attributes
     ----------
     owner : (r,) array of int
-        Polygon of each ring; its outer ring comes first.
+        Polygon of each ring; the outer ring of a polygon comes first.
     is_neck : (k,) array of bool
-        Whether a vertex stands for a neck.
+        Whether a vertex replaces a neck.
     cell : float or None, m
     """
 
@@ -84,14 +84,14 @@ class OriginalOutline(RingVertices):
         self.cell = cell
 
     def draw(self, tolerance: Array, is_fixed: BoolArray) -> RingVertices:
-        """Draw the outline with fewer vertices.
+        """Draw the outline with fewer vertices, by the algorithm of Douglas and Peucker.
 
         Parameters
         ----------
         tolerance : (k,) array, m
-            Where it is 0, vertices stay.
+            Tolerance at each vertex; a vertex with tolerance 0 stays.
         is_fixed : (k,) array of bool
-            These vertices stay, or the midpoints of sides that stand for them.
+            Vertices that stay; where a midpoint has replaced them, the midpoint stays.
 
         Returns
         -------
@@ -105,7 +105,7 @@ class OriginalOutline(RingVertices):
         stays = is_fixed[path.vertex] | (is_midpoint & is_fixed[self.after[path.vertex]])
         stays |= path.find_extremes() | (allowed == 0.0)
         stays |= np.arange(len(allowed)) % _MAX_LINE_VERTICES == 0
-        # Small rings have few corners to lose.
+        # Small rings get a smaller tolerance, because they have few corners to lose.
         min_tolerance = 0.0 if self.cell is None else _MIN_TOLERANCE_CELLS * self.cell
         max_tolerance = np.maximum(np.sqrt(np.abs(self.areas)) / _FULL_TOLERANCE_SIZE, min_tolerance)
         kept, starts = path.simplify(allowed, stays, max_tolerance)
@@ -115,14 +115,15 @@ class OriginalOutline(RingVertices):
         return fit_walls(path, kept, drawing, allowed[kept])
 
     def restore_areas(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
-        """Give rings of a drawing their original area back where they lost or gained much of it.
+        """Restore the original area of the rings of a drawing that have lost or gained much of it.
 
         All sides of such a ring move by the same distance, at most half the tolerance. Small round obstacles
-        need it: with few corners, all of them on the circle, they would shrink.
+        need this: with few corners, all of them on the circle, they would shrink.
         """
         areas_before = self.areas
         areas_after = drawing.areas
         has_changed = np.abs(areas_after - areas_before) > _MAX_AREA_LOSS * np.abs(areas_before)
+        # Rings that lost more than half of their area, or changed orientation, are not restored.
         has_changed &= 2 * areas_after * np.sign(areas_before) > np.abs(areas_before)
         if not has_changed.any():
             return drawing
@@ -135,12 +136,15 @@ class OriginalOutline(RingVertices):
         ring_distance = np.where(has_changed, (areas_before - areas_after) / perimeter, 0.0)
         distance = np.clip(ring_distance[drawing.ring], -max_distance, max_distance)
         both_normals = normal + normal[drawing.before]
-        # A corner moves farther than its sides, a sharp one up to twice as far.
+        # A corner moves farther than its sides: a sharp one moves up to twice as far.
         scale = distance / np.maximum(compute_dot(both_normals, both_normals) / 2, 0.5)
         return RingVertices(drawing.points + scale[:, None] * both_normals, drawing.starts, drawing.source)
 
     def restore_necks(self, drawing: RingVertices) -> RingVertices:
-        """Insert the necks of the outline into a drawing; the source of each vertex is its vertex there."""
+        """Insert the necks of the outline into a drawing.
+
+        The ``source`` of the result refers to the vertices of `drawing`.
+        """
         points = drawing.points
         is_neck = self.is_neck[drawing.vertex] & (drawing.source == drawing.vertex)
         if self.cell is None or not is_neck.any():
@@ -150,19 +154,20 @@ class OriginalOutline(RingVertices):
         neighbor = np.where(is_second, drawing.after[doubled], drawing.before[doubled])
         vector = points[neighbor] - points[doubled]
         length = np.maximum(np.hypot(*vector.T), 1e-300)
+        # A neck takes at most 0.4 of a side, so that the necks at both of its ends do not meet.
         fraction = np.where(is_neck[doubled], np.minimum(NECK * self.cell / length, 0.4), 0.0)
         starts = np.searchsorted(doubled, drawing.starts)
         return RingVertices(points[doubled] + fraction[:, None] * vector, starts, doubled.astype(float))
 
     @cached_property
     def walls(self) -> STRtree:
-        """The sides of all rings."""
+        """Search tree of the sides of all rings."""
         return STRtree(shapely.linestrings(self.endpoints))
 
     def restrain(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
-        """Put vertices of a drawing back that are farther from all walls than the tolerance."""
+        """Move vertices of a drawing back to their origin if they are farther from all walls than allowed."""
         vertex = drawing.vertex
-        # A vertex comes from a vertex of the outline, or from the midpoint of the side after it.
+        # A source of k + 0.5 is the midpoint of the side after vertex k.
         half = (drawing.source % 1.0)[:, None]
         origin = (1.0 - half) * self.points[vertex] + half * self.points[self.after[vertex]]
         moved = np.flatnonzero((drawing.points != origin).any(axis=1))
@@ -179,7 +184,7 @@ class OriginalOutline(RingVertices):
         Parameters
         ----------
         free : MultiPolygon, m
-            The free space that this is the outline of.
+            The free space whose outline this is.
         tolerance : float, m
 
         Returns
@@ -202,19 +207,19 @@ class OriginalOutline(RingVertices):
         return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
 
     def to_polygons(self, drawing: RingVertices) -> MultiPolygon:
-        """Return the polygons of a drawing of this outline, m; perhaps invalid."""
+        """Return the polygons of a drawing of this outline, m. They may be invalid."""
         rings = shapely.linearrings(drawing.points, indices=drawing.ring)
         return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
 
 
 def _remove_necks(rings: RingVertices, cell: float) -> tuple[RingVertices, BoolArray]:
-    """Replace necks, short sides between two at right angles, by the corner between them.
+    """Replace each neck, a short side between two perpendicular ones, by the corner where these would meet.
 
     Returns
     -------
     rings : RingVertices
     is_neck : (k,) array of bool
-        Which vertices stand for a neck.
+        Which vertices replace a neck.
     """
     before = rings.before
     after_next = rings.after[rings.after]
@@ -222,6 +227,7 @@ def _remove_necks(rings: RingVertices, cell: float) -> tuple[RingVertices, BoolA
     direction = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
     is_neck = np.abs(compute_dot(direction, direction[after_next])) < _MAX_RIGHT_ANGLE_COSINE
     is_neck &= length < np.minimum(length[before], length[rings.after])
+    # A neck is the diagonal of a square of side NECK, in cells; the factor allows for rounding.
     is_neck &= length < 1.001 * np.sqrt(2) * NECK * cell
     corner = rings.points + compute_dot(rings.sides, direction)[:, None] * direction
     points = np.where(is_neck[:, None], corner, rings.points)

@@ -1,4 +1,4 @@
-"""The vertices of many rings in flat arrays, so that whole outlines are processed at once."""
+"""The vertices of many rings in flat arrays, so that a whole outline is processed at once."""
 
 from functools import cached_property
 
@@ -9,11 +9,11 @@ from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_
 from robocov_app.formats.geometry.vectors import compute_cross
 
 _EXTREME_DIGITS = 6
-"""Decimals of relative distances, so that rounding does not decide between equally far vertices."""
+"""Decimals of relative distances, so that rounding errors do not decide between equidistant vertices."""
 
 
 class RingVertices:
-    """The vertices of the rings of polygons, ring after ring; the first of a ring is not repeated.
+    """The vertices of the rings of polygons, ring after ring, without repeating the first of each ring.
 
     Parameters
     ----------
@@ -21,14 +21,13 @@ class RingVertices:
     starts : (r,) array of int
         Index of the first vertex of each ring; no ring is empty.
     source : (k,) array
-        Index of the vertex of the original outline that each vertex is. An index plus one half is the
-        midpoint of the side after that vertex. Along a ring the values increase, except for one step
-        back to the lowest.
+        Index of each vertex in the original outline. An index plus one half stands for the midpoint of the
+        side after that vertex. Along a ring the values increase, except for one step back to the lowest.
 
     Attributes
     ----------
     vertex : (k,) array of int
-        ``source`` without the halves.
+        ``source`` rounded down.
     size : (r,) array of int
         Number of vertices of each ring.
     ring : (k,) array of int
@@ -71,7 +70,10 @@ class RingVertices:
         return np.stack([self.points, self.points[self.after]], axis=1)
 
     def find_extremes(self) -> BoolArray:
-        """Select two vertices of each ring that are far from each other, (k,)."""
+        """Return a mask, (k,), of two vertices of each ring that are far from each other.
+
+        The first is the farthest from the mean of the vertices, the second the farthest from the first.
+        """
         reference = np.add.reduceat(self.points, self.starts, axis=0) / self.size[:, None]
         is_extreme = np.zeros(len(self.points), dtype=bool)
         for _ in range(2):
@@ -85,14 +87,14 @@ class RingVertices:
     def simplify(
         self, tolerance: Array, is_fixed: BoolArray, max_tolerance: Array
     ) -> tuple[IntArray, IntArray]:
-        """Drop vertices by the algorithm of Douglas and Peucker, between vertices that are fixed.
+        """Drop vertices between fixed ones, by the algorithm of Douglas and Peucker.
 
         Parameters
         ----------
         tolerance : (k,) array, m
-            Where it changes along a ring, the vertices on both sides are fixed.
+            Tolerance at each vertex. Where it changes along a ring, the vertices on both sides are fixed.
         is_fixed : (k,) array of bool
-            At least one vertex of each ring.
+            Vertices that stay, at least one in each ring.
         max_tolerance : (r,) array, m
             Upper limit of the tolerance in each ring.
 
@@ -110,7 +112,7 @@ class RingVertices:
         # Between its ends, a line has a single tolerance.
         second = vertex[find_run_starts(line) + 1]
         line_tolerance = np.minimum(tolerance[second], max_tolerance[self.ring[second]])
-        # The index of a vertex travels through GEOS as the third coordinate.
+        # GEOS preserves the third coordinate, which here is the index of the vertex.
         lines = shapely.linestrings(np.column_stack([self.points[vertex], vertex]), indices=line)
         simple = shapely.simplify(lines, line_tolerance, preserve_topology=False)
         coordinates, line = shapely.get_coordinates(simple, include_z=True, return_index=True)
@@ -119,10 +121,13 @@ class RingVertices:
         return kept, np.searchsorted(self.ring[kept], np.arange(len(self.starts)))
 
     def _split_at(self, is_fixed: BoolArray) -> tuple[IntArray, IntArray]:
-        """Split each ring into lines from one fixed vertex to the next; return vertices and their lines."""
+        """Split each ring into lines from one fixed vertex to the next.
+
+        Two arrays are returned: the index of each vertex along the lines, and the number of its line.
+        """
         size = self.size
         index = np.arange(len(is_fixed))
-        # Each ring is followed from its first fixed vertex around to that vertex again.
+        # Each ring is traversed from its first fixed vertex back to that vertex.
         first = np.minimum.reduceat(np.where(is_fixed, index, len(is_fixed)), self.starts)
         ring = np.arange(len(self.starts)).repeat(size + 1)
         step = concatenate_ranges(np.zeros_like(size), size + 1)

@@ -1,13 +1,12 @@
-"""Simplification of a free space: fewer vertices, with the same passages and sizes.
+"""Simplification of a free space: fewer vertices, but the same passages and sizes.
 
-Walls move by at most the tolerance. Afterwards it is checked that no outline meets another one or
-itself, that every obstacle and every part that is as thin as the tolerance keeps its size, and that a robot
-passes through the same passages as before. If a check fails, the tolerance is reduced around that position,
-and the import report mentions it.
+Walls move by at most the tolerance. Checks then ensure that no outline meets itself or another one, that
+obstacles and parts as thin as the tolerance keep their sizes, and that a robot fits through the same passages
+as before. If a check fails, the tolerance is reduced around that position, and the import report mentions it.
 
-The outline of cells along a wall at an angle consists of stairs, which are replaced by the midpoints of their
-steps (see `stairs`). Then the algorithm of Douglas and Peucker drops the vertices that are within
-the tolerance, between vertices that must stay.
+The outline of cells along an oblique wall consists of stairs, which are replaced by the midpoints of their
+steps (see `stairs`). Then the algorithm of Douglas and Peucker drops vertices within the tolerance, between
+vertices that must stay.
 
 D. H. Douglas, T. K. Peucker, Algorithms for the reduction of the number of points required to represent
 a digitized line or its caricature, Cartographica 10 (1973), 112-122.
@@ -29,16 +28,16 @@ from robocov_app.formats.geometry.simplification.checks import (
 from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline
 
 DEFAULT_TOLERANCE_M = 0.02
-"""Distance by which walls of vector formats may move."""
+"""Distance by which walls may move by default in vector formats."""
 _MIN_CELLS = 16
-"""Rings of fewer cells stay as they are: the cells are the best description of them."""
+"""Rings of fewer cells are not simplified: the cells describe them best."""
 _MAX_HALVINGS = 3
-"""Number of times that the tolerance around a point is halved before all vertices near it are kept."""
+"""Number of times that the tolerance at a vertex is halved before it becomes 0, so that the vertex stays."""
 _PATIENT_ROUNDS = 24
-"""Number of rounds after which whole walls stay instead of single vertices."""
+"""Number of rounds after which whole walls, not only single vertices, are excluded from simplification."""
 _MAX_ROUNDS = 60
 _MAX_VERTEX_ROUNDS = 1_000_000
-"""Number of rounds times the number of vertices after which everything stays."""
+"""Limit on the number of rounds times the number of vertices, after which the space is not simplified."""
 
 
 class SimplifiedSpace(NamedTuple):
@@ -50,7 +49,7 @@ class SimplifiedSpace(NamedTuple):
     tolerance : float, m
         Distance by which walls may have moved.
     changed : tuple of str
-        Where and why less was simplified, for the import report.
+        Lines of the import report about where and why less was simplified.
     """
 
     free: MultiPolygon
@@ -61,7 +60,7 @@ class SimplifiedSpace(NamedTuple):
 def simplify_free_space(
     free: MultiPolygon, tolerance: float, cell: float | None, radius: float
 ) -> SimplifiedSpace:
-    """Simplify a free space.
+    """Reduce the number of vertices of a free space.
 
     Parameters
     ----------
@@ -70,9 +69,9 @@ def simplify_free_space(
     tolerance : float, m
         Distance by which walls may move.
     cell : float or None, m
-        Side of the cells that the free space consists of, if it does.
+        Side of the cells, if the free space consists of cells.
     radius : float, m
-        Radius of a robot, which passes through the same passages as before.
+        Radius of a robot, which must fit through the same passages as before.
 
     Returns
     -------
@@ -120,19 +119,21 @@ def simplify_free_space(
 def _tighten(
     check: SimplificationCheck, wrong: BoolArray, far: BoolArray, is_fixed: BoolArray, *, whole_walls: bool
 ) -> None:
-    """Reduce the tolerances of a check where something is wrong, and fix vertices that are too far away."""
+    """Reduce the tolerance at the vertices in `wrong`, and fix those in `far`, for the next round.
+
+    With `whole_walls`, all vertices that share a side of the drawing with one of these stay.
+    """
     allowed: Array = check.allowed
     wrong |= far & is_fixed
     is_fixed |= far
     if whole_walls:
-        # Everything that a side stands for together with one of these stays.
         allowed[np.isin(check.side, check.side[wrong | far])] = 0.0
     allowed[wrong] /= 2
     allowed[allowed < 0.75 * check.tolerance * 0.5**_MAX_HALVINGS] = 0.0
 
 
 def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]:
-    """Return the lines of the import report about walls that were simplified less."""
+    """Return the lines of the import report about places that were simplified less."""
     reasons = {
         "narrow passage": f"so that a robot of radius {radius:g} m passes where it passed",
         "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",

@@ -1,7 +1,7 @@
-"""Stairs of cells: flights of short sides that stand for a wall at an angle to the grid.
+"""Stairs of cells: runs of short sides that represent a wall oblique to the grid.
 
-Every short side between two opposite turns becomes its midpoint. These midpoints lie along the wall to
-within a third of a cell, so that lines fitted to them are better than lines through corners of cells.
+Every short side between a left and a right turn is replaced by its midpoint. The midpoints are within a third
+of a cell of the wall, so lines fitted to them are more accurate than lines through corners of cells.
 """
 
 from typing import NamedTuple
@@ -13,13 +13,13 @@ from robocov_app.formats.geometry.simplification.ring_vertices import RingVertic
 from robocov_app.formats.geometry.vectors import compute_cross, intersect_lines, project_onto_lines
 
 _MIN_STAIRS_TOLERANCE = 0.75
-"""Tolerance, in cells, above which stairs are replaced by lines."""
+"""Minimum tolerance, in cells, at which stairs are replaced by lines."""
 _MIN_STAIRS_SIZE = 8.0
-"""Side, in cells, of the square that is as large as the smallest ring whose stairs are replaced."""
+"""Minimum size of a ring whose stairs are replaced: square root of its area, in cells."""
 _MIN_MIDPOINTS = 3
-"""Number of midpoints that a line is fitted to."""
+"""Minimum number of midpoints to which a line is fitted."""
 _MIN_SINE = 0.2
-"""Sine of the angle between two lines below which their intersection is not used."""
+"""Two lines are intersected only if the sine of the angle between them is larger."""
 
 
 def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> RingVertices:
@@ -45,7 +45,7 @@ def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> Ring
     is_loose = (tolerance >= _MIN_STAIRS_TOLERANCE * cell) & is_large[outline.ring]
     is_short = outline.lengths <= cell * (1 + 1e-6)
     is_step = is_short & (turn * turn[after] < 0) & is_loose & is_loose[after]
-    # Each vertex is followed by the midpoint of the side after it; at most one of both remains.
+    # Each vertex is followed by the midpoint of the next side. At most one of the two remains.
     is_kept = np.column_stack([~(is_step | is_step[outline.before]), is_step]).ravel()
     with_midpoints = np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)
     source = np.column_stack([outline.source, outline.source + 0.5]).ravel()
@@ -54,17 +54,18 @@ def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> Ring
 
 
 def fit_walls(path: RingVertices, kept: IntArray, drawing: RingVertices, tolerance: Array) -> RingVertices:
-    """Move the sides of a drawing onto the stairs that they stand for, and restore cut corners.
+    """Move the sides of a drawing onto the walls whose stairs they represent, and restore cut corners.
 
-    A side that stands for stairs becomes the least-squares line of their midpoints, and ends where that line
-    meets its neighbors. A short side between two long ones that meet nearby is a cut corner.
+    A side that represents stairs becomes the least-squares line through their midpoints, and ends where that
+    line meets the lines of the adjacent sides. A short side between two long ones whose lines meet nearby is
+    a cut corner, and is replaced by the point where they meet.
 
     Parameters
     ----------
     path : RingVertices
         Result of `replace_stairs`.
     kept : (m,) array of int
-        Vertices of the path that the drawing consists of.
+        Indices of the vertices of the path of which the drawing consists.
     drawing : RingVertices
     tolerance : (m,) array, m
 
@@ -75,18 +76,19 @@ def fit_walls(path: RingVertices, kept: IntArray, drawing: RingVertices, toleran
     points = drawing.points
     stairs = _fit_stairs(path, kept, drawing)
     move = _move_to_stairs(drawing, stairs)
+    # Only vertices next to stairs move, and only up to twice the tolerance.
     move[~(stairs.is_stairs | stairs.is_stairs[drawing.before])] = 0.0
     move[np.hypot(*move.T) > 2 * tolerance] = 0.0
     corners = _find_cut_corners(drawing, stairs, tolerance)
     move[corners.is_cut] = corners.positions[corners.is_cut] - points[corners.is_cut]
-    # The second end of a cut corner is dropped.
+    # The side of a cut corner becomes one point: its first end moves there, its second end is dropped.
     is_kept = ~corners.is_cut[drawing.before]
     starts = np.searchsorted(drawing.ring[is_kept], np.arange(len(drawing.starts)))
     return RingVertices((points + move)[is_kept], starts, drawing.source[is_kept])
 
 
 class _StairLines(NamedTuple):
-    """A line for each of m sides: a point on it, m, and its direction; and which sides stand for stairs."""
+    """A line for each of m sides, as a point on it, m, and a direction; and which sides represent stairs."""
 
     is_stairs: BoolArray
     origins: Array
@@ -94,17 +96,17 @@ class _StairLines(NamedTuple):
 
 
 class _CutCorners(NamedTuple):
-    """Which sides are cut corners, (m,), and where these corners are, (m, 2) m."""
+    """Which of m sides are cut corners, and where each corner would be, (m, 2) m."""
 
     is_cut: BoolArray
     positions: Array
 
 
 def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _StairLines:
-    """Fit a line to the midpoints of stairs that each side stands for, else take the side itself."""
+    """Fit a line to the midpoints of the stairs that each side represents; other sides are their own line."""
     count = path.size[drawing.ring]
     first = path.starts[drawing.ring]
-    # The vertices of the path between each kept vertex and the next one, around the ring.
+    # The vertices of the path between each kept vertex and the next, which may be past the end of the ring.
     length = np.maximum((kept[drawing.after] - kept) % count - 1, 0)
     side = np.arange(len(kept)).repeat(length)
     inner = first[side] + (concatenate_ranges(kept + 1, length) - first[side]) % count[side]
@@ -116,11 +118,12 @@ def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _S
     def average(values: Array) -> Array:
         return np.asarray(np.bincount(side, values, len(kept)) / np.maximum(number, 1))
 
-    # Relative to the first vertex of the side, as squares of large coordinates would cancel.
+    # Relative to the first vertex of the side, to avoid cancellation in the squares of large coordinates.
     x, y = (path.points[inner] - drawing.points[side]).T
     center = np.column_stack([average(x), average(y)])
     x = x - center[side, 0]
     y = y - center[side, 1]
+    # Principal axis of the midpoints, which is their total least-squares line.
     angle = np.arctan2(2 * average(x * y), average(x * x) - average(y * y)) / 2
     fitted = np.column_stack([np.cos(angle), np.sin(angle)])
     is_stairs = (number >= _MIN_MIDPOINTS) & (2 * number >= length)
@@ -133,12 +136,12 @@ def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _S
 
 
 def _move_to_stairs(drawing: RingVertices, lines: _StairLines) -> Array:
-    """Return the vectors from the vertices to where the lines before and after them meet, (m, 2) m."""
+    """Return the vector, (m, 2) m, from each vertex to the point where the lines before and after it meet."""
     before = drawing.before
     previous_origins = lines.origins[before]
     previous_directions = lines.directions[before]
     meeting, sine = intersect_lines(previous_origins, previous_directions, lines.origins, lines.directions)
-    # Almost parallel lines have no accurate intersection; the vertex is placed half-way between them.
+    # Nearly parallel lines have no accurate intersection; the vertex is placed midway between them.
     first_foot = project_onto_lines(drawing.points, previous_origins, previous_directions)
     second_foot = project_onto_lines(drawing.points, lines.origins, lines.directions)
     middle = (first_foot + second_foot) / 2
@@ -146,12 +149,12 @@ def _move_to_stairs(drawing: RingVertices, lines: _StairLines) -> Array:
 
 
 def _find_cut_corners(drawing: RingVertices, lines: _StairLines, tolerance: Array) -> _CutCorners:
-    """Find short sides between two long ones that meet nearby."""
+    """Find short sides between two long ones whose lines meet nearby; sides that represent stairs are not."""
     points = drawing.points
     after = drawing.after
     before = drawing.before
     length = drawing.lengths
-    # A side is only cut if both of its ends may move.
+    # Both ends of a side must be allowed to move.
     allowed = np.minimum(tolerance, tolerance[after])
     is_long = length > 4 * allowed
     positions, sine = intersect_lines(

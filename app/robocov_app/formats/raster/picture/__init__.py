@@ -1,4 +1,4 @@
-"""Pictures: `decoding` of files, `classification` of pixels as cells, the map (`reading`), and `writing`."""
+"""Pictures: `decoding` of files, `classification` of pixels as cells, `reading` of maps, and `writing`."""
 
 from robocov_app.formats.raster.picture.brightness import Brightness, describe_transparency
 from robocov_app.formats.raster.picture.decoding import is_picture, read_picture

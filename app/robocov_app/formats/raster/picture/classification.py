@@ -16,25 +16,25 @@ from robocov_app.formats.raster.picture.brightness import OPAQUE_ALPHA, STRIP_RO
 from robocov_app.formats.reports import format_area
 
 _MAX_LIGHT_RATIO = 0.02
-"""Light pixels for each dark one of a drawing on a transparent ground: soft edges."""
+"""Maximum ratio of light to dark pixels in a drawing on a transparent ground: light ones are soft edges."""
 _MAX_LINE_FRACTION = 0.25
-"""Fraction of the pixels that lines cover if they are walls."""
+"""Maximum fraction of the pixels that the lines of a plan cover."""
 _LINE_WIDTH_FRACTION = 0.05
-"""Width of a line, of the shorter side of a picture: no line is as wide."""
+"""Maximum width of a line, as a fraction of the shorter side of a picture."""
 _SOFT_EDGE_PX = 2
-"""Number of pixels from one color to the next."""
+"""Width of the soft edge between two colors, in pixels."""
 _DEFAULT_THRESHOLD = 0.5
 """Brightness, from 0 to 1, of the darkest free pixels."""
 _ROLE_LABELS: dict[Role, str] = {"free": "free", "solid": "obstacles", "ignore": "left out"}
 
 
 def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, list[str]]:
-    """Return the pixels as cells, and notes on the declared colors.
+    """Classify pixels as free, blocked or unknown cells; also return notes on the declared colors.
 
     Parameters
     ----------
     picture : Brightness
-        Its `roles` are changed where it is transparent.
+        Transparent pixels lose their role in `picture.roles`.
     options : ReadOptions
     """
     cells = _classify_brightness(picture, options)
@@ -57,11 +57,12 @@ def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, l
 
 
 def _get_role_code(role: Role) -> int:
+    """Return the code of a role in arrays of roles; see `NO_ROLE`."""
     return ROLES.index(role) + 1
 
 
 def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
-    """Return light pixels as free cells, or dark ones if the option ``invert`` is set."""
+    """Classify light pixels as free and dark ones as blocked; the option ``invert`` swaps them."""
     threshold = get_or_default(options.threshold, _DEFAULT_THRESHOLD)
     shade = np.arange(picture.full + 1) / picture.full
     is_free = shade >= threshold
@@ -72,7 +73,7 @@ def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
 
 
 def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]:
-    """Return a note on the fraction of the picture that each declared role covers."""
+    """Return, for each role with declared colors, a note on the fraction of the picture that it covers."""
     notes = []
     for role in ROLES:
         names = getattr(options, f"{role}_color")
@@ -86,10 +87,11 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
 def _free_soft_edges(
     cells: Cells, picture: Brightness, roles: NDArray[np.uint8], options: ReadOptions
 ) -> None:
-    """Make soft edges between a dark declared color and light paint free.
+    """Make the soft edges between light paint and a dark color declared free or ignored free.
 
-    Their mixed colors are neither; without this, they would become walls around such colors.
+    Soft edges have mixed colors without a role; they would become walls around the declared color.
     """
+    # 765 = 3 * 255: brightness from 0 to 1.
     declared = [sum(color) / 765 for color, role in options.build_color_key().entries if role != "solid"]
     if not declared or min(declared) >= 0.5:
         return
@@ -102,7 +104,7 @@ def _free_soft_edges(
 
 
 def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:
-    """Give ignored cells the value of the nearest other cell, or make them free if there is none near."""
+    """Replace each ignored cell by the nearest other cell; cells far from all others become free."""
     halo = STRIP_ROWS // 4
     original = cells.copy()
     for top in range(0, len(cells), STRIP_ROWS):
@@ -121,13 +123,13 @@ def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:
 
 
 def is_on_transparent_ground(cells: Cells) -> bool:
-    """Return whether a picture has only transparent and dark pixels, apart from soft edges."""
+    """Return whether a picture is mostly transparent, with dark paint and nothing light but soft edges."""
     counts = np.bincount(cells.ravel(), minlength=3)
     return bool(counts[FREE] < _MAX_LIGHT_RATIO * counts[BLOCKED] and counts[UNKNOWN] > counts[BLOCKED] > 0)
 
 
 def drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -> tuple[str, ...]:
-    """Make thin strokes free in `cells`, and return lines of the report."""
+    """Make strokes thinner than the option ``min_stroke`` free in `cells`; return lines of the report."""
     width = options.compute_stroke_width(cell)
     pixels = math.ceil(width / cell - 1e-9)
     if pixels > MAX_STROKE_PIXELS:
@@ -146,7 +148,7 @@ def drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) ->
 
 
 def _is_line_drawing(cells: Cells) -> bool:
-    """Return whether the free cells are thin lines on a dark ground, as in a blueprint."""
+    """Return whether the free cells are thin lines on a dark ground, such as in a blueprint."""
     free = cells == FREE
     if not 0.0 < free.mean() < _MAX_LINE_FRACTION:
         return False
@@ -155,7 +157,7 @@ def _is_line_drawing(cells: Cells) -> bool:
 
 
 def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: str) -> None:
-    """Raise MapError, with the cause, if no cell is free; `unknown` is the treatment of unknown cells."""
+    """Raise MapError if no cell is free, with the likely cause; `unknown` says what unknown cells become."""
     counts = np.bincount(cells.ravel(), minlength=3)
     if counts[FREE] or (unknown == "free" and counts[UNKNOWN]):
         return
@@ -172,7 +174,7 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: s
 
 
 def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str]:
-    """Return a note if nothing is solid, or if the free cells look like walls."""
+    """Return a note if nothing is solid, or if the light lines of a picture may be its walls."""
     counts = np.bincount(cells.ravel(), minlength=3)
     if not counts[BLOCKED] and unknown == "free" and counts[UNKNOWN]:
         percentage = 100 * counts[UNKNOWN] / cells.size

@@ -1,4 +1,4 @@
-"""Decoding pictures of every kind to their brightness."""
+"""Decoding of picture files of all supported formats."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ def is_picture(head: bytes) -> bool:
 
 
 def read_picture(path: Path, where: str, key: ColorKey = _NO_KEY) -> Brightness:
-    """Read a picture.
+    """Read and decode a picture file.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def read_picture(path: Path, where: str, key: ColorKey = _NO_KEY) -> Brightness:
     where : str
         Name of the file for messages.
     key : ColorKey
-        Colors whose roles are needed.
+        Declared colors, whose roles are found in the picture.
 
     Raises
     ------
     MapError
-        If the picture is broken or too large.
+        If the picture is damaged or too large.
     """
     data = files.read_content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):

@@ -1,7 +1,7 @@
 """Decoding PGM and PPM: https://netpbm.sourceforge.net/doc/pgm.html.
 
-Pillow is not used for them: it rescales pixels with a maximum other than 255 by rounding, which changes the
-result of ROS's thresholds, and takes half a second for a million pixels.
+Pillow is not used for these formats. It rescales pixels whose maximum is not 255, with rounding that changes
+the result of ROS's thresholds, and it takes half a second for a million pixels.
 """
 
 import re
@@ -21,7 +21,7 @@ from robocov_app.formats.raster.picture.brightness import (
 )
 
 _PIECE_BYTES = 1 << 20
-"""Number of bytes of plain text that are parsed at a time."""
+"""Number of bytes of a plain (text) file that are parsed at a time."""
 _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
 """Separator of the numbers in a header: white space or a comment."""
 _DIGITS = re.compile(rb"\d+")
@@ -30,7 +30,7 @@ _MAX_LEVEL = 65535
 
 
 def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
-    """Decode a PGM or PPM, raw or plain.
+    """Decode a PGM or PPM, whose levels may be binary ("raw") or text ("plain").
 
     Parameters
     ----------
@@ -38,16 +38,16 @@ def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
     where : str
         Name of the file for messages.
     key : ColorKey
-        Colors whose roles are needed.
+        Declared colors, whose roles are found in the picture.
 
     Raises
     ------
     MapError
-        If the picture is broken or too large.
+        If the picture is damaged or too large.
     """
     header = _parse_header(data, where)
     maximum = header.maximum
-    if data[1:2] in b"56":
+    if data[1:2] in b"56":  # P5 and P6 are binary, P2 and P3 are text
         levels: Any = _decode_raw(data, header, where)
     else:
         levels = _parse_plain(data[header.end :], header.level_count, where)
@@ -99,9 +99,9 @@ class _Header(NamedTuple):
 
 
 def _parse_header(data: bytes, where: str) -> _Header:
-    """Parse the type, the width, the height and the maximum level."""
+    """Parse the header: type (P2, P3, P5 or P6), width, height and maximum level."""
     numbers = []
-    at = 2
+    at = 2  # after the type
     for name in ("width", "height", "largest value"):
         blank = _BLANK.match(data, at)
         start = at
@@ -119,19 +119,19 @@ def _parse_header(data: bytes, where: str) -> _Header:
     if not 1 <= maximum <= _MAX_LEVEL:
         raise MapError(f"{where}: largest value: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
     channels = 1
-    if data[1:2] in b"36":
+    if data[1:2] in b"36":  # P3 and P6 are in color
         channels = 3
     return _Header(width, height, channels, maximum, at)
 
 
 def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
-    """Return the levels, of one or two bytes each; bytes after the picture are ignored."""
+    """Return the levels of a binary picture, of one or two bytes each; bytes after them are ignored."""
     raw: np.dtype[Any] = np.dtype(np.uint8)
     if header.maximum > 255:
         raw = np.dtype(">u2")
     count = header.level_count
     size = count * raw.itemsize
-    # One blank ends the header, or a line end of two bytes.
+    # One character of white space ends the header; some programs write a line end of two bytes.
     start = header.end + 1
     if data[header.end : header.end + 2] == b"\r\n" and len(data) - header.end - 2 >= size:
         start = header.end + 2
@@ -142,8 +142,8 @@ def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
 
 
 def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
-    """Return `count` levels that are written as text."""
-    shortest = 2 * count - 1  # a digit and a blank for each
+    """Parse `count` levels that are written as text, piece by piece to limit the memory."""
+    shortest = 2 * count - 1  # one digit for each level, with blanks between them
     if len(text) < shortest:
         raise MapError(f"{where}: cut off: {len(text)} bytes are too few for {count} pixels")
     if b"#" in text:

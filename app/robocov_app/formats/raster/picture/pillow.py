@@ -1,4 +1,4 @@
-"""Decoding PNG, JPEG, BMP, TIFF and PBM by Pillow."""
+"""Decoding PNG, JPEG, BMP, TIFF and PBM with Pillow."""
 
 import io
 import re
@@ -26,9 +26,9 @@ MAGIC_NUMBERS = {
     "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
     "PPM": re.compile(rb"P[14][\s#]"),
 }
-"""First bytes of the formats that Pillow reads, by its names for them."""
+"""First bytes of the formats that are decoded with Pillow, keyed by Pillow's names."""
 _MAX_JPEG_PIXELS_PER_BYTE = 512
-"""8 x 8 pixels take at least a bit; Pillow would fill missing ones with gray."""
+"""A complete JPEG has at least one bit for 8 x 8 pixels. Pillow would fill missing pixels with gray."""
 _MODES_WITH_ALPHA = ("LA", "PA", "RGBA", "La", "RGBa")
 
 
@@ -43,12 +43,12 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
     where : str
         Name of the file for messages.
     key : ColorKey
-        Colors whose roles are needed.
+        Declared colors, whose roles are found in the picture.
 
     Raises
     ------
     MapError
-        If the picture is broken, too large, or a TIFF whose samples are not brightness.
+        If the picture is damaged, too large, or a TIFF whose samples are not brightness.
     """
     import PIL.Image
 
@@ -74,7 +74,7 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
 
 
 class _UnclearSamplesError(ValueError):
-    """Samples of a TIFF do not define black and white."""
+    """The samples of a TIFF do not say which values are black and white."""
 
 
 def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
@@ -83,7 +83,7 @@ def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
     Raises
     ------
     _UnclearSamplesError
-        If there are other samples, such as heights.
+        If samples are outside this range, such as heights.
     """
     from PIL.ExifTags import Base
 
@@ -121,7 +121,7 @@ def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
 
 
 def _convert(image: Image, key: ColorKey) -> Brightness:
-    """Return a picture without its colors, turned as its metadata says."""
+    """Convert an opened picture to its brightness, rotated as its metadata says."""
     import PIL.ImageOps
     from PIL.ExifTags import Base
 
@@ -144,14 +144,14 @@ def _convert(image: Image, key: ColorKey) -> Brightness:
 
 
 def _convert_deep_samples(image: Image, tiff_tags: Any, key: ColorKey) -> Brightness:
-    """Convert a gray picture of more than 8 bits."""
+    """Convert a gray picture with samples of up to 16 bits."""
     from PIL.ExifTags import Base
 
     full = 65535
     level = np.asarray(image).astype(np.uint16)
     if tiff_tags:
         full = (1 << tiff_tags[Base.BitsPerSample][0]) - 1
-        if tiff_tags.get(Base.PhotometricInterpretation) == 0:
+        if tiff_tags.get(Base.PhotometricInterpretation) == 0:  # white is zero
             level = full - level
     shades = to_rgb(level[:, :, None], full)
     step = choose_thumbnail_step(image.width, image.height)
@@ -168,7 +168,7 @@ def _convert_bytes(
     is_gray: bool,
     has_alpha: bool,
 ) -> Brightness:
-    """Convert a picture of 8 bits; only a strip of it is copied at a time."""
+    """Convert a picture with 8 bits per channel, strip by strip to limit the memory."""
     shape = (image.height, image.width)
     level: Any
     if is_gray:
@@ -212,7 +212,7 @@ def _convert_bytes(
 
 
 def _shrink(strip: Image, step: int) -> NDArray[np.uint8]:
-    """Return a strip of a picture in its colors on white, `step` times smaller, (rows, columns, 3)."""
+    """Return a strip of a picture in color on white, reduced by the factor `step`, (rows, columns, 3)."""
     import PIL.Image
 
     small = strip

@@ -1,8 +1,8 @@
-"""Pictures: dark is an obstacle.
+"""Pictures, whose dark pixels are obstacles.
 
-`decoding` reads every kind of picture, and `classification` turns its pixels into cells. A picture that
-`robocov export` wrote has a text chunk with the side of a pixel in meters and the lower left corner, so that
-it is imported at the same position.
+`decoding` reads pictures of all formats, and `classification` turns their pixels into cells. A picture
+written by `robocov export` has a text chunk with the side of a pixel in meters and the lower left corner, so
+that it is imported at the same scale and position.
 """
 
 import json
@@ -33,7 +33,7 @@ GEOREFERENCE_CHUNK = "robocov"
 TITLE_CHUNK = "Title"
 """Key of the text chunk with the name of the map."""
 _JPEG_NOISE_CELLS = 1.5
-"""Single cells next to dark ones come from JPEG compression."""
+"""Obstacles of a JPEG that are smaller, in cells, are compression noise."""
 _MIN_CELL_M = 1e-6
 _MAX_CELL_M = 1e4
 
@@ -49,7 +49,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     Raises
     ------
     MapError
-        If the picture is broken, its scale is unknown, or no cell is free.
+        If the picture is damaged, its scale is unknown, or no cell is free.
     """
     where = to_one_line(path)
     picture = read_picture(path, where, options.build_color_key(PICTURE_TOLERANCE))
@@ -92,7 +92,10 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _parse_georeference(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
-    """Return the side of a pixel, m, and the lower left corner, m, from the text chunk of a picture."""
+    """Return the side of a pixel, m, and the lower left corner, m, from the text chunk of a picture.
+
+    Without a valid chunk, they are None and (0, 0).
+    """
     with suppress(ValueError, KeyError, TypeError, RecursionError, OverflowError):
         document = json.loads(picture.texts.get(GEOREFERENCE_CHUNK, ""))
         cell = float(document["cell_m"])

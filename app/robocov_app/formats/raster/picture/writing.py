@@ -1,4 +1,4 @@
-"""The free cells of maps as pictures in black and white."""
+"""Writing the free cells of maps as black-and-white pictures."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from robocov_app.formats.reports import ExportReport
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    """Write the free cells of an environment as a PNG in black and white.
+    """Write an environment as a black-and-white PNG, in which free cells are white.
 
     Raises
     ------

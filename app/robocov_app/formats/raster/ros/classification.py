@@ -1,13 +1,13 @@
 """Cells of a ROS map from the pixels of its picture.
 
-The rules are those of http://wiki.ros.org/map_server and of nav2_map_server in ROS 2. With p the darkness of
-a pixel from 0 to 1 (or its brightness, if `negate` is set), a cell of mode
+The rules are those of http://wiki.ros.org/map_server and of nav2_map_server in ROS 2. Let p be the darkness
+of a pixel from 0 to 1, or its brightness if `negate` is set. In the mode
 
-- trinary is occupied if p > occupied_thresh, free if p < free_thresh, else unknown; an alpha channel is
-  averaged in like a color;
-- scale is unknown if it is not opaque; between the thresholds, its occupancy rises from 0 to 100 %;
-- raw has the value of the pixel as its occupancy in %, and is unknown if that exceeds 100; `negate` and the
-  thresholds do not count.
+- trinary, a cell is occupied if p > occupied_thresh, free if p < free_thresh, and unknown otherwise; an alpha
+  channel is included in the average like a color;
+- scale, a cell is unknown if it is not opaque; between the thresholds, its occupancy rises from 0 to 100 %;
+- raw, the value of the pixel is the occupancy of the cell in %, and the cell is unknown if the value exceeds
+  100; `negate` and the thresholds are ignored.
 """
 
 import numpy as np
@@ -20,11 +20,11 @@ from robocov_app.formats.raster.picture import Brightness
 from robocov_app.formats.raster.ros.metadata import Metadata
 
 _DEFAULT_OCCUPANCY = 0.5
-"""Cells with this occupancy or a higher one are obstacles, in the modes scale and raw."""
+"""Occupancy, from 0 to 1, at which a cell becomes an obstacle in the modes scale and raw."""
 
 
 def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, where: str) -> Cells:
-    """Return the cells of a picture by the mode of its map.
+    """Classify the pixels of a picture as cells, according to the mode of its map.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
     Raises
     ------
     ParameterError
-        If the option ``threshold`` is given for the mode trinary, which has two of its own.
+        If the option ``threshold`` is given for the mode trinary, which has its own two thresholds.
     """
     threshold = get_or_default(options.threshold, _DEFAULT_OCCUPANCY)
     if metadata.mode == "raw":
@@ -60,7 +60,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
 
 
 def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied: float) -> Cells:
-    """Return the cells of a picture of mode trinary.
+    """Classify the pixels of a picture of mode trinary.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied
     level = picture.level
     full = picture.full
     if picture.alpha is not None:
-        # The mean of red, green, blue and alpha; in a gray picture, each color is the level.
+        # The sum of red, green, blue and alpha, each from 0 to 255; in a gray picture the colors are equal.
         color_sums = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)
         level = color_sums[level] + picture.alpha.astype(np.uint16)
         full = 4 * 255
@@ -91,14 +91,14 @@ def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied
 def classify_scale(
     picture: Brightness, *, negate: bool, free: float, occupied: float, threshold: float
 ) -> Cells:
-    """Return the cells of a picture of mode scale.
+    """Classify the pixels of a picture of mode scale.
 
     Parameters
     ----------
     picture, negate, free, occupied
         See `classify_trinary`.
     threshold : float
-        Occupancy, from 0 to 1, from which a cell is an obstacle.
+        Occupancy, from 0 to 1, at which a cell becomes an obstacle.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def classify_scale(
 
 
 def classify_raw(picture: Brightness, threshold: float) -> Cells:
-    """Return the cells, (rows, columns), of a picture of mode raw, whose pixels are the occupancy."""
+    """Classify the pixels of a picture of mode raw, whose values are the occupancy in percent."""
     occupancy = np.rint(_compute_darkness(picture.full, negate=True) * 255.0)
     table = _find_blocked_cells(occupancy, threshold)
     table[occupancy > 100.0] = UNKNOWN
@@ -129,5 +129,5 @@ def _compute_darkness(full: int, negate: bool) -> Array:
 
 
 def _find_blocked_cells(occupancy: Array, threshold: float) -> Cells:
-    """Return `BLOCKED` or `FREE` for occupancies in percent; a cell of 0 % is always free."""
+    """Return `BLOCKED` or `FREE` for each occupancy in percent; an occupancy of 0 % is always free."""
     return np.where(occupancy >= max(100.0 * threshold, 1.0), BLOCKED, FREE).astype(np.uint8)

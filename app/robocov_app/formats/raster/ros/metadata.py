@@ -11,10 +11,10 @@ Mode: TypeAlias = Literal["trinary", "scale", "raw"]
 """Encoding of occupancy in pixels; see `classification`."""
 OCCUPIED_THRESHOLD = 0.65
 FREE_THRESHOLD = 0.196
-"""Thresholds as map_server writes them."""
+"""Thresholds that map_server writes."""
 DEFAULT_THRESHOLDS = {"occupied_thresh": OCCUPIED_THRESHOLD, "free_thresh": FREE_THRESHOLD}
 UNKNOWN_LEVEL = 205
-"""Level, of 255, that map savers write for unknown cells."""
+"""Level (0 to 255) that map savers write for unknown cells."""
 _KNOWN_KEYS = ("image", "resolution", "origin", "negate", "mode", *DEFAULT_THRESHOLDS)
 _MIN_RESOLUTION_M = 1e-4
 _MAX_RESOLUTION_M = 1000.0
@@ -36,12 +36,13 @@ class Metadata:
     origin : (x, y), m
         Lower left corner.
     yaw : float, rad
+        Angle by which the map is rotated about that corner.
     negate : bool
         Whether light pixels are occupied, not dark ones.
     occupied, free : float
         Thresholds of darkness, from 0 to 1.
     missing_thresholds, unknown_keys : tuple of str
-        Keys that are missing, and keys that a map does not have.
+        Thresholds missing in the file, and keys in the file that ROS does not define.
     """
 
     image: str
@@ -57,7 +58,7 @@ class Metadata:
 
 
 def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
-    """Check the YAML of a map.
+    """Parse and check the YAML of a map.
 
     Parameters
     ----------
@@ -94,14 +95,14 @@ def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
 
 
 class _MetadataParser:
-    """Parses the values of a YAML."""
+    """Parses the values in the YAML of a map."""
 
     def __init__(self, document: dict[str, files.Value], where: str) -> None:
         self._document = document
         self._where = where
 
     def get_text(self, key: str, default: str | None = None) -> str:
-        """Return the text of a key. Raises MapError if it is missing without a default."""
+        """Return the text of a key; raise MapError if the key is missing and has no default."""
         value = self._document.get(key, default)
         if value is None:
             raise MapError(f"{self._where}: {key}: missing")
@@ -110,7 +111,7 @@ class _MetadataParser:
         return value
 
     def parse_number(self, key: str, default: str | None = None) -> float:
-        """Return the number of a key. Raises MapError if it is missing without a default."""
+        """Return the number of a key; raise MapError if it is invalid, or missing without a default."""
         return _parse_number(self.get_text(key, default), f"{self._where}: {key}")
 
     def parse_mode(self) -> Mode:
@@ -127,7 +128,7 @@ class _MetadataParser:
         origin = self._document.get("origin", ["0", "0", "0"])
         if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
             raise MapError(f"{where}: expected [x, y, yaw], got {quote(origin)}")
-        texts = [*origin, "0"]
+        texts = [*origin, "0"]  # the yaw may be missing
         x = _parse_number(texts[0], f"{where}[0]")
         y = _parse_number(texts[1], f"{where}[1]")
         yaw = _parse_number(texts[2], f"{where}[2]")
@@ -143,7 +144,7 @@ class _MetadataParser:
         return word in _TRUE_WORDS
 
     def parse_thresholds(self) -> tuple[float, float]:
-        """Return the thresholds of darkness of occupied and of free cells."""
+        """Return the thresholds of darkness for occupied cells and for free cells."""
         occupied, free = (self.parse_number(key, str(default)) for key, default in DEFAULT_THRESHOLDS.items())
         if not 0.0 <= free <= occupied <= 1.0:
             expected = "expected numbers from 0 to 1, the first not the larger"
@@ -153,7 +154,7 @@ class _MetadataParser:
 
 
 def _parse_number(text: files.Value, where: str) -> float:
-    """Return a finite number. Raises MapError if a value is not one."""
+    """Convert text to a finite number; raise MapError for invalid input."""
     value = files.parse_number(text) if isinstance(text, str) else math.nan
     if not math.isfinite(value):
         raise MapError(f"{where}: expected a number, got {quote(text)}")

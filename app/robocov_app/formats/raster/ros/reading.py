@@ -1,7 +1,8 @@
-"""ROS maps: YAML and a picture, as map_server and nav2 write them.
+"""ROS maps: a YAML file and a picture, as written by map_server and nav2.
 
-Cells with an occupancy of 50 % or more, or of the option ``threshold``, are obstacles. Single cells in the
-free space are noise, and dropped, unless `Shaping.specks` is given.
+In the modes scale and raw, cells with an occupancy of 50 % or more are obstacles; the option ``threshold``
+changes this limit. Single blocked cells in the free space are dropped as noise unless `Shaping.specks` is
+given.
 """
 
 import math
@@ -24,7 +25,7 @@ from robocov_app.formats.raster.ros.metadata import (
 )
 
 _NOISE_CELLS = 1.5
-"""Obstacles of fewer cells are noise of the robots that made the map."""
+"""Obstacles of fewer cells are sensor noise of the robots that made the map."""
 
 
 def sniff(path: Path, head: bytes) -> bool:
@@ -38,9 +39,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     Raises
     ------
     MapError
-        If a key is missing or wrong, the picture cannot be read, or no cell is free.
+        If a key is missing or invalid, the picture cannot be read, or no cell is free.
     ParameterError
-        If there is a threshold for a map of mode trinary.
+        If the option ``threshold`` is given for a map of mode trinary.
     """
     where = to_one_line(path)
     document = files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where)
@@ -86,7 +87,7 @@ def _describe_missing_thresholds(metadata: Metadata) -> list[str]:
 
 
 def _describe_transparency(picture: Brightness, mode: str) -> str:
-    """Return a note on transparent pixels, empty if they are unknown cells."""
+    """Return a note on transparent pixels; empty if there are none, or if they are unknown cells."""
     description = describe_transparency(picture)
     if not description or mode == "scale":
         return ""
@@ -97,7 +98,7 @@ def _describe_transparency(picture: Brightness, mode: str) -> str:
 
 
 def _describe_yaw(yaw_in_file: float, yaw: float) -> list[str]:
-    """Return a note on the yaw, rad, and its remainder within half a turn, if it turns the map."""
+    """Return a note if the map is rotated; `yaw` is that in the file reduced to half a turn, rad."""
     if yaw == 0.0:
         return []
     note = f"origin: turned by {math.degrees(yaw):.4g} degrees about the lower left corner"
@@ -108,7 +109,7 @@ def _describe_yaw(yaw_in_file: float, yaw: float) -> list[str]:
 
 
 def _describe_doubtful_cells(picture: Brightness, metadata: Metadata) -> list[str]:
-    """Return a note if cells that were saved as unknown count as free by the thresholds."""
+    """Return a note if the thresholds make cells free that were probably saved as unknown."""
     count = int(np.count_nonzero(picture.level == UNKNOWN_LEVEL))
     is_plain = not metadata.negate and picture.full == 255 and picture.alpha is None
     is_unknown_free = metadata.free > 1 - UNKNOWN_LEVEL / 255

@@ -1,7 +1,7 @@
-"""Maps of robocov as ROS maps.
+"""Writing maps as ROS maps.
 
-Cells outside of the boundary are unknown, except for those along the free space: these are occupied, so that
-planners which consider unknown cells passable stay inside.
+Cells outside the boundary are unknown, except for those next to the free space: these are occupied, so that
+planners that treat unknown cells as passable stay inside.
 """
 
 import json
@@ -28,9 +28,9 @@ from robocov_app.formats.raster.ros.metadata import FREE_THRESHOLD, OCCUPIED_THR
 from robocov_app.formats.reports import ExportReport
 
 _FREE_LEVEL = 254
-"""Level that map_saver writes for free cells; that of occupied ones is 0."""
+"""Level that map_saver writes for free cells. For occupied cells it is 0."""
 _SUBDIVISION = 4
-"""Subcells along each side of a cell; the solid fraction of them is its occupancy of scale and raw."""
+"""Subcells along each side of a cell; the solid fraction of them is its occupancy in modes scale and raw."""
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """File names that need no quotes in YAML."""
 
@@ -44,7 +44,7 @@ def list_files(path: Path, options: WriteOptions) -> tuple[Path, ...]:
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    """Write an environment as a YAML and a picture.
+    """Write an environment as a YAML file and a picture.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     is_pgm = image.suffix == ".pgm"
     grid = build_grid(environment, options.cell)
     free = find_free_cells(environment, grid)
-    # One cell all around the free space is occupied.
+    # The cells next to the free space stay occupied, even outside the boundary.
     walls_and_free = ndimage.binary_dilation(free, np.ones((3, 3), bool))
     unknown = ~(grid.find_covered_cells(environment.boundary_polygon) | walls_and_free)
     notes: tuple[str, ...] = ()
@@ -85,7 +85,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 
 
 def _quote_image_name(path: Path, image: Path) -> str:
-    """Return the name of the picture as it is written in the YAML at `path`."""
+    """Return the name of the picture as written in the YAML file `path`, in quotes if necessary."""
     if image == path:
         raise OutputError(f"{to_one_line(path)}: expected another name for the YAML than for the picture")
     try:
@@ -98,7 +98,7 @@ def _quote_image_name(path: Path, image: Path) -> str:
 def _compute_occupancy(environment: Environment, grid: CellGrid, free: BoolArray) -> NDArray[np.float32]:
     """Return the solid fraction of each cell.
 
-    A cell that is not free is fully occupied, because costmaps consider any lower occupancy free.
+    A cell that is not free counts as fully occupied, because costmaps treat any lower occupancy as free.
     """
     subcells = grid.find_covered_cells(environment.free, _SUBDIVISION)
     subcells = subcells.reshape(grid.rows, _SUBDIVISION, grid.columns, _SUBDIVISION)
@@ -122,7 +122,10 @@ def _build_raw_pixels(occupancy: NDArray[np.float32], unknown: BoolArray) -> NDA
 def _build_scale_pixels(
     occupancy: NDArray[np.float32], unknown: BoolArray, *, has_alpha: bool
 ) -> NDArray[np.uint8]:
-    """Return the pixels of a map of mode scale, (rows, columns) or (rows, columns, 2) with alpha."""
+    """Return the pixels of a map of mode scale, the bottom row first.
+
+    They are a (rows, columns) array, or (rows, columns, 2) with alpha, which is 0 for unknown cells.
+    """
     darkness = FREE_THRESHOLD + occupancy * (OCCUPIED_THRESHOLD - FREE_THRESHOLD)
     darkness = np.where(occupancy <= 0.0, 0.0, darkness)
     darkness = np.where(occupancy >= 1.0, 1.0, darkness)
@@ -136,7 +139,7 @@ def _build_scale_pixels(
 
 
 def _write_picture(path: Path, pixels: NDArray[np.uint8], cell: float) -> None:
-    """Write pixels, the bottom row first, as a PGM or PNG."""
+    """Write pixels, whose bottom row is first, as a PGM or PNG."""
     picture = np.ascontiguousarray(pixels[::-1])
     with replace_file(path) as temporary:
         if path.suffix == ".pgm":

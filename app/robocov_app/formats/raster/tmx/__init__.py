@@ -1,4 +1,4 @@
-"""Tile maps of Tiled: the map (`reading`), its layers, their grids of tiles, tilesets and objects."""
+"""Tile maps of Tiled: `reading` of maps, their layers, grids of tiles, tilesets and objects."""
 
 from robocov_app.formats.raster.tmx.reading import read, sniff
 

@@ -1,4 +1,4 @@
-"""Grids of tiles: layers of a size that the map gives, or chunks of an infinite map."""
+"""Grids of tiles: layers of the size that the map states, or chunks of an infinite map."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from robocov_app.formats.raster.tmx.tile_data import ID_MASK, GlobalIDs, decode_
 MAX_TILES = 4_000_000
 """Largest number of tiles of a map."""
 MAX_TILES_READ = 16_000_000
-"""Largest number of tiles of all its layers together."""
+"""Largest total number of tiles in all layers of a map."""
 
 
 class Window(NamedTuple):
-    """A rectangle of tiles: from `left` to below `right`, and from `top` to below `bottom`."""
+    """A rectangle of tiles; `right` and `bottom` are the first column and row outside of it."""
 
     left: int
     top: int
@@ -41,9 +41,9 @@ class TileLayers(NamedTuple):
     ----------
     layers : list of Layer
     grids : list of (rows, columns) arrays
-        The global IDs of each layer.
+        The global IDs of the tiles of each layer.
     window : Window
-        Position of the grids.
+        Columns and rows of the map that the grids cover.
     """
 
     layers: list[Layer]
@@ -52,7 +52,7 @@ class TileLayers(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """The tiles of a layer, or of a chunk of it, from a column and a row."""
+    """The tiles of a layer, or of a chunk of it, with the column and row of the first tile."""
 
     column: int
     row: int
@@ -77,7 +77,7 @@ def read_tile_layers(root: Element, layers: list[Layer]) -> TileLayers:
     Raises
     ------
     MapError
-        If the tiles cannot be decoded, are not those of a map of this size, or are too many.
+        If the tiles cannot be decoded, do not match the size of the map, or are too many.
     """
     reader = _PieceReader()
     pieces_of_layers = [list(reader.iterate_pieces(layer.element)) for layer in layers]
@@ -116,7 +116,7 @@ def _require_few_tiles(root: Element, window: Window, layer_count: int) -> None:
 
 
 def _combine(pieces: list[_Piece], window: Window) -> GlobalIDs:
-    """Return the pieces of a layer as a grid that fills the window."""
+    """Combine the pieces of a layer into a grid that fills the window."""
     grid = np.zeros(window.shape, np.uint32)
     for piece in pieces:
         left, top, right, bottom = piece.window
@@ -126,7 +126,7 @@ def _combine(pieces: list[_Piece], window: Window) -> GlobalIDs:
 
 
 def _crop_empty_edges(grids: list[GlobalIDs], window: Window) -> tuple[list[GlobalIDs], Window]:
-    """Return grids without the edges of chunks that are empty in all of them, and their window."""
+    """Remove rows and columns at the edges that are empty in all grids; return the grids and their window."""
     is_used = np.logical_or.reduce([grid & ID_MASK != 0 for grid in grids])
     if not is_used.any():
         return grids, window
@@ -146,7 +146,7 @@ def _crop_empty_edges(grids: list[GlobalIDs], window: Window) -> tuple[list[Glob
 
 
 class _PieceReader:
-    """Reads the tiles of layers, and limits their number."""
+    """Reads the tiles of layers, and limits their total number."""
 
     def __init__(self) -> None:
         self._tile_count = 0
@@ -168,7 +168,7 @@ class _PieceReader:
             yield _Piece(column, row, ids.reshape(height, width))
 
     def _parse_size(self, sized: Element, piece: Element) -> tuple[int, int]:
-        """Return the width and height of a piece, which are attributes of `sized`, and count its tiles."""
+        """Return the width and height in the attributes of `sized`, and count the tiles of the piece."""
         width = parse_integer(sized, "width", 1)
         height = parse_integer(sized, "height", 1)
         self._tile_count += width * height

@@ -1,4 +1,4 @@
-"""Layers of tiles and objects, in groups or not, selected by their names."""
+"""Layers of tiles and objects, possibly in groups, selected by their names."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Layer(NamedTuple):
     ----------
     element : Element
     labels : tuple of str
-        Its labels and those of the groups around it.
+        Labels of the layer and of the groups that contain it.
     offset : (2,) array, px
-        Offset, y down.
+        Offset of the layer on the map, with the y axis down.
     is_solid : bool
-        Whether it is selected, or says itself that it is solid.
+        Whether the user selects the layer, or the file declares it solid.
     """
 
     element: Element
@@ -40,13 +40,13 @@ class Layer(NamedTuple):
 
 
 def list_layers(root: Element, shapes: Shapes) -> list[Layer]:
-    """Return the layers of a map that are read; others are counted in `shapes` as left out."""
+    """Return the layers of a map to read; layers that the user skips are counted as left out."""
     surroundings = Layer(root, (), np.zeros(2), is_solid=False)
     return list(_iterate_layers(surroundings, shapes))
 
 
 def _iterate_layers(group: Layer, shapes: Shapes) -> Iterator[Layer]:
-    """Yield the layers of a group, and of groups in it."""
+    """Yield the layers of a group and, recursively, of the groups in it."""
     selection = shapes.labels
     for element in group.element.children:
         if element.tag not in ("layer", "objectgroup", "group"):

@@ -17,7 +17,7 @@ from robocov_app.formats.raster.tmx.tile_data import (
 )
 
 RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-"""Vertices of the square of side 1 from the origin, (4, 2)."""
+"""Vertices of the unit square with a corner at the origin, (4, 2)."""
 _DISC = CircleObstacle((0.0, 0.0), 1.0).polygon
 
 
@@ -27,9 +27,9 @@ class ObjectShape(NamedTuple):
     Attributes
     ----------
     kind : "polygon", "line", "point", "circle" or ""
-        Empty for a text, or an object that a template defines.
+        Empty for objects that are not read: texts, capsules, and objects defined by a template.
     points : (k, 2) array, px
-        Vertices, y down; of a circle its center and a point of its edge.
+        Vertices, with the y axis down. For a circle: its center and a point on its edge.
     """
 
     kind: Literal["polygon", "line", "point", "circle", ""]
@@ -37,7 +37,7 @@ class ObjectShape(NamedTuple):
 
 
 def parse_object(element: Element) -> ObjectShape:
-    """Return the shape of an object in the pixels of its layer.
+    """Return the shape of an object, in pixels of its layer.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def parse_object(element: Element) -> ObjectShape:
 def _parse_outline(
     element: Element, children: dict[str, Element], width: float, height: float
 ) -> ObjectShape:
-    """Return the shape of an object relative to its position, without its rotation."""
+    """Return the shape of an object relative to its position, before rotation."""
     rectangle = RECTANGLE * [width, height]
     if "polyline" in children:
         return ObjectShape("line", _parse_vertices(children["polyline"], 2))
@@ -76,7 +76,7 @@ def _parse_outline(
 
 
 def _parse_vertices(element: Element, minimum: int) -> Array:
-    """Return the vertices of a polygon or polyline, at least `minimum`."""
+    """Return the vertices of a polygon or polyline, (k, 2) px; raise MapError if there are too few."""
     numbers = element.parse_numbers("points")
     if len(numbers) % 2 or len(numbers) < 2 * minimum:
         element.refuse(f"points: expected {minimum} points, got {len(numbers)} numbers")
@@ -84,7 +84,7 @@ def _parse_vertices(element: Element, minimum: int) -> Array:
 
 
 def flip_points(points: Array, gid: int, size: Array) -> Array:
-    """Return points on the picture of a tile, flipped as the bits of its global ID say.
+    """Flip points on the picture of a tile as specified by the flags in its global ID.
 
     Parameters
     ----------

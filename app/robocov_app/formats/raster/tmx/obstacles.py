@@ -17,12 +17,12 @@ from robocov_app.formats.raster.tmx.tile_data import ID_MASK, GlobalIDs
 from robocov_app.formats.raster.tmx.tilesets import Tile
 
 MAX_PARTS = 10_000
-"""Collision objects, each counted as often as its tile is used, and tiles off the grid."""
+"""Largest number of collision objects, counted for each use of their tile, and of tiles off the grid."""
 
 
 @dataclass(frozen=True, eq=False)
 class TileFrame:
-    """Positions on the map in pixels, y down, and in meters, y up from the lower left corner of the tiles.
+    """Conversion from pixels, with y down, to meters, with y up from the lower left corner of the tiles.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class TileFrame:
     pixel : float, m
         Side of a pixel.
     window : Window
-        The tiles of the map.
+        Columns and rows of the tiles of the map.
     """
 
     tile: Array
@@ -49,7 +49,7 @@ class TileFrame:
         return np.array([self.window.left, self.window.top]) * self.tile
 
     def to_meters(self, points: Array) -> Array:
-        """Return points in pixels, (..., 2), in meters."""
+        """Convert points, (..., 2), from pixels to meters."""
         return np.asarray((points - self.lower_left) * [self.pixel, -self.pixel])
 
 
@@ -63,7 +63,7 @@ class ObstacleReader:
     shapes : Shapes
     frame : TileFrame
     tiles : dict of int to Tile
-        Solid tiles by their global IDs.
+        Solid tiles, keyed by their global IDs.
     """
 
     def __init__(self, root: Element, shapes: Shapes, frame: TileFrame, tiles: dict[int, Tile]) -> None:
@@ -80,12 +80,12 @@ class ObstacleReader:
         ----------
         layer : Layer
         ids : (rows, columns) array
-            Its global IDs.
+            Global IDs of its tiles.
 
         Returns
         -------
         (rows, columns) array of bool
-            Cells of the map that are solid as a whole; other shapes were added.
+            Cells of the map that are entirely solid. Other obstacles are added to the shapes.
 
         Raises
         ------
@@ -100,7 +100,7 @@ class ObstacleReader:
         self._add_tile_parts(layer, ids, is_full)
         if not layer.offset.any():
             return is_full
-        # The tiles of the layer are off the grid of the map.
+        # With an offset, the tiles of the layer are off the grid of the map and become separate shapes.
         corner = self._frame.upper_left + layer.offset
         for row, column in np.argwhere(is_full).tolist():
             ring = corner + np.add(RECTANGLE, [column, row]) * self._frame.tile
@@ -108,7 +108,7 @@ class ObstacleReader:
         return np.zeros_like(is_full)
 
     def _add_tile_parts(self, layer: Layer, ids: GlobalIDs, is_full: BoolArray) -> None:
-        """Add the collision objects of tiles, or mark in `is_full` the cells that they fill."""
+        """Add the collision objects of tiles; if one fills its cell, mark the cell in `is_full` instead."""
         tiles_with_parts = [number for number, tile in self._tiles.items() if tile.parts]
         has_parts = np.isin(ids & ID_MASK, tiles_with_parts)
         cells = np.argwhere(has_parts)
@@ -122,7 +122,7 @@ class ObstacleReader:
         remaining = np.flatnonzero(~fills_cell)
         part_counts = np.array([len(parts) for parts in parts_of_gids], dtype=int)
         self._require_few_parts(int(part_counts[gid_index[remaining]].sum()))
-        # Sorted by global IDs; tiles with the same ID are row by row.
+        # In the order of global IDs, and row by row for each ID.
         for k in remaining[np.argsort(gid_index[remaining], kind="stable")].tolist():
             gid = int(gids[gid_index[k]])
             row, column = cells[k].tolist()
@@ -134,7 +134,7 @@ class ObstacleReader:
                 self._add_part(element, part._replace(points=points), layer.labels)
 
     def _parse_parts(self, numbers: list[int]) -> list[list[ObjectShape]]:
-        """Return the collision objects of tiles; those of a tile with several flips are parsed once."""
+        """Return the collision objects of each tile; a number that occurs repeatedly is parsed once."""
         parts_of_tile: dict[int, list[ObjectShape]] = {}
         for number in numbers:
             if number not in parts_of_tile:
@@ -155,13 +155,13 @@ class ObstacleReader:
         self._add_shape(element, shape, labels)
 
     def add_objects(self, layer: Layer, *, are_all_solid: bool) -> None:
-        """Add the solid objects of a layer; those with the name of a robot are starts.
+        """Add the solid objects of a layer; the positions of objects named as robots become starts.
 
         Parameters
         ----------
         layer : Layer
         are_all_solid : bool
-            Whether objects are solid without saying so, unless names are selected.
+            Whether all objects are solid if the user selects none, even if the file does not declare them so.
 
         Raises
         ------
@@ -188,14 +188,14 @@ class ObstacleReader:
     def _is_solid(
         self, element: Element, labels: tuple[str, ...], folded: set[str], is_layer_solid: bool
     ) -> bool:
-        """Return whether an object is an obstacle; `folded` are its labels as they are compared."""
+        """Return whether an object is an obstacle; `folded` are its labels in lower case."""
         only = self._shapes.labels.only
         if only is not None:
             return bool(only & folded)
         return is_layer_solid or is_declared_solid(element, labels)
 
     def _add_shape(self, element: Element, shape: ObjectShape, labels: tuple[str, ...]) -> None:
-        """Add an obstacle, whose points are in pixels on the map."""
+        """Add an obstacle whose points are in pixels on the map."""
         shapes = self._shapes
         at = f"line {element.line}"
         points = self._frame.to_meters(shape.points)

@@ -3,11 +3,12 @@
 Neither pytmx nor pytiled-parser is used: they unpack files of any size, and open any other file that is
 named.
 
-A tile is solid by a property or class (``collides``, ``solid``, ``wall`` and the like), or by collision
-objects. All tiles of a layer without any such tile are solid if the option ``only`` names the layer, or its
-name, class or a property says so. Objects are solid if they or their layer say so or are selected; all of
-them are if there are no layers of tiles. Hidden layers count, because layers of walls are usually hidden. The
-option ``cell`` is the width of a tile in meters, ``scale`` that of a pixel.
+A tile is solid if a property or its class says so (``collides``, ``solid``, ``wall`` and the like), or if it
+has collision objects. If a layer has no such tile, all its tiles are solid if the option ``only`` names the
+layer, or if its name, its class or a property says so. Objects are solid if they or their layer are declared
+solid or selected; in a map without layers of tiles, all objects are solid. Hidden layers are read, because
+layers of walls are usually hidden. The option ``cell`` is the width of a tile in meters, ``scale`` that of a
+pixel.
 """
 
 import re
@@ -31,7 +32,7 @@ from robocov_app.formats.raster.tmx.obstacles import ObstacleReader, TileFrame
 from robocov_app.formats.raster.tmx.tilesets import read_solid_tiles
 
 DEFAULT_TILE_M = 1.0
-"""Width of a tile if no option gives it: the format has only pixels."""
+"""Default width of a tile: files contain only sizes in pixels."""
 ROOT = re.compile(rb"<map[\s>]")
 _MAX_QUOTED_CHARACTERS = 20
 
@@ -49,7 +50,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the map is not orthogonal, too large, damaged, or nothing in it is solid.
     ParameterError
-        If there is both a cell and a scale.
+        If both ``cell`` and ``scale`` are given.
     """
     root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
     shapes = Shapes(root.where, options)
@@ -83,7 +84,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _choose_pixel_size(tile: Array, options: ReadOptions, notes: list[str]) -> float:
-    """Return the size of a pixel, m, of tiles with a width and height, (2,) px."""
+    """Return the side of a pixel, m; `tile` is the width and height of a tile, (2,) px."""
     if options.cell is not None and options.scale is not None:
         raise ParameterError("--cell, --scale: expected one of them, because both say how large a tile is")
     if options.scale is not None:

@@ -1,4 +1,4 @@
-"""Names and properties that make tiles, objects and layers of a TMX file solid, or objects starts."""
+"""Names and properties that make tiles, objects and layers of a TMX file solid, or objects robot starts."""
 
 import re
 from collections.abc import Iterable
@@ -26,10 +26,10 @@ def is_declared_solid(element: Element, names: Iterable[str] = ()) -> bool:
 
 
 def is_robot_name(name: str) -> bool:
-    """Return whether an object of this name is a start of a robot."""
+    """Return whether an object of this name is the start of a robot."""
     return _ROBOT.fullmatch(_fold_name(name)) is not None
 
 
 def _fold_name(name: str) -> str:
-    """Return the alphabetic characters of a name in lower case, as "blocktile" for "Block_Tile 2"."""
+    """Return the letters of a name in lower case: "blocktile" for "Block_Tile 2"."""
     return re.sub(r"[\W\d_]", "", name.casefold())

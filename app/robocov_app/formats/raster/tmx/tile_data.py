@@ -13,24 +13,24 @@ from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.raster.tmx.attributes import parse_integer
 
 GlobalIDs: TypeAlias = NDArray[np.uint32]
-"""The number of a tile and its flips; 0 where there is no tile."""
+"""Array of global IDs: the number of a tile, with flags for its flips; 0 if there is no tile."""
 FLIPPED_HORIZONTALLY = 0x80000000
 FLIPPED_VERTICALLY = 0x40000000
 FLIPPED_DIAGONALLY = 0x20000000
 ID_MASK = 0x0FFFFFFF
-"""Bits of the number of a tile."""
+"""Mask of the bits that hold the number of a tile."""
 _MAX_NAME_CHARACTERS = 20
 
 
 def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
-    """Return the global IDs of tiles.
+    """Decode the global IDs of the tiles of a layer or chunk.
 
     Parameters
     ----------
     piece : Element
         The element that contains the tiles, which is `data` or a chunk in it.
     data : Element
-        Its attributes give the encoding.
+        The element whose attributes specify the encoding.
     count : int
         Expected number of tiles.
 
@@ -41,7 +41,7 @@ def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
     Raises
     ------
     MapError
-        If the encoding is unknown, the data are damaged, or the number of tiles is another one.
+        If the encoding is unknown, the data are damaged, or the number of tiles is not `count`.
     """
     encoding = data.attributes.get("encoding", "")
     compression = data.attributes.get("compression", "")
@@ -64,11 +64,12 @@ def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
 
 
 def _decode_base64_ids(piece: Element, compression: str, count: int) -> GlobalIDs | None:
-    """Return global IDs, or None if there are more than `count`."""
+    """Decode base64 to global IDs; return None if there are more than `count`."""
     size = 4 * count
     try:
         raw = binascii.a2b_base64("".join(piece.text.split()), strict_mode=True)
         if compression:  # never unpacked to more than expected
+            # wbits=47 accepts zlib and gzip.
             raw = zlib.decompressobj(wbits=47).decompress(raw, size + 1)
     except (ValueError, zlib.error) as error:
         piece.refuse(f"not {compression or 'base64'}: {to_one_line(error)[:60]}")
@@ -78,7 +79,7 @@ def _decode_base64_ids(piece: Element, compression: str, count: int) -> GlobalID
 
 
 def _decode_csv_ids(piece: Element, count: int) -> GlobalIDs | None:
-    """Return global IDs, or None if there are more than `count`."""
+    """Parse comma-separated global IDs; return None if there are more than `count`."""
     if piece.text.count(",") > count:  # a comma may end the text
         return None
     numbers = files.parse_integers(piece.text, ",")

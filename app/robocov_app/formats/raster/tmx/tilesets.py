@@ -1,4 +1,4 @@
-"""Tiles that are solid, by properties, classes or collision objects in their tilesets."""
+"""Tiles that properties, classes or collision objects in their tilesets make solid."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Tile(NamedTuple):
     Attributes
     ----------
     parts : list of Element
-        Collision objects, which are solid instead of the whole tile.
+        Collision objects. If there are any, they are solid instead of the whole tile.
     size : (2,) array, px
-        Size of its picture.
+        Size of the tile's picture.
     offset : (2,) array, px
-        Position of the picture, from the lower left of the cell.
+        Position of the picture relative to the lower left corner of the cell.
     """
 
     parts: list[Element]
@@ -35,7 +35,7 @@ class Tile(NamedTuple):
 
 
 def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Tile]:
-    """Return the solid tiles of all tilesets, by their global IDs.
+    """Return the solid tiles of all tilesets, keyed by their global IDs.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
     path : Path
         File of the map.
     shapes : Shapes
-        Gives the options and takes the notes.
+        Holds the options, and collects the notes.
 
     Raises
     ------
     MapError
-        If a file of a tileset cannot be read, or they are too large together.
+        If the file of a tileset cannot be read, or if all tilesets together are too large.
     """
     tiles: dict[int, Tile] = {}
     budget = files.IncludeBudget()

@@ -1,4 +1,4 @@
-"""Values of a YAML file with their positions, so that messages name them."""
+"""Values of a YAML file with their places in it, which error messages name."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _TRUE_WORDS = ("true", "yes", "on", "1")
 
 @dataclass(frozen=True)
 class Node:
-    """A value of a file.
+    """A value in a YAML file, which may be missing.
 
     Attributes
     ----------
     value : str, list, dict or None
         None if the file does not contain it.
     at : str
-        Position, for messages, as in "world.yaml: obstacle[0].shape".
+        Place of the value, for messages, as in "world.yaml: obstacle[0].shape".
     """
 
     value: files.Value | None
@@ -36,7 +36,7 @@ class Node:
         return self.value not in (None, "", "null", "~", "None", [], {})
 
     def __getitem__(self, name: str) -> Node:
-        """Return the value of a key. Raises MapError if this value is not a mapping."""
+        """Return the value of a key; raise MapError if this value is not a mapping."""
         prefix = self.at if self.at.endswith(": ") else f"{self.at}."
         if isinstance(self.value, dict):
             return Node(self.value.get(name), f"{prefix}{name}")
@@ -45,12 +45,12 @@ class Node:
         return Node(None, f"{prefix}{name}")
 
     def list_items(self, *, allow_single: bool = False) -> list[Node]:
-        """Return the items of a list, none if it is not given.
+        """Return the items of a list; an empty list if the value is not given.
 
         Parameters
         ----------
         allow_single : bool
-            Whether a value that is not a list is its only item.
+            Whether to accept a value that is not a list as its only item.
 
         Raises
         ------
@@ -66,7 +66,7 @@ class Node:
         return [self]
 
     def get_text(self, default: str = "") -> str:
-        """Return a text. Raises MapError if it is a list or mapping."""
+        """Return the value as text; raise MapError if it is a list or a mapping."""
         if not self.is_given:
             return default
         if not isinstance(self.value, str):
@@ -74,18 +74,18 @@ class Node:
         return self.value
 
     def is_true(self) -> bool:
-        """Return whether the value is one of the words for true. Raises MapError as `get_text`."""
+        """Return whether the value is a word for true; raise MapError if it is a list or a mapping."""
         return self.get_text().lower() in _TRUE_WORDS
 
     def parse_number(self, default: float) -> float:
-        """Return a number. Raises MapError if it is not one."""
+        """Return the value as a number; raise MapError for invalid input."""
         value = files.parse_number(self.get_text(str(default)))
         if not abs(value) <= MAX_COORDINATE_M:
             self.refuse("a number within 1e7")
         return value
 
     def parse_length(self, default: float) -> float:
-        """Return a positive length, m. Raises MapError if it is out of range."""
+        """Return the value as a positive length, m; raise MapError if it is out of range."""
         value = self.parse_number(default)
         files.require_length(value, self.at)
         return value
@@ -96,7 +96,7 @@ class Node:
         Parameters
         ----------
         default : list of float
-            The first two numbers may be missing together, others each.
+            Numbers that replace missing ones. If the value is given, it must have at least two numbers.
 
         Returns
         -------
@@ -114,5 +114,5 @@ class Node:
         return np.array([*values, *default[len(values) :]])
 
     def refuse(self, expected: str) -> NoReturn:
-        """Raise the MapError of this value."""
+        """Raise a MapError that names the place of this value, and what was expected there."""
         raise MapError(f"{self.at}: expected {expected}, got {quote(self.value)}")

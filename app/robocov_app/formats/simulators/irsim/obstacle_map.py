@@ -24,7 +24,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     path : Path
         File of the world.
     shapes : Shapes
-        Gives the options and takes the notes.
+        Holds the options, and collects the notes.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
         If there is no such picture, or it cannot be read.
     """
     source = _get_source(world["obstacle_map"])
-    # Notes name a value without the file.
+    # Notes name the place without the file.
     _, _, place = source.at.rpartition(": ")
     file = files.find_named_file(
         path,
@@ -65,7 +65,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
 
 
 def _get_source(obstacle_map: Node) -> Node:
-    """Return the name of the picture, which is given as such or as the ``path`` of a mapping."""
+    """Return the node with the name of the picture: `obstacle_map` itself, or the ``path`` in it."""
     if not isinstance(obstacle_map.value, dict):
         return obstacle_map
     if obstacle_map["name"].get_text() != "image":
@@ -75,9 +75,9 @@ def _get_source(obstacle_map: Node) -> Node:
 
 
 def _find_packaged_picture(source: Node) -> Path:
-    """Return a picture that is installed with IR-SIM, which IR-SIM itself uses if there is no such file.
+    """Return a picture that is installed with IR-SIM, as IR-SIM does if there is no such file.
 
-    IR-SIM is only located, not imported.
+    The package IR-SIM is only located, not imported.
 
     Raises
     ------

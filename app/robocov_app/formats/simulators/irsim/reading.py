@@ -1,11 +1,11 @@
 """Worlds of the simulator IR-SIM: https://ir-sim.readthedocs.io/en/stable/yaml_config/configuration.html.
 
-A YAML contains the size of the ``world``, optionally a picture of it, and groups of ``robot`` and
-``obstacle``: a number of objects of a shape, at given states [x, y, theta] or distributed.
+The YAML file contains the size of the ``world``, optionally a picture of it, and groups of ``robot`` and
+``obstacle``. A group is a number of objects with a shape, at given states [x, y, theta] or distributed.
 
-Obstacles are placed at their first state, even if they move; lines are walls with the width of the option
-``thickness``. Objects that collide with nothing, have random shapes or are distributed at random are left
-out and counted. The states of robots are starts.
+Obstacles are placed at their initial state, even if they move; lines become walls with the width of the
+option ``thickness``. Objects that collide with nothing, have random shapes or are distributed at random are
+left out and counted. The positions of robots become starts.
 """
 
 import math
@@ -33,9 +33,9 @@ from robocov_app.formats.simulators.irsim.shape_reader import ShapeReader
 MAX_OBJECTS = 4_000
 """Largest number of robots and obstacles of a world."""
 _DEFAULT_SIDE_M = 10.0
-"""Width and height of a world that does not give them."""
+"""Default width and height of a world."""
 _CIRCLE_MARGIN_M = 0.5
-"""Distance of objects that are distributed on a circle from the edge of the world, by default."""
+"""Default distance between the edge of the world and the circle on which objects are distributed."""
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _Item = TypeVar("_Item")
 
@@ -72,7 +72,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _read_free_space(world: Node, path: Path, shapes: Shapes, corner: Array, size: Array) -> MultiPolygon:
-    """Return the world without its obstacles: a rectangle, or the light part of a picture.
+    """Return the free space of the world without its obstacles: a rectangle, or the light part of a picture.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class _GroupReader:
         self._moving_count = 0
 
     def add(self, kind: str, group: Node) -> None:
-        """Add a group of robots or obstacles. Raises MapError if a value is invalid."""
+        """Add a group of robots or obstacles; raise MapError if a value is invalid."""
         number = max(int(group["number"].parse_number(1.0)), 0)
         self._object_count += number
         if self._object_count > MAX_OBJECTS:
@@ -141,20 +141,20 @@ class _GroupReader:
         return [f"{obstacles} with kinematics taken as standing where the file has them"]
 
     def _add_obstacle(self, group: Node, k: int, frame: Array, labels: tuple[str, ...]) -> None:
-        """Add obstacle k of a group."""
+        """Add obstacle k of a group; `frame` is the (3, 3) transform from its frame to meters."""
         if group["unobstructed"].is_true():
             self._shapes.leave_out("obstacle", "that nothing collides with")
             return
         if group["kinematics"].is_given:
             self._moving_count += 1
-        # Without a shape, the defaults of a shape are taken.
+        # Without a shape, the node that is not given stands for a shape with default values.
         candidates = group["shape"].list_items(allow_single=True) or [group["shape"]]
         self._shape_reader.add(_get_item(candidates, k), frame, labels)
 
     def _parse_states(self, group: Node, number: int) -> list[Array] | None:
         """Return the states [x, y, theta] of a group, or None if they are random.
 
-        There may be fewer states than objects; see `_get_item`.
+        There may be fewer states than objects: see `_get_item`.
         """
         distribution = group["distribution"]
         name = distribution["name"].get_text("manual")
@@ -171,7 +171,7 @@ class _GroupReader:
         return [state.parse_numbers([1.0, 1.0, 0.0]) for state in states]
 
     def _compute_states_on_circle(self, distribution: Node, number: int) -> list[Array]:
-        """Return states at equal distances on a circle, facing its center."""
+        """Return states [x, y, theta] at equal distances on a circle, facing its center."""
         center = distribution["center"].parse_numbers([*self._center.tolist(), 0.0])[:2]
         radius = distribution["radius"].parse_number(self._radius)
         angles = 2 * math.pi * np.arange(number) / max(number, 1)
@@ -180,5 +180,5 @@ class _GroupReader:
 
 
 def _get_item(items: Sequence[_Item], k: int) -> _Item:
-    """Return item k, or the last one if there are fewer: IR-SIM repeats it for the rest of a group."""
+    """Return item k, or the last item if there are fewer: IR-SIM repeats it for the rest of a group."""
     return items[min(k, len(items) - 1)]

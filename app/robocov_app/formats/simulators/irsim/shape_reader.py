@@ -1,4 +1,4 @@
-"""Shapes of the obstacles of IR-SIM: circles, rectangles, polygons, lines and compounds of them."""
+"""Shapes of IR-SIM's obstacles: circles, rectangles, polygons, lines and compounds of them."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class ShapeReader:
         self._count = 0
 
     def add(self, shape: Node, frame: Array, labels: tuple[str, ...]) -> None:
-        """Add a shape.
+        """Add a shape, or all parts of a compound.
 
         Parameters
         ----------
@@ -36,10 +36,11 @@ class ShapeReader:
         MapError
             If a value is invalid, or there are too many shapes.
         """
-        # Few objects may stand for many shapes, so these are counted before they are built.
+        # Compounds may turn a few objects into many shapes, so shapes are counted before they are built.
         self._count += 1
         files.require_shapes(self._count, self._shapes.where)
         name = shape["name"].get_text("circle").lower()
+        # IR-SIM places the origin of a body with a wheelbase on the rear axle.
         shift = np.array([shape["wheelbase"].parse_number(0.0) / 2, 0.0])
         if shape["random_shape"].is_true():
             self._shapes.leave_out("shape", "of random form")
@@ -61,7 +62,7 @@ class ShapeReader:
             shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
 
     def _add_circle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
-        """Add a disc; `shift` is the position of its frame, (2,) m."""
+        """Add a disc; `shift`, (2,) m, moves it within its frame."""
         center = shape["center"].parse_numbers([0.0, 0.0])[:2] + shift
         radius = shape["radius"].parse_length(0.2)
         (center,) = transform_points(frame, center[None])
@@ -74,13 +75,13 @@ class ShapeReader:
 
 
 def _get_place(shape: Node) -> str:
-    """Return the position of a shape without the file, for messages."""
+    """Return the place of a shape for messages, without the name of the file."""
     _, _, place = shape.at.partition(": ")
     return place
 
 
 def _parse_vertices(shape: Node, frame: Array, *, minimum: int) -> Array:
-    """Return the vertices of a polygon or line, (k, 2) m. Raises MapError if there are too few."""
+    """Return the vertices of a polygon or line, (k, 2) m; raise MapError if there are too few."""
     points = [point.parse_numbers([0.0, 0.0])[:2] for point in shape["vertices"].list_items()]
     if len(points) < minimum:
         shape["vertices"].refuse("a list of points [x, y]")

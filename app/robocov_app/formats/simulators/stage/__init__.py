@@ -1,4 +1,4 @@
-"""Worlds of Stage: words and includes (`tokens`), models and macros (`entities`), `placement`, the map."""
+"""Worlds of Stage: words and includes (`tokens`), models and macros (`entities`), `placement`, `reading`."""
 
 from robocov_app.formats.simulators.stage.reading import read, sniff
 

@@ -12,7 +12,7 @@ from robocov_app.formats.geometry.cells.vectorize import outline_free_cells
 from robocov_app.formats.raster.picture import describe_transparency, read_picture
 
 _MAX_DARK_LEVEL = 127 / 255
-"""Pixels are dark up to this brightness, from 0 to 1."""
+"""Largest brightness, from 0 to 1, of dark pixels."""
 
 
 class Bitmap(NamedTuple):
@@ -21,9 +21,9 @@ class Bitmap(NamedTuple):
     Attributes
     ----------
     free : MultiPolygon
-        Scaled so that the box around all dark pixels is the square of side 1 around the origin.
+        Scaled so that the bounding box of all dark pixels is the unit square around the origin.
     columns, rows : int
-        Size of that box in pixels.
+        Size of that bounding box, in pixels.
     """
 
     free: MultiPolygon
@@ -32,12 +32,12 @@ class Bitmap(NamedTuple):
 
 
 class BitmapReader:
-    """Reads the pictures of a world, each once.
+    """Reads the pictures of a world; each file is read only once.
 
     Parameters
     ----------
     notes : list of str
-        Takes remarks about pictures.
+        List to which remarks about pictures are added.
     """
 
     def __init__(self, notes: list[str]) -> None:
@@ -51,13 +51,14 @@ class BitmapReader:
         Raises
         ------
         MapError
-            If it cannot be read, is only dark or light, or all pictures together are too large.
+            If it cannot be read, has no dark or no light pixels, or if all pictures together are too large.
         """
         if file not in self._bitmaps:
             self._bitmaps[file] = self._read(file, to_one_line(file))
         return self._bitmaps[file]
 
     def _read(self, file: Path, where: str) -> Bitmap:
+        """Decode a picture, and crop it to the bounding box of its dark pixels."""
         picture = read_picture(file, where)
         self._pixel_count += picture.level.size
         if self._pixel_count > files.MAX_CELLS:

@@ -1,4 +1,4 @@
-"""Models, blocks and windows of world files, with their properties, and macros that stand for them."""
+"""Models, blocks and windows of world files with their properties, and the macros on which they are based."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from robocov_app.formats.simulators.stage.tokens import BRACKETS, Token
 
 @dataclass(frozen=True, eq=False)
 class Entity:
-    """A model, block or window.
+    """A model, block or window in a world file.
 
     Attributes
     ----------
     type : str
-        Type of the model, or name of a macro.
+        Type of the entity, or name of the macro on which it is based.
     at : str
-        File and line.
+        File and line, for messages.
     properties : dict of str to list of str
-        Values by the name of the property.
+        Values of each property.
     children : list of Entity
         Entities within this one.
     """
@@ -41,7 +41,7 @@ class Entity:
         return self.properties.get(name, [default])[0]
 
     def parse_number(self, name: str, default: float) -> float:
-        """Return the first value of a property as a number. Raises MapError if it is not one."""
+        """Return the first value of a property as a number; raise MapError for invalid input."""
         return float(self.parse_numbers(name, (default,))[0])
 
     def parse_numbers(self, name: str, default: tuple[float, ...]) -> Array:
@@ -51,7 +51,7 @@ class Entity:
         ----------
         name : str
         default : tuple of float
-            Values that are taken for missing ones at the end.
+            Numbers that replace missing ones at the end.
 
         Returns
         -------
@@ -77,9 +77,9 @@ class World(NamedTuple):
     Attributes
     ----------
     root : Entity
-        Its children and properties are those on the top level of the file.
+        An entity that holds the children and properties at the top level of the file.
     macros : dict of str to Entity
-        Entities that others are based on, by their names.
+        Entities on which others are based, keyed by name.
     """
 
     root: Entity
@@ -92,14 +92,14 @@ def parse_world(tokens: deque[Token], where: str) -> World:
     Parameters
     ----------
     tokens : deque of Token
-        They are removed from it.
+        The tokens; they are removed from the deque.
     where : str
         The file, for messages.
 
     Raises
     ------
     MapError
-        At the first mistake.
+        At the first syntax error.
     """
     parser = _EntityParser(tokens)
     root = Entity("world", where)
@@ -115,7 +115,7 @@ class _EntityParser:
         self._tokens = tokens
 
     def parse_content(self, entity: Entity, depth: int) -> None:
-        """Add properties and children to an entity, up to its closing bracket; `depth` 0 has none."""
+        """Add properties and children to an entity, up to its closing bracket; at depth 0, up to the end."""
         if depth > files.MAX_DEPTH:
             raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}")
         while self._tokens:
@@ -138,13 +138,13 @@ class _EntityParser:
             Token("", "the end of the file", entity.at).refuse("a ) to close this bracket")
 
     def _peek_kind(self, index: int) -> str:
-        """Return the kind of a following token, or an empty text beyond the end."""
+        """Return the kind of the token at an index from here on, or an empty string past the end."""
         if index >= len(self._tokens):
             return ""
         return self._tokens[index].kind
 
     def _is_at_macro(self) -> bool:
-        """Return whether a name, a type and a bracket follow."""
+        """Return whether a name, a type and a bracket follow, as in the definition of a macro."""
         kinds = [self._peek_kind(index) for index in range(3)]
         return kinds[:2] == ["word", "word"] and kinds[2] in BRACKETS
 
@@ -157,7 +157,7 @@ class _EntityParser:
         self.macros.setdefault(name.text, macro)
 
     def _parse_values(self, name: Token) -> list[str]:
-        """Return the values of a property, at least one, which may be an empty text."""
+        """Return the values of a property; an empty list gives one empty string."""
         values = [self._tokens.popleft()] if self._tokens else [name]
         if values[0].kind == "[":
             values = []

@@ -1,4 +1,4 @@
-"""Placement of models in the world: their shapes as obstacles, and robots as starts."""
+"""Placement of models in the world: shapes become obstacles, and positions of robots become starts."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from robocov_app.formats.simulators.stage.bitmaps import BitmapReader
 from robocov_app.formats.simulators.stage.entities import Entity, World
 
 MAX_ENTITIES = 10_000
-"""Largest number of models and blocks, with those of macros."""
+"""Largest number of models and blocks, including those from macros."""
 _METERS_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _DEFAULT_SIDE = 0.4
-"""Length and width of a model without a size, in units of the world."""
+"""Default length and width of a model, in units of the world."""
 _MIN_EXTENT = 1e-12
-"""Blocks without an extent in a direction are scaled as if they had this one."""
+"""Smallest extent that is used to scale blocks, to avoid a division by zero."""
 _DIGITS = 9
-"""Decimals of coordinates."""
+"""Decimals of coordinates in meters."""
 _MAX_TYPE_CHARACTERS = 30
 
 
 @dataclass(frozen=True, eq=False)
 class Floorplan:
-    """A model that may be the map: one with a bitmap, or with a boundary around its blocks.
+    """A model that may be the map: it has a bitmap, or a boundary around its blocks.
 
     Attributes
     ----------
     box : Polygon, m
-        Outline of the model.
+        Rectangle that the model fills.
     free : MultiPolygon, m
         The box without the dark pixels of its bitmap.
     labels : tuple of str
@@ -69,7 +69,7 @@ class _ModelBox:
         self.polygon = Polygon(self.place(UNIT_SQUARE))
 
     def place(self, points: Array) -> Array:
-        """Return positions in the square of side 1 around the origin, (k, 2), as positions on the map, m."""
+        """Convert positions in the unit square around the origin, (k, 2), to positions on the map, m."""
         return np.round(transform_points(self._frame, points * self._size), _DIGITS) + 0.0
 
 
@@ -81,12 +81,12 @@ class ModelPlacer:
     world : World
     shapes : Shapes
     find_file : callable
-        ``find_file(name, description, at=position)`` returns the path of a file that the world names.
+        ``find_file(name, kind, at=place)`` returns the path of a file that the world names.
 
     Attributes
     ----------
     floorplans : list of Floorplan
-        Models that may be the map; all others are in the shapes.
+        Models that may be the map. All others are added to the shapes.
     """
 
     def __init__(self, world: World, shapes: Shapes, find_file: Callable[..., Path]) -> None:
@@ -102,11 +102,11 @@ class ModelPlacer:
         self._radians_per_unit = 1.0 if is_in_radians else math.pi / 180
 
     def place_all(self) -> None:
-        """Add all models. Raises MapError if a value is invalid, or there are too many."""
+        """Add all models; raise MapError if a value is invalid, or if there are too many."""
         self._place(self._world.root.children, np.eye(3), 0)
 
     def _place(self, entities: list[Entity], frame: Array, depth: int) -> None:
-        """Add models and those within them; `frame` is the transform, (3, 3), to meters."""
+        """Add models and, recursively, the models in them; `frame` is the (3, 3) transform to meters."""
         for given in entities:
             entity, labels = self._expand_macros(given)
             if depth > files.MAX_DEPTH:
@@ -128,7 +128,11 @@ class ModelPlacer:
                 self._place(entity.children, model_frame, depth + 1)
 
     def _expand_macros(self, entity: Entity) -> tuple[Entity, tuple[str, ...]]:
-        """Return an entity with the properties and children of its macros, and its name and theirs."""
+        """Merge an entity with the macros on which it is based.
+
+        Properties of the entity take precedence. Also returned are its labels: its own name, and the names of
+        these macros and of its type.
+        """
         macros = self._world.macros
         chain = [entity]
         while chain[-1].type in macros:
@@ -146,14 +150,14 @@ class ModelPlacer:
         return expanded, tuple(name for name in names if name)
 
     def _parse_pose(self, entity: Entity, name: str) -> Array:
-        """Return the frame, (3, 3), of a pose [x y z heading], or [x y heading] as in Stage 2."""
+        """Return the (3, 3) frame of a pose [x y z heading], or [x y heading] as in Stage 2."""
         x, y, third, fourth = entity.parse_numbers(name, (0.0, 0.0, 0.0, 0.0)).tolist()
         heading = third if len(entity.properties.get(name, [])) == 3 else fourth
         meters = self._meters_per_unit
         return build_frame(x * meters, y * meters, heading * self._radians_per_unit)
 
     def _add_model(self, entity: Entity, frame: Array, labels: tuple[str, ...]) -> None:
-        """Add the bitmap, the blocks or else the box of a model."""
+        """Add the bitmap of a model; without one, its blocks; without blocks, its box."""
         size = entity.parse_numbers("size", (_DEFAULT_SIDE, _DEFAULT_SIDE)) * self._meters_per_unit
         for length in size.tolist():
             files.require_length(length, f"{entity.at}: size")
@@ -175,6 +179,7 @@ class ModelPlacer:
             self._shapes.add_outline([ring], labels, at=entity.at, thing="block")
 
     def _add_bitmap(self, entity: Entity, box: _ModelBox, size: Array, labels: tuple[str, ...]) -> None:
+        """Add a model with a bitmap to the floor plans."""
         file = self._find_file(entity.get_text("bitmap"), "picture", at=f"{entity.at}: bitmap")
         bitmap = self._bitmaps.read(file)
         self._shapes.count_vertices(count_polygon_vertices(bitmap.free))
@@ -193,14 +198,14 @@ class ModelPlacer:
 
 
 def _is_solid(entity: Entity) -> bool:
-    """Return whether robots or their range sensors meet a model."""
+    """Return whether a model blocks robots or their range sensors."""
     returns = [entity.parse_number(name, 1.0) for name in ("ranger_return", "laser_return")]
     is_seen = min(returns) > 0
     return is_seen or entity.parse_number("obstacle_return", 1.0) != 0 or "bitmap" in entity.properties
 
 
 def _scale_to_unit_square(rings: list[Array]) -> list[Array]:
-    """Return rings scaled so that the box around them is the square of side 1 around the origin."""
+    """Scale rings so that their bounding box becomes the unit square around the origin."""
     points = np.concatenate(rings)
     low = points.min(axis=0)
     high = points.max(axis=0)
@@ -211,7 +216,7 @@ def _scale_to_unit_square(rings: list[Array]) -> list[Array]:
 def _parse_rings(entity: Entity) -> list[Array]:
     """Return the polygons of a block, or of a model as in Stage 2, (k, 2) each.
 
-    Their points are properties: ``point[1] [x y]``, or in a model ``block[0].point[1] [x y]``.
+    Points are properties such as ``point[1] [x y]`` in a block, or ``block[0].point[1] [x y]`` in a model.
     """
     rings: dict[str, dict[int, Array]] = {}
     for name in entity.properties:

@@ -1,14 +1,13 @@
 """Worlds of the simulator Stage: https://player-stage-manual.readthedocs.io/en/latest/WORLDFILES/.
 
-A world file is a tree of models with properties, of macros that others are based on, and of files that it
-includes. A model has the size of its property ``size``, independent of that of its bitmap or its blocks: the
-box around them is scaled to it.
+A world file contains a tree of models with properties, macros on which models are based, and includes of
+other files. The property ``size`` determines the size of a model: its bitmap or blocks are scaled to it.
 
 R. Vaughan, Massively multi-robot simulation in Stage, Swarm Intelligence 2 (2008), 189-208.
 
-Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
-(``position``) are starts; sensors and other devices are left out. The map is the largest model with a bitmap
-or a ``boundary``, if most of the others are in it.
+Models are obstacles unless nothing collides with them (``obstacle_return 0`` and no ``ranger_return``);
+positions of robots (``position``) become starts; sensors and other devices are left out. The map is the
+largest model with a bitmap or a ``boundary`` that contains most of the others.
 """
 
 import re
@@ -67,7 +66,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _choose_map(floorplans: Sequence[Floorplan], positions: Sequence[Point]) -> Floorplan | None:
-    """Return the first floor plan that contains most positions, m, or None."""
+    """Return the first floor plan that contains most of the positions, m, or None."""
     for floorplan in floorplans:
         if shapely.covers(floorplan.box, positions).mean() > 0.5:
             return floorplan
@@ -82,7 +81,7 @@ def _add_walls(floorplan: Floorplan, shapes: Shapes) -> None:
 
 
 def _build_map(shapes: Shapes, name: str, free: MultiPolygon | None) -> ForeignMap:
-    """Build the map; without free space, m, it is that within the outer walls."""
+    """Build the map; if `free` is None, the free space is the area within the outer walls."""
     boundary_source = ""
     if free is None and shapes.outlines:
         surrounding = shapes.find_surrounding()

@@ -1,4 +1,4 @@
-"""Words, numbers, texts and brackets of world files, with those of the files that they include."""
+"""Words, numbers, strings and brackets of world files and of the files that they include."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robocov.errors import MapError, quote, to_one_line
 from robocov_app.formats import files
 
 MAX_BYTES = 5_000_000
-"""Largest file of a world, and largest size of all included files together."""
+"""Largest size of a world file, and largest total size of all included files."""
 MAX_TOKENS = 200_000
 """Largest number of tokens."""
 BRACKETS = ("(", ")", "[", "]")
@@ -24,16 +24,16 @@ _MAX_QUOTED_CHARACTERS = 20
 
 
 class Token(NamedTuple):
-    """A word, number, text or bracket.
+    """A word, number, string or bracket.
 
     Attributes
     ----------
     kind : str
         "word", "number", "string", or the bracket itself.
     text : str
-        Without quotation marks.
+        The text of the token, without quotation marks.
     at : str
-        File and line.
+        File and line, for messages.
     """
 
     kind: str
@@ -41,18 +41,18 @@ class Token(NamedTuple):
     at: str
 
     def refuse(self, expected: str) -> NoReturn:
-        """Raise the MapError of this token."""
+        """Raise a MapError that names the place of this token, and what was expected there."""
         raise MapError(f"{self.at}: expected {expected}, got {quote(self.text)}")
 
 
 def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
-    """Return the tokens of a world file, each include replaced by the tokens of its file.
+    """Return the tokens of a world file, with each include replaced by the tokens of the included file.
 
     Parameters
     ----------
     path : Path
     find_file : callable
-        ``find_file(name, description, at=position)`` returns the path of a file that another one names.
+        ``find_file(name, kind, at=place)`` returns the path of a file that another file names.
 
     Raises
     ------
@@ -73,7 +73,7 @@ class _TokenReader:
         self._budget = files.IncludeBudget(max_bytes=MAX_BYTES)
 
     def read(self, path: Path, open_files: tuple[Path, ...]) -> None:
-        """Append the tokens of a file; `open_files` are this one and those that include it."""
+        """Append the tokens of a file; `open_files` are the file itself and those that include it."""
         content = files.read_content(path, MAX_BYTES).decode("utf-8", "replace")
         name = to_one_line(path)
         line = 1
@@ -101,6 +101,7 @@ class _TokenReader:
         self.tokens.append(token)
 
     def _include(self, token: Token, open_files: tuple[Path, ...]) -> None:
+        """Append the tokens of the file that a token names; raise MapError if it includes itself."""
         if token.kind != "string":
             token.refuse("a file to include")
         path = self._find_file(token.text, "file", at=token.at)

@@ -1,4 +1,4 @@
-"""DXF drawings: loading by ezdxf (`document`), the map (`reading`), entities (`entity_reader`) and curves."""
+"""DXF drawings: loading with ezdxf (`document`), `reading` of maps, entities (`entity_reader`) and curves."""
 
 from robocov_app.formats.vector.dxf.document import sniff
 from robocov_app.formats.vector.dxf.reading import read

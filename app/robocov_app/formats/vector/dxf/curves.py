@@ -13,7 +13,7 @@ from robocov.optional_imports import import_optional
 from robocov_app.formats.geometry.curves import MAX_POINTS, sample_curve
 
 _MIN_BULGE = 1e-9
-"""Edges with a smaller bulge are straight."""
+"""Edges with a smaller bulge are straight lines."""
 
 
 def to_plane(vectors: Sequence[Any]) -> Array:
@@ -28,7 +28,7 @@ def flatten_polyline(vertices: Array, bulges: Array, tolerance: float) -> Array:
     ----------
     vertices : (n, 2) array
     bulges : (n,) array
-        Of the edge from each vertex to the next one: tan(angle / 4) of the arc, positive to the left.
+        Bulge of the edge from each vertex to the next: tan(angle / 4) of the arc, positive if it turns left.
     tolerance : float
         Maximum distance from the polyline.
 
@@ -55,14 +55,17 @@ def flatten_polyline(vertices: Array, bulges: Array, tolerance: float) -> Array:
 def _flatten_bulge(
     start: Array, end: Array, bulge: float, tolerance: float, max_points: float
 ) -> tuple[Array, float]:
-    """Return the points of an arc from its start to its end, (k, 2), and an estimate of their number."""
+    """Return the points of an arc, (k, 2), from its start to its end, and an estimate of their number.
+
+    The estimate is made first; ValueError is raised if it exceeds `max_points`.
+    """
     ezdxf_math = import_optional("ezdxf.math", "dxf")
     center, start_angle, end_angle, radius = ezdxf_math.bulge_to_arc(start, end, bulge)
     point_count = 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
     if not max_points - point_count > 0.0:  # The estimate may be nan.
         raise ValueError(f"expected at most {MAX_POINTS} points, got more")
     arc = ezdxf_math.ConstructionArc(center, radius, *np.degrees([start_angle, end_angle]))
-    # ezdxf goes counterclockwise, which is from the start to the end if the bulge is positive.
+    # ezdxf's points run counterclockwise, which is from the start to the end only for positive bulges.
     points = to_plane(list(arc.flattening(min(tolerance, radius / 8))))
     if bulge <= 0.0:
         points = points[::-1]
@@ -89,8 +92,8 @@ def flatten_spline(entity: Any, tolerance: float) -> Array:
 
     Notes
     -----
-    The spline is sampled between the knots where it is defined. The method `flattening` of ezdxf 1.4 goes
-    beyond them, which spoils closed splines. (L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer
+    The spline is sampled between the knots where it is defined. The method `flattening` of ezdxf 1.4 samples
+    beyond them, which distorts closed splines. (L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer
     1997, section 4.2.)
     """
     spline = entity.construction_tool()

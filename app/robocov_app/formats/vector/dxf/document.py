@@ -1,4 +1,4 @@
-"""Detection and loading of DXF files by ezdxf, within limits that are checked before it parses them."""
+"""Detection of DXF files, and loading with ezdxf, within limits that are checked before it parses them."""
 
 import logging
 import re
@@ -12,13 +12,13 @@ from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 
 MAX_LINES = 8_000_000
-"""Largest number of lines of text: a line of the drawing takes about 24, a vertex 4."""
+"""Largest number of lines of text. A LINE entity takes about 24 of them, a vertex 4."""
 MAX_ENTITIES = 50_000
 """Largest number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
 BINARY = b"AutoCAD Binary DXF"
 """First bytes of a binary file."""
 TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
-"""Start of a text file: a section, perhaps after comments."""
+"""Start of a text file: a section, possibly after comments."""
 _ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
 _POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
 _MAX_REASON_CHARACTERS = 200
@@ -53,7 +53,7 @@ def load_document(path: Path, where: str) -> Any:
         recover = import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:
         raise MapError(f"{where}: {error}") from None
-    # ezdxf logs its repairs, which would appear among the messages of a command.
+    # ezdxf logs its repairs; without a handler, they would appear among the messages of a command.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
     def repair(path: Path) -> Any:
@@ -73,7 +73,7 @@ def load_document(path: Path, where: str) -> Any:
 
 
 def _require_limits(content: bytes, where: str) -> None:
-    """Raise MapError if a file is no DXF, or would take too long to parse."""
+    """Raise MapError if a file is not a DXF, or would take too long to parse."""
     if not content.startswith(BINARY):
         if not TEXT.match(content):
             raise MapError(

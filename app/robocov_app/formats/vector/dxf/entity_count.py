@@ -1,4 +1,4 @@
-"""Number of entities that a drawing with blocks stands for."""
+"""Number of entities in a drawing after its blocks are expanded."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,11 +9,11 @@ from robocov_app.formats import files
 MAX_DRAWN_ENTITIES = 200_000
 """Largest number of entities drawn, including those of inserted blocks."""
 _MAX_PRINTED_COUNT = 10**300
-"""Blocks in blocks may stand for more entities than a float can express."""
+"""Largest number that is printed: nested blocks may expand to more entities than a float can represent."""
 
 
 def require_few_entities(document: Any, where: str) -> None:
-    """Check the number of entities to be drawn, without drawing them: a few kB may stand for billions.
+    """Check the number of entities to draw before drawing them: a few kB of blocks may expand to billions.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def require_few_entities(document: Any, where: str) -> None:
 
 
 class _EntityCounter:
-    """Counts entities, each block once."""
+    """Counts entities, including those of inserted blocks. Each block is counted only once."""
 
     def __init__(self, document: Any, where: str) -> None:
         self._document = document
@@ -42,13 +42,14 @@ class _EntityCounter:
         self._open_blocks: list[str] = []
 
     def count(self, entities: Iterable[Any]) -> int:
-        """Return the number of entities that are drawn for some, with those of blocks."""
+        """Return the number of entities to draw, including those of inserted blocks."""
         total = 0
         for entity in entities:
             total += self._count_insert(entity) if entity.dxftype() == "INSERT" else 1
         return total
 
     def _count_insert(self, insert: Any) -> int:
+        """Return the number of entities that an insert of a block adds, at all of its positions."""
         name = str(insert.dxf.get("name", "")).casefold()
         if name in self._open_blocks:
             raise MapError(f"{self._where}: block {quote(name)} is inserted into itself")

@@ -1,4 +1,4 @@
-"""Entities of a DXF drawing, from polylines to inserted blocks, as outlines and walls."""
+"""Conversion of the entities of a DXF drawing, including inserted blocks, to outlines and walls."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
@@ -14,11 +14,11 @@ from robocov_app.formats.vector.dxf.curves import flatten_polyline, flatten_spli
 from robocov_app.formats.vector.dxf.entity_count import MAX_DRAWN_ENTITIES, require_few_entities
 
 _SPLINE_FRAME_FLAG = 16
-"""Flag of a vertex of an old polyline that controls its spline, and is not on it."""
+"""Flag of a vertex of an old polyline that is a control point of its spline, not a point on it."""
 _MIN_UPWARD_COMPONENT = 1.0 - 1e-9
-"""A circle whose unit normal has a smaller z component is tilted: an ellipse, as seen from above."""
+"""A circle whose unit normal has a smaller z component is tilted, and is an ellipse seen from above."""
 _MAX_RELATIVE_GAP = 1e-9
-"""Lines whose ends are nearer, relative to their coordinates, are closed."""
+"""A line is closed if the distance between its ends, relative to its coordinates, is at most this."""
 _MAX_KIND_CHARACTERS = 40
 _MAX_PLACE_CHARACTERS = 60
 
@@ -29,12 +29,12 @@ class _Polyline(NamedTuple):
     Attributes
     ----------
     rows : (n, 5) array
-        Of each vertex x, y and, of the edge that follows, the bulge and the widths at its ends.
+        For each vertex: x, y, and the bulge, start width and end width of the edge that follows.
     is_closed : bool
     width : float
-        Width of edges that have none themselves.
+        Width of edges without a width of their own.
     plane : ezdxf.math.OCS or None
-        Coordinate system of the vertices, unless that of the drawing.
+        Coordinate system of the vertices. None stands for that of the drawing.
     height : float
         Position of the vertices along the normal of the plane.
     """
@@ -86,7 +86,7 @@ class EntityReader:
         Raises
         ------
         MapError
-            If there are too many, or a coordinate is out of range.
+            If there are too many entities, or if a coordinate is out of range.
         """
         require_few_entities(self._document, self._shapes.where)
         self._add_entities(self._document.modelspace(), "0", ())
@@ -94,15 +94,15 @@ class EntityReader:
             self._shapes.notes.append(f"curves flattened to within {1000 * CURVE_TOLERANCE_M:g} mm")
 
     def _add_entities(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
-        """Add entities of the drawing or of blocks.
+        """Add entities of the drawing or of a block.
 
         Parameters
         ----------
         entities : iterable of ezdxf.entities.DXFEntity
         layer : str
-            Layer that the innermost block is inserted on, which is also that of its entities on layer 0.
+            Layer on which the innermost block is inserted. It replaces layer 0 of the entities in the block.
         blocks : tuple of str
-            Names of the blocks that the entities are in, the outermost first.
+            Names of the blocks that contain the entities, the outermost first.
         """
         for entity in entities:
             self._drawn_count += 1
@@ -121,6 +121,7 @@ class EntityReader:
                 self._shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _add_entity(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
+        """Add an entity on a layer; if it is hidden or of an unsupported kind, count it as left out."""
         kind = entity.dxftype()
         labels = (layer, *reversed(blocks))
         if layer.casefold() in self._hidden_layers or entity.dxf.get("invisible", 0):
@@ -189,7 +190,7 @@ class EntityReader:
         self._add_line(points * self._scale, labels, at)
 
     def _flatten(self, entity: Any) -> Array:
-        """Return points of a circle, arc, ellipse or spline, (k, 2) in units of the drawing."""
+        """Approximate a circle, arc, ellipse or spline by points, (k, 2) in units of the drawing."""
         kind = entity.dxftype()
         if kind == "ELLIPSE":
             self._require_near(to_plane([entity.dxf.center, entity.dxf.major_axis]))
@@ -201,7 +202,7 @@ class EntityReader:
         return to_plane(list(entity.flattening(tolerance)))
 
     def _add_polyline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        """Add a polyline, whose edges may be arcs, with its largest width."""
+        """Add a polyline, whose edges may be arcs; it gets the largest width of its edges."""
         polyline = _parse_polyline(entity)
         if polyline is None:
             self._shapes.leave_out("mesh")
@@ -225,14 +226,14 @@ class EntityReader:
         self._add_line(points * self._scale, labels, at, width * self._scale)
 
     def _add_line(self, points: Array, labels: tuple[str, ...], at: str, width: float = 0.0) -> None:
-        """Add an outline if a line is closed and has no width, else a wall.
+        """Add a line: as an outline if it is closed and has no width, otherwise as a wall.
 
         Parameters
         ----------
         points : (k, 2) array, m
         labels : tuple of str
         at : str
-            Position in the file, for messages.
+            Place in the file, for messages.
         width : float, m
         """
         gap = np.abs(points[0] - points[-1])
@@ -249,25 +250,25 @@ class EntityReader:
         self._shapes.add_line(WallLine(points, width, labels), at=at)
 
     def _to_meters(self, vectors: Sequence[Any]) -> Array:
-        """Return ezdxf vectors as points, (k, 2) m; third coordinates are counted."""
+        """Convert ezdxf vectors to points, (k, 2) m; third coordinates are counted as left out."""
         heights = np.array([vector[2] if len(vector) > 2 else 0.0 for vector in vectors])
         self._shapes.omissions.add_heights(heights[heights != 0.0])
         return to_plane(vectors) * self._scale
 
     def _get_radius(self, entity: Any) -> float:
-        """Return the radius of a circle or an arc. Raises MapError if it extends too far."""
+        """Return the radius of a circle or an arc; raise MapError if it extends too far."""
         radius = abs(float(entity.dxf.radius))
         self._require_near(np.array([*to_plane([entity.dxf.center]), [radius, radius]]))
         return radius
 
     def _require_near(self, points: Array) -> None:
-        """Raise MapError if points of a curve are out of range: flattening it might not end."""
+        """Raise MapError if points of a curve are out of range, because flattening it might never end."""
         if not (np.abs(points) * self._scale <= MAX_COORDINATE_M).all():
             raise MapError(f"{self._shapes.where}: a curve beyond {MAX_COORDINATE_M:.0f} m")
 
 
 def _describe_place(entity: Any) -> str:
-    """Return the position of an entity in the file, for messages: its kind and its handle."""
+    """Return the kind and the handle of an entity, which identify it in messages."""
     kind = entity.dxftype()
     if not entity.dxf.get("handle"):
         return to_one_line(kind)[:_MAX_PLACE_CHARACTERS]

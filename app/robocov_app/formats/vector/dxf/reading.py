@@ -2,10 +2,10 @@
 
 Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, except for
 the boundary; lines, arcs and open polylines are walls with the width in the drawing, or with that of the
-option ``thickness``. Names are those of layers and blocks: see `Shapes.build_foreign_map`. A block is drawn
-at each position at which it is inserted. Left out are layers that are off or frozen, texts, dimensions,
-everything with a third dimension, and hatches without the option ``hatches``. Curves become lines within a
-millimeter of them. The unit is that of the header, unless the option ``scale`` is given.
+option ``thickness``. Shapes have the names of their layers and blocks: see `Shapes.build_foreign_map`. A
+block is drawn at each position where it is inserted. Left out are layers that are off or frozen, texts,
+dimensions, three-dimensional objects and, without the option ``hatches``, hatches. Curves become lines within
+a millimeter of them. The unit is that of the header, unless the option ``scale`` is given.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ UNITS = {
     10: ("yards", 0.9144), 13: ("micrometers", 1e-6), 14: ("decimeters", 0.1), 15: ("decameters", 10.0),
     16: ("hectometers", 100.0), 21: ("US survey feet", 1200 / 3937),
 }  # fmt: skip
-"""Names and sizes in meters of the units, by their codes in the header ($INSUNITS)."""
+"""Names of units and their sizes in meters, keyed by their codes in the header ($INSUNITS)."""
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -48,7 +48,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _choose_scale(document: Any, scale: float | None, where: str) -> tuple[float, str]:
-    """Return the size of a unit in meters, and a note about it. Raises MapError if it is unknown."""
+    """Return the size of a unit in meters, and a note about it; raise MapError if it is unknown."""
     if scale is not None:
         return scale, f"a unit is {scale:g} m"
     code = document.header.get("$INSUNITS", 0)

@@ -13,12 +13,12 @@ from robocov_app.formats.vector.svg.transforms import build_affine, compose, fit
 
 
 def parse_view_box(attributes: dict[str, str]) -> tuple[float, float, float, float] | None:
-    """Return the ``viewBox`` among attributes; None if there is none of positive size.
+    """Return the ``viewBox`` (x, y, width, height) among attributes; None if it is missing or has no area.
 
     Raises
     ------
     ValueError
-        If it is not four numbers.
+        If the attribute is not four numbers.
     """
     if "viewBox" not in attributes:
         return None
@@ -32,7 +32,7 @@ def parse_view_box(attributes: dict[str, str]) -> tuple[float, float, float, flo
 def list_labels(
     element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Return the labels of an element after inner and before outer ones, without repetition."""
+    """Return the distinct labels: inner ones, those of the element itself, then outer ones."""
     attributes = element.attributes
     names = (attributes.get("id", ""), attributes.get("label", ""), *attributes.get("class", "").split())
     own = [name.strip() for name in names if name.strip()]
@@ -41,7 +41,7 @@ def list_labels(
 
 @dataclass(frozen=True, eq=False)
 class ElementState:
-    """Inherited and own properties of an element.
+    """The state in which an element is drawn: its own properties and those it inherits.
 
     Attributes
     ----------
@@ -49,13 +49,13 @@ class ElementState:
         Transform from the element's units to meters.
     style : Style
     labels : tuple of str
-        The innermost first.
+        Labels of the element and of those around it, the innermost first.
     width, height : float
         Size of the viewport.
     depth : int
         Number of elements around it.
     opacity : float
-        Of the groups around an element and of its own.
+        Opacity of the element and of the groups around it, multiplied.
     """
 
     matrix: Array
@@ -68,11 +68,11 @@ class ElementState:
 
     @property
     def diagonal(self) -> float:
-        """Length that percentages without a direction refer to (SVG 2, section 8.9)."""
+        """Length to which percentages without a direction refer (SVG 2, section 8.9)."""
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
 
     def enter(self, element: Element, properties: Style) -> ElementState:
-        """Return the state of an element with properties of its own."""
+        """Return the state of a child element with its own properties."""
         return replace(
             self,
             matrix=compose(self.matrix, parse_transform(properties.get("transform", ""))),
@@ -83,17 +83,17 @@ class ElementState:
         )
 
     def shift(self, element: Element) -> ElementState:
-        """Return the state moved by the position of a ``use`` or ``svg`` element."""
+        """Return the state translated to the position of a ``use`` or ``svg`` element."""
         x, y = self.parse_lengths(element, "x", "y")
         return replace(self, matrix=compose(self.matrix, build_affine(e=x, f=y)))
 
     def enter_target(self, target: Element, properties: Style) -> ElementState:
-        """Return the state of the target of a ``use`` element, which has this state."""
+        """Return the state of the target of a ``use`` element; this is the state of the ``use`` element."""
         style = inherit_style(self.style, properties)
         return replace(self, style=style, labels=list_labels(target, inner=self.labels))
 
     def enter_viewport(self, attributes: dict[str, str]) -> ElementState:
-        """Return the state in the viewport of an element with these attributes."""
+        """Return the state inside the viewport of an element with these attributes."""
         width = parse_length(attributes.get("width", "100%").replace("auto", "100%"), self.width)
         height = parse_length(attributes.get("height", "100%").replace("auto", "100%"), self.height)
         matrix = self.matrix
@@ -105,11 +105,11 @@ class ElementState:
         return replace(self, matrix=matrix, width=width, height=height)
 
     def parse_radius(self, element: Element) -> float:
-        """Return the radius of a circle, in its units."""
+        """Return the radius of a circle, in the units of the element."""
         return parse_length(element.attributes.get("r", "0"), self.diagonal)
 
     def parse_lengths(self, element: Element, *names: str) -> list[float]:
-        """Return attributes that are lengths along x or y, in units; missing ones are 0."""
+        """Return attributes that are lengths along x or y, in the element's units; missing ones are 0."""
         lengths = []
         for name in names:
             text = element.attributes.get(name, "0").strip()

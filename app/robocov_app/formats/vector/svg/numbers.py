@@ -2,13 +2,14 @@
 
 import re
 
-# Possessive quantifiers (++, *+) never backtrack: a million digits before a wrong letter would take forever.
+# Possessive quantifiers (++, *+) never backtrack, which would take forever with a million digits before an
+# invalid letter.
 DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
 NUMBER = re.compile(rf"[\s,]*+({DECIMAL})", re.ASCII)
 MAX_NUMBER = 1e30
-"""Numbers of a larger absolute value are rejected; those below its inverse are 0."""
+"""Numbers with a larger absolute value are rejected; numbers smaller than its inverse become 0."""
 METERS_PER_UNIT = 0.0254 / 96
-"""Length of a user unit without the option ``scale``."""
+"""Default length of a user unit: 96 units are an inch."""
 _LENGTH = re.compile(rf"\s*+({DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _USER_UNITS = {
     "": 1.0,
@@ -20,11 +21,11 @@ _USER_UNITS = {
     "pt": 4 / 3,
     "pc": 16.0,
 }
-"""User units in a unit of length (CSS Values 4, section 6.2)."""
+"""Number of user units in each unit of length (CSS Values 4, section 6.2)."""
 
 
 def parse_number(text: str) -> float:
-    """Return a number. Raises ValueError if it is larger than `MAX_NUMBER`."""
+    """Convert text to a number; raise ValueError if it is invalid or larger than `MAX_NUMBER`."""
     value = float(text)
     if not abs(value) <= MAX_NUMBER:
         raise ValueError(f"expected a number up to {MAX_NUMBER:g}, got {text[:20]}")
@@ -32,7 +33,7 @@ def parse_number(text: str) -> float:
 
 
 def parse_numbers(text: str) -> list[float]:
-    """Return the numbers of a list, as of ``points``. Raises ValueError if it contains anything else."""
+    """Parse a list of numbers, such as ``points``; raise ValueError if it contains anything else."""
     values = []
     position = 0
     while match := NUMBER.match(text, position):
@@ -44,18 +45,18 @@ def parse_numbers(text: str) -> list[float]:
 
 
 def parse_length(text: str, whole: float | None = None) -> float:
-    """Return a length in user units.
+    """Parse a length, and convert it to user units.
 
     Parameters
     ----------
     text : str
     whole : float or None
-        Length that percentages refer to; None where they are not allowed.
+        Length to which percentages refer. None if percentages are not allowed.
 
     Raises
     ------
     ValueError
-        If the text is no length.
+        If the text is not a length.
     """
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""

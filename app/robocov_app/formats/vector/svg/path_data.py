@@ -1,4 +1,4 @@
-"""Path data of SVG (the attribute ``d``) as points."""
+"""Conversion of SVG path data (the attribute ``d``) to points."""
 
 import cmath
 import math
@@ -12,13 +12,13 @@ from robocov_app.formats.geometry.curves import flatten_arcs, flatten_beziers
 from robocov_app.formats.vector.svg.numbers import NUMBER, parse_number
 
 MAX_COMMANDS = 150_000
-"""Maximum number of commands of all paths of a file, with or without their letter, except for polylines."""
+"""Maximum number of commands of all paths in a file, counting repetitions without a letter, except lines."""
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """Number of arguments of each command."""
 _ARC_FLAGS = (3, 4)
-"""Indices of the arguments of an arc that are 0 or 1, perhaps without a separator."""
+"""Indices of the arguments of an arc that are flags, 0 or 1, which need no separator after them."""
 
 
 class Subpath(NamedTuple):
@@ -37,7 +37,7 @@ def parse_path(
     ----------
     text : str
     tolerance : float
-        Maximum distance of a curve from its points.
+        Maximum distance between a curve and the lines that approximate it.
     max_points, max_commands : int
 
     Returns
@@ -49,8 +49,7 @@ def parse_path(
     Raises
     ------
     ValueError
-        If the text is no path data, with the position of the character, or if there are too many points or
-        commands.
+        If the text is not valid path data, or if there are too many points or commands.
     """
     letters = sum(text.count(letter) + text.count(letter.lower()) for letter in _ARGUMENTS)
     if letters > max_commands:
@@ -74,7 +73,10 @@ def parse_path(
 
 
 def _parse_arguments(text: str, position: int, command: str, pen: "_Pen") -> tuple[list[float], int]:
-    """Return the arguments of a command, also if it is repeated without its letter, and the end of them."""
+    """Parse the arguments of a command and of its repetitions without a letter.
+
+    Returned are all arguments, and the position in the text after them.
+    """
     kind = command.upper()
     count = _ARGUMENTS[kind]
     max_values = count * pen.count_remaining(kind)
@@ -95,7 +97,7 @@ def _parse_arguments(text: str, position: int, command: str, pen: "_Pen") -> tup
 
 
 class _Bezier(NamedTuple):
-    """A cubic Bézier curve and the index of the vertex that it ends at."""
+    """A cubic Bézier curve, and the index of the vertex at its end."""
 
     vertex: int
     start: complex
@@ -105,7 +107,7 @@ class _Bezier(NamedTuple):
 
 
 class _Arc(NamedTuple):
-    """An elliptic arc, center + u cos(a) + v sin(a), and the index of the vertex that it ends at."""
+    """An elliptic arc, center + u cos(a) + v sin(a), and the index of the vertex at its end."""
 
     vertex: int
     center: complex
@@ -116,7 +118,7 @@ class _Arc(NamedTuple):
 
 
 class _FlatCurves(NamedTuple):
-    """Points of curves, (k, 2), their numbers, (n,), and the vertices that the curves end at, (n,)."""
+    """The points of n curves, (k, 2), how many belong to each, and the index of the vertex at each end."""
 
     vertices: IntArray
     points: Array
@@ -124,7 +126,10 @@ class _FlatCurves(NamedTuple):
 
 
 class _Pen:
-    """The pen and the path so far, as x + i y; all curves become points together at the end."""
+    """The pen and the path drawn so far. Positions are complex numbers, x + i y.
+
+    Curves are only recorded while drawing, and all of them are converted to points at once at the end.
+    """
 
     def __init__(self, max_points: int, max_commands: int) -> None:
         self.commands = 0
@@ -141,14 +146,14 @@ class _Pen:
         self._arcs: list[_Arc] = []
 
     def count_remaining(self, kind: str) -> int:
-        """Return how often a command may still occur."""
+        """Return how many more times a command may occur."""
         points = self._max_points - len(self._vertices)
         if kind in "ML":
             return points
         return min(points, self._max_commands - self.commands)
 
     def describe_limit(self, kind: str) -> str:
-        """Return the limit that `count_remaining` has applied."""
+        """Describe the limit on which the result of `count_remaining` is based."""
         points = self._max_points - len(self._vertices)
         if self.count_remaining(kind) == points:
             return f"{self._max_points} points"
@@ -159,7 +164,7 @@ class _Pen:
         if command in "MmLl":
             self._draw(command, values[:2])
             if len(values) > 2:
-                # Lines through all remaining positions.
+                # Further positions after M or L are lines to them.
                 self._draw_polyline(values[2:], is_relative=command.islower())
             return
         count = _ARGUMENTS[command.upper()]
@@ -173,10 +178,10 @@ class _Pen:
         self._last_kind = "Z"
 
     def build_subpaths(self, tolerance: float) -> list[Subpath]:
-        """Return all subpaths of at least two points."""
+        """Return all subpaths with at least two points."""
         vertices = np.array(self._vertices, complex).view(float).reshape(-1, 2)
         curves = self._flatten_curves(tolerance)
-        # Each vertex stands for the points of the curve that ends at it.
+        # A vertex at the end of a curve is repeated, and then replaced by the points of the curve.
         count = np.ones(len(vertices), dtype=np.intp)
         for flat in curves:
             count[flat.vertices] = flat.counts
@@ -193,8 +198,10 @@ class _Pen:
         return [subpath for subpath in subpaths if len(subpath.points) > 1]
 
     def _flatten_curves(self, tolerance: float) -> list[_FlatCurves]:
+        """Approximate all Bézier curves, and all arcs, by points."""
         curves = []
         if self._beziers:
+            # Complex rows; column 0 is the index of the vertex.
             rows = np.array(self._beziers)
             control = rows[:, 1:].copy().view(float).reshape(-1, 4, 2)
             points, counts = flatten_beziers(control, tolerance, self._max_points)
@@ -215,7 +222,7 @@ class _Pen:
         return curves
 
     def _draw(self, command: str, values: list[float]) -> None:
-        """Execute a command once."""
+        """Execute a command with the arguments of one repetition."""
         kind = command.upper()
         origin = self._position if command.islower() else 0j
         self.commands += 1
@@ -223,7 +230,7 @@ class _Pen:
             self._position = origin + complex(*values)
             self._subpath_start = self._position
         if kind == "M" or self._last_kind == "Z":
-            # After a Z, the next subpath starts where the last one did.
+            # After a Z without an M, the next subpath starts where the last one did.
             self._subpath_indices.append(len(self._vertices))
             self._is_closed.append(False)
             self._vertices.append(self._position)
@@ -263,7 +270,7 @@ class _Pen:
         *handles, end = points
         self._handle = handles[-1]
         if len(handles) == 1:
-            # The same curve as one of degree 3.
+            # A quadratic curve (Q, T) is raised to degree 3.
             handles = [point + 2 * (handles[0] - point) / 3 for point in (start, end)]
         first_handle, second_handle = handles
         self._beziers.append(_Bezier(len(self._vertices), start, first_handle, second_handle, end))
@@ -284,18 +291,18 @@ class _Pen:
             return
         turn = complex(math.cos(angle), math.sin(angle))
         half_chord = (start - end) / 2 * turn.conjugate()
-        # In units of the axes, where the ellipse is a circle of radius 1.
+        # In units of the half axes, the ellipse is a circle of radius 1.
         point = complex(half_chord.real / rx, half_chord.imag / ry)
         half_length = abs(point)
         if half_length > 1.0:
-            # The ellipse is too small to reach the end, and scaled up until it does.
+            # The ellipse is too small to reach the end, and is scaled up until it does.
             rx = rx * half_length
             ry = ry * half_length
             point = point / half_length
         ratio = math.sqrt(max(1.0 / max(min(half_length, 1.0), 1e-150) ** 2 - 1.0, 0.0))
         side = 1j if is_large == is_positive else -1j
         middle = side * ratio * point
-        # From the length of the chord, which is exact for huge radii, too.
+        # The length of the chord gives the sweep accurately even for huge radii.
         sweep = 2.0 * math.asin(min(half_length, 1.0))
         if is_large:
             sweep = math.tau - sweep

@@ -1,13 +1,15 @@
 """SVG drawings as maps: filled shapes are areas, and unfilled strokes are walls.
 
-Filled shapes are areas, by their fill rule: solid, except for the boundary (see `Shapes.build_foreign_map`;
-names are ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes
-that are only stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn
-more sharply than their miter limit. Hidden elements, text and images are left out.
+Filled shapes, according to their fill rule, are solid areas, except for the boundary (see
+`Shapes.build_foreign_map`). The names of a shape are its id, its classes and its Inkscape label, and those of
+the groups around it. Shapes that are only stroked are walls as wide as the stroke, or as the option
+``thickness``; corners sharper than the miter limit are cut off. Hidden elements, text and images are left
+out.
 
-Without the option ``scale``, the length of a user unit in meters, the drawing has its own size: 96 px are an
-inch, mm are mm. The y axis is turned up; the lower left corner of the image is [0, 0] m, or the position in
-the attribute ``data-origin`` of the root. A drawing smaller than a meter at its own scale is rejected.
+The option ``scale`` is the length of a user unit in meters. Without it, the drawing has its own size: 96 px
+are an inch, and mm are mm. The y axis is flipped to point up; the lower left corner of the image is [0, 0] m,
+or the position in the attribute ``data-origin`` of the root. A drawing smaller than a meter at its own scale
+is rejected.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ from robocov_app.formats.vector.svg.transforms import build_affine, compose, fit
 
 ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
 _MIN_SIZE_M = 1.0
-"""A drawing that is smaller at its own scale shows something larger."""
+"""Minimum size of a drawing at its own scale. A smaller one must show something larger than itself."""
 _GROUP_TAGS = ("g", "a", "switch", "svg", "use")
 _IMAGE_TAGS = ("text", "image", "foreignObject", "video", "iframe", "canvas")
 _MAX_TITLE_CHARACTERS = 80
@@ -44,7 +46,7 @@ _MAX_DESCRIPTION_CHARACTERS = 1000
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Read an SVG drawing. Raises MapError if it cannot be used."""
+    """Read an SVG drawing; raise MapError if it is damaged, too large or too small, or contains no map."""
     root = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
     shapes = Shapes(root.where, options)
     drawing = _DrawingReader(root, shapes)
@@ -70,7 +72,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _require_size(shapes: Shapes) -> None:
-    """Raise MapError if shapes are too small at their own scale."""
+    """Raise MapError if all shapes together are too small at the drawing's own scale."""
     geometries = shapes.geometries
     if shapes.options.scale is not None or not geometries:
         return
@@ -82,7 +84,7 @@ def _require_size(shapes: Shapes) -> None:
 
 
 def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
-    """Return the matrix from the root's units to meters, and width and height of its viewport in units.
+    """Return the matrix from the root's units to meters, and the width and height of its viewport in units.
 
     Raises
     ------
@@ -115,7 +117,7 @@ def _parse_page_length(attributes: dict[str, str], name: str, whole: float) -> f
 
 
 class _DrawingReader:
-    """Visits the elements in the order in which they are drawn, also uses and nested images."""
+    """Visits the elements, including uses and nested images, in the order in which they are drawn."""
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
         self.root = root
@@ -132,7 +134,7 @@ class _DrawingReader:
         self.shape_reader = ShapeReader(shapes, self.sheet, self._elements_by_id)
 
     def draw(self, matrix: Array, width: float, height: float) -> None:
-        """Add all shapes; the matrix and the size are those of `_compute_page`."""
+        """Add all shapes; the matrix and the size are the result of `_compute_page`."""
         self._require_few_elements()
         style = inherit_style(INHERITED, self.sheet.get_properties(self.root))
         state = ElementState(matrix, style, list_labels(self.root), width, height)
@@ -153,7 +155,7 @@ class _DrawingReader:
         return notes
 
     def _require_few_elements(self) -> None:
-        """Raise MapError if too much would be drawn; a few kB of uses may stand for billions of elements."""
+        """Raise MapError if too much would be drawn: a few kB of uses may expand to billions of elements."""
         counts = _ElementCounter(self).count(self.root, 0)
         if counts[0] > MAX_ELEMENTS:
             expected = f"expected at most {MAX_ELEMENTS}"
@@ -168,6 +170,7 @@ class _DrawingReader:
         return self._elements_by_id.get(element.attributes.get("href", "").strip().removeprefix("#"))
 
     def _draw_element(self, element: Element, outer: ElementState) -> None:
+        """Add an element and its children; `outer` is the state around it."""
         if element.tag in _IMAGE_TAGS:
             self.shapes.leave_out(element.tag)
         if element.tag not in _GROUP_TAGS and element.tag not in SHAPE_TAGS:
@@ -192,7 +195,7 @@ class _DrawingReader:
             self._draw_element(child, child_state)
 
     def _enter_group(self, element: Element, state: ElementState) -> Iterator[tuple[Element, ElementState]]:
-        """Yield the elements that a group draws, each with the state around it.
+        """Yield the elements that a group, an image or a ``use`` draws, each with the state around it.
 
         Raises
         ------
@@ -220,7 +223,7 @@ class _DrawingReader:
 
 
 class _ElementCounter:
-    """Counts the elements that will be drawn without drawing them."""
+    """Counts the elements that would be drawn, without drawing them. Each target is counted only once."""
 
     def __init__(self, drawing: _DrawingReader) -> None:
         self._drawing = drawing
@@ -228,7 +231,7 @@ class _ElementCounter:
         self._open: set[Element] = set()
 
     def count(self, element: Element, depth: int) -> tuple[int, int]:
-        """Return the number of elements, and of shapes among them, that an element draws."""
+        """Return how many elements an element draws, and how many of them are shapes."""
         if element in self._open:
             element.refuse("is used within itself")
         if depth > MAX_NESTING:

@@ -1,4 +1,4 @@
-"""Shapes of a drawing, from paths to rectangles, as outlines and walls."""
+"""Conversion of the shapes of a drawing, from paths to rectangles, to outlines and walls."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ SHAPE_TAGS = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon"
 _CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
 _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
 _MAX_REFERENCES = 5
-"""Number of references from one gradient to the next."""
+"""Maximum number of references that are followed from one gradient to the next."""
 _MAX_EVEN_STRETCH = 1.0 + 1e-6
-"""Ratio of the stretch in two directions up to which a stroke has a single width."""
+"""Maximum ratio of the stretch in two directions for which a stroke has the same width in all directions."""
 _DEFAULT_MITRE_LIMIT = 4.0
 
 
@@ -45,7 +45,7 @@ class ShapeReader:
     shapes : Shapes
     sheet : StyleSheet
     elements_by_id : dict of str to Element
-        For references to gradients.
+        Elements to which paints refer, such as gradients.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ShapeReader:
         self._remaining_commands = MAX_COMMANDS
 
     def add(self, element: Element, state: ElementState) -> None:
-        """Add a shape. Raises ValueError if an attribute is invalid."""
+        """Add a shape; raise ValueError if an attribute is invalid."""
         style = state.style
         is_visible = style["visibility"].lower() not in ("hidden", "collapse")
         if is_visible and not self.shapes.accept(state.labels):
@@ -87,10 +87,10 @@ class ShapeReader:
             self._add_walls(self._compute_subpaths(element, state), state, stroke, element)
 
     def _add_fill(self, element: Element, state: ElementState, fill: Paint, stroke: Paint | None) -> None:
-        """Add a filled shape with its stroke, if any; a shape without an area is only its stroke."""
+        """Add a filled shape with its stroke, if any; without an area, only the stroke is added, as walls."""
         if self._add_disc(element, state, fill):
             if stroke is not None:
-                with suppress(ValueError):  # A disc may be too large to have points, but needs none.
+                with suppress(ValueError):  # a huge disc has too many points for edges, but needs none itself
                     self._add_edges(self._compute_subpaths(element, state), state, stroke)
             return
         subpaths = self._compute_subpaths(element, state)
@@ -103,20 +103,20 @@ class ShapeReader:
             self.shapes.leave_out("shape", "without an area")
 
     def _is_ignored(self, paint: Paint, kind: str) -> bool:
-        """Return whether a color is declared to be ignored; then the fill or stroke is counted."""
+        """Return whether the user ignores a color; if so, count the fill or stroke as left out."""
         if paint.role != "ignore":
             return False
         self.shapes.leave_out(kind, "of a color that is left out (--ignore-color)")
         return True
 
     def _find_paint(self, state: ElementState, kind: Literal["fill", "stroke"]) -> Paint:
-        """Return the color of a fill or a stroke; of a gradient, the first one."""
+        """Return the color of a fill or a stroke, and its role; a gradient has its first color."""
         visible = compute_visible_color(state.style, kind, state.opacity, self._get_gradient_color)
         written = parse_css_color_on_white(state.style[kind])
         return Paint(visible, self.key.find_role(written) or self.key.find_role(visible))
 
     def _get_gradient_color(self, name: str) -> str | None:
-        """Return the first color of the gradient of that name, or of the one that it refers to."""
+        """Return the first color of the gradient with an id, or of the gradient to which it refers."""
         for _ in range(_MAX_REFERENCES):
             gradient = self._elements_by_id.get(name)
             if gradient is None:
@@ -129,7 +129,7 @@ class ShapeReader:
         return None
 
     def _add_disc(self, element: Element, state: ElementState, paint: Paint) -> bool:
-        """Add a circle that the transform leaves one; return whether it is."""
+        """Add a circle as a disc, unless the transform distorts it; return whether it was added."""
         smallest, largest = compute_stretch(state.matrix)
         if element.tag != "circle" or largest - smallest > 1e-9 * largest:
             return False
@@ -156,10 +156,10 @@ class ShapeReader:
         )
 
     def _add_edges(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> None:
-        """Add the stroke of a filled shape, which only counts if its fill turns out to be floor."""
+        """Add the stroke of a filled shape, which is a wall only if the fill turns out to be a floor."""
         try:
             lines = self._build_lines(subpaths, state, paint)
-        except ValueError:  # An invalid width does not matter if the stroke never counts.
+        except ValueError:  # an invalid width is no error, because the stroke may never be used
             return
         min_width = self.shapes.options.compute_stroke_width(self.unit)
         wide = [line for line in lines if min_width <= line.measure_widths()[1] <= MAX_SIZE_M]
@@ -168,7 +168,7 @@ class ShapeReader:
     def _add_walls(
         self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint, element: Element
     ) -> None:
-        """Add the walls that a stroke stands for."""
+        """Add a stroke as walls."""
         lines = self._build_lines(subpaths, state, paint)
         if not lines:
             self.shapes.leave_out("stroke", "without a width")
@@ -183,7 +183,7 @@ class ShapeReader:
             self.shapes.add_line(line, at=_format_line(element))
 
     def _build_lines(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> list[WallLine]:
-        """Return the lines of a stroke; none if it has no width."""
+        """Build the walls of a stroke, one for each subpath; none if it has no width."""
         style = state.style
         thickness = self.shapes.options.thickness
         smallest, largest = compute_stretch(state.matrix)
@@ -216,7 +216,7 @@ class ShapeReader:
         return lines
 
     def _compute_subpaths(self, element: Element, state: ElementState) -> list[Subpath]:
-        """Return the subpaths of a shape, in its units."""
+        """Return the subpaths of a shape, in the units of the element."""
         _, stretch = compute_stretch(state.matrix)
         tolerance = CURVE_TOLERANCE_M / stretch if stretch > 0.0 else np.inf
         attributes = element.attributes
@@ -250,12 +250,12 @@ def _format_line(element: Element) -> str:
 
 
 def _compute_ellipse(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
-    """Return the points of a circle or an ellipse, if it has a size."""
+    """Return the points of a circle or an ellipse; nothing if a radius is not positive."""
     if element.tag == "circle":
         rx = ry = state.parse_radius(element)
     else:
         rx, ry = state.parse_lengths(element, "rx", "ry")
-        # A missing radius is the other one.
+        # A missing radius equals the other one.
         if "rx" not in element.attributes:
             rx = ry
         elif "ry" not in element.attributes:
@@ -269,12 +269,12 @@ def _compute_ellipse(element: Element, state: ElementState, tolerance: float) ->
 
 
 def _compute_rectangle(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
-    """Return the points of a rectangle, whose corners may be round, if it has a size."""
+    """Return the points of a rectangle, whose corners may be round; nothing if it has no area."""
     x, y, width, height = state.parse_lengths(element, "x", "y", "width", "height")
     rx, ry = state.parse_lengths(element, "rx", "ry")
     if width <= 0.0 or height <= 0.0:
         return []
-    # A missing radius is the other one.
+    # A missing radius equals the other one.
     if element.attributes.get("rx", "auto").strip() == "auto":
         rx = ry
     elif element.attributes.get("ry", "auto").strip() == "auto":

@@ -1,4 +1,4 @@
-"""Style of SVG elements: style sheets, inheritance, visibility and colors."""
+"""Styles of SVG elements: style sheets, inheritance, visibility and colors."""
 
 import math
 import re
@@ -11,7 +11,7 @@ from robocov_app.formats.colors import Color, mix_with_white, parse_css_color
 from robocov_app.formats.files.xml_tree import Element
 
 Style: TypeAlias = Mapping[str, str]
-"""Properties by name, as they are written."""
+"""Properties by name, with their values as written in the file."""
 INHERITED = {
     "color": "black",
     "fill": "black",
@@ -30,7 +30,7 @@ INHERITED = {
 MAX_SHEET_CHARACTERS = 1_000_000
 MAX_RULES = 10_000
 MAX_RULE_CHECKS = 500_000
-"""Maximum number of rules compared with elements."""
+"""Maximum number of comparisons of a rule with an element."""
 _PROPERTIES = (*INHERITED, "display", "opacity", "transform", "clip-path", "mask")
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _CLASS_OR_ID = re.compile(r"[.#][\w-]+")
@@ -54,9 +54,9 @@ class _StyleRule(NamedTuple):
     Attributes
     ----------
     marks : frozenset of str
-        Tag, classes and id that an element needs.
+        Tag, classes and id that an element must have.
     weight : tuple of int
-        Rules of a higher weight win.
+        Specificity: numbers of ids, classes and tags, then the number of the rule. The highest rule wins.
     declarations : _Declarations
     """
 
@@ -76,7 +76,7 @@ class StyleSheet:
     Attributes
     ----------
     unsupported : int
-        Number of other rules, as in @supports.
+        Number of rules that are not supported, such as @supports.
     """
 
     def __init__(self, where: str) -> None:
@@ -88,13 +88,13 @@ class StyleSheet:
         self._checks = 0
 
     def add(self, text: str) -> None:
-        """Add the rules of a text. Raises MapError if there are too many."""
+        """Add the rules of a style sheet; raise MapError if the sheets are too long."""
         self._characters += len(text)
         if self._characters > MAX_SHEET_CHARACTERS:
             expected = f"expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
             raise MapError(f"{self._where}: {expected}, got more")
         text = text.replace("<!--", " ").replace("-->", " ")
-        # Only up to the last end of a comment: searching for one that does not exist takes forever.
+        # Comments are removed only up to the last "*/", because searching for a missing end takes forever.
         commented, end, rest = text.rpartition("*/")
         text = _COMMENT.sub(" ", commented + end) + rest
         for rule in self._remove_at_rules(text).split("}")[:-1]:
@@ -106,7 +106,10 @@ class StyleSheet:
                 self._add_rule(selector.strip(), declarations)
 
     def get_properties(self, element: Element) -> dict[str, str]:
-        """Return the properties of an element itself. Raises MapError if there are too many rules."""
+        """Return an element's own properties, from its attributes, the style sheets and its style attribute.
+
+        Raise MapError if too many rules would have to be compared with elements.
+        """
         attributes = element.attributes
         properties = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
         marks = {element.tag, f"#{attributes.get('id', '')}"}
@@ -126,7 +129,7 @@ class StyleSheet:
         return properties
 
     def _remove_at_rules(self, text: str) -> str:
-        """Return a style sheet without its @ rules, which apply to other media, or name other files."""
+        """Remove the @ rules of a style sheet, which apply to other media or name other files."""
         kept = []
         position = 0
         while (start := text.find("@", position)) >= 0:
@@ -138,6 +141,7 @@ class StyleSheet:
         return "".join([*kept, text[position:]])
 
     def _add_rule(self, selector: str, declarations: _Declarations) -> None:
+        """Add a rule, or count it as unsupported if its selector is not a tag, classes and an id."""
         match = _SELECTOR.fullmatch(selector)
         if match is None or not selector or self._rule_count >= MAX_RULES:
             self.unsupported += 1
@@ -148,6 +152,7 @@ class StyleSheet:
         self._rule_count += 1
         weight = (id_count, len(marks) - id_count, len(tags), self._rule_count)
         rule = _StyleRule(frozenset([*tags, *marks]), weight, declarations)
+        # A rule is compared only with elements that have its last mark; "" is for rules without marks.
         key = ""
         if tags or marks:
             key = [*tags, *marks][-1]
@@ -155,7 +160,7 @@ class StyleSheet:
 
 
 def _skip_at_rule(text: str, start: int) -> int:
-    """Return the position after an @ rule, which ends with a semicolon or its last brace."""
+    """Return the position after an @ rule, which ends at a semicolon or at its closing brace."""
     depth = 0
     for part in _AT_RULE_PARTS.finditer(text, start):
         if part[0] == "{":
@@ -169,13 +174,13 @@ def _skip_at_rule(text: str, start: int) -> int:
 
 
 def parse_declarations(text: str) -> dict[str, str]:
-    """Return the declarations of a style attribute or rule, by the name of the property."""
+    """Parse the declarations of a style attribute or rule; values are keyed by the names of properties."""
     pairs = [part.partition(":") for part in text.split(";") if ":" in part]
     return {name.strip().lower(): value.strip() for name, _, value in pairs}
 
 
 def _split_by_importance(properties: dict[str, str]) -> _Declarations:
-    """Split properties by the mark ``!important``, which is removed."""
+    """Split properties into those without and those with ``!important``, which is removed."""
     normal = {}
     important = {}
     for name, value in properties.items():
@@ -187,7 +192,7 @@ def _split_by_importance(properties: dict[str, str]) -> _Declarations:
 
 
 def inherit_style(parent: Style, own: Style) -> dict[str, str]:
-    """Return the style of an element from that of its parent and its own properties."""
+    """Return the style of an element with given own properties, inheriting the others from its parent."""
     style = {}
     for name in INHERITED:
         value = own.get(name, "inherit")
@@ -209,7 +214,7 @@ def compute_visible_color(
     opacity: float,
     get_gradient_color: Callable[[str], str | None],
 ) -> Color | None:
-    """Return the color of a fill or a stroke, mixed with white where it is translucent.
+    """Return the color of a fill or a stroke, mixed with white if it is translucent.
 
     Parameters
     ----------
@@ -218,12 +223,12 @@ def compute_visible_color(
     opacity : float
         Opacity of the element and of the groups around it.
     get_gradient_color : callable
-        Returns the color of the gradient with a name, as it is written, or None.
+        Returns the color of the gradient with an id, as written in the file, or None.
 
     Returns
     -------
     Color or None
-        None where it is not known, as of a pattern.
+        None if the color is unknown, such as that of a pattern.
     """
     written = style[kind]
     match = _REFERENCE.match(written)
@@ -239,7 +244,7 @@ def compute_visible_color(
 
 
 def parse_opacity(text: str) -> float:
-    """Return an opacity from 0 to 1; it is 1 if the text is no number."""
+    """Parse an opacity, a number or a percentage, and limit it to 0 to 1; invalid input gives 1."""
     text = text.strip()
     try:
         value = float(text.rstrip("%"))
@@ -253,7 +258,7 @@ def parse_opacity(text: str) -> float:
 
 
 def is_hidden(own: Style) -> bool:
-    """Return whether an element with these properties of its own is hidden, with all that it contains."""
+    """Return whether these own properties of an element hide it and everything in it."""
     return own.get("display", "").lower() == "none" or _is_zero(own.get("opacity", "1"))
 
 

@@ -1,4 +1,4 @@
-"""Transforms of SVG as (3, 3) matrices."""
+"""SVG transforms as (3, 3) matrices."""
 
 import math
 import re
@@ -23,12 +23,12 @@ def build_affine(
 
 
 def compose(outer: Array, inner: Array) -> Array:
-    """Return the matrix of two transforms, the inner one first.
+    """Return the matrix that applies the inner transform first, then the outer one.
 
     Raises
     ------
     ValueError
-        If it has an element larger than `MAX_NUMBER`.
+        If an element of the matrix is larger than `MAX_NUMBER`.
     """
     both = outer @ inner
     if not (np.abs(both) <= MAX_NUMBER).all():
@@ -39,8 +39,8 @@ def compose(outer: Array, inner: Array) -> Array:
 def compute_stretch(matrix: Array) -> tuple[float, float]:
     """Return the smallest and the largest factor by which a transform stretches lengths.
 
-    These are the singular values of its linear part. A decomposition by LAPACK, for each shape, would take as
-    long as everything else.
+    These are the singular values of its linear part. Computing them with LAPACK for each shape would take as
+    long as the rest of the import.
     """
     (a, c), (b, d) = matrix[:2, :2].tolist()
     half_sum = math.hypot(a + d, b - c) / 2
@@ -54,13 +54,13 @@ def parse_transform(text: str) -> Array:
     Raises
     ------
     ValueError
-        If the text is no transform.
+        If the text is not a valid transform.
     """
     matrix = build_affine()
     position = 0
     while match := _FUNCTION.match(text, position):
         function = _FUNCTIONS.get(match[1].lower())
-        # CSS writes units where attributes have none.
+        # CSS writes numbers with units, attributes without.
         values = parse_numbers(_UNIT.sub("", match[2]))
         if function is None or len(values) not in function[0]:
             raise ValueError(f"expected a transform, got {match[0].strip()[:40]!r}")
@@ -121,4 +121,4 @@ _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
     "skewx": ((1,), lambda angle: build_affine(c=math.tan(math.radians(angle)))),
     "skewy": ((1,), lambda angle: build_affine(b=math.tan(math.radians(angle)))),
 }
-"""Allowed numbers of arguments, and the matrix, of each function."""
+"""For each function: the allowed numbers of arguments, and how to build its matrix."""

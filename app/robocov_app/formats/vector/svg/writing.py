@@ -1,4 +1,4 @@
-"""Maps as SVG drawings at true scale."""
+"""Writing maps as SVG drawings at true scale."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +17,12 @@ from robocov_app.formats.reports import ExportReport
 from robocov_app.look.theme import DARK, LIGHT, Theme
 
 DEFAULT_DIGITS = 3
-"""Decimals of millimeters: at true scale, as fine as the free space is known."""
+"""Decimals of coordinates in millimeters: at true scale, they are rounded to a micrometer."""
 DEFAULT_SCALE = 0.001
-"""Meters that a millimeter of the drawing stands for."""
+"""Length, in meters, that a millimeter of the drawing represents: true scale."""
 _MARGIN = 0.03
 """Margin around the map, as a fraction of its longer side."""
-# A browser window shows the whole map, whatever its size.
+# max-width and max-height make a browser window show the whole map, whatever its size.
 _PAGE = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" {size}
@@ -52,7 +52,7 @@ class _ShapeWriter:
     Attributes
     ----------
     scale : float
-        Meters that a millimeter stands for.
+        Length, in meters, that a millimeter represents.
     digits : int
         Number of decimals.
     """
@@ -61,20 +61,20 @@ class _ShapeWriter:
     digits: int
 
     def format_length(self, length: float) -> str:
-        """Return a length in meters as millimeters of the drawing."""
+        """Format a length, m, in millimeters of the drawing."""
         return format_decimal(length / self.scale, self.digits)
 
     def round_length(self, length: float) -> float:
-        """Return a length in meters as precisely as it is written."""
+        """Round a length, m, as it is rounded when written."""
         return round(length / self.scale, self.digits) * self.scale
 
     def format_ring(self, ring: Ring, end: str = "Z") -> str:
-        """Return the path data of a ring, or of a line if the end is empty."""
+        """Return the path data of a ring, or of an open line if `end` is empty."""
         points = [f"{self.format_length(x)} {self.format_length(-y)}" for x, y in ring]
         return f"M{' L'.join(points)}{end}"
 
     def format_obstacle(self, obstacle: Obstacle) -> str:
-        """Return the element of an obstacle."""
+        """Return an obstacle as an SVG element, with its name as the title."""
         if isinstance(obstacle, CircleObstacle):
             x = self.format_length(obstacle.center[0])
             y = self.format_length(-obstacle.center[1])
@@ -96,7 +96,7 @@ class _ShapeWriter:
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    """Write a map as an SVG drawing."""
+    """Write a map as an SVG drawing; raise OutputError if the file cannot be written."""
     scale = get_or_default(options.scale, DEFAULT_SCALE)
     writer = _ShapeWriter(scale, get_or_default(options.digits, DEFAULT_DIGITS))
     vertices = np.asarray(environment.boundary, dtype=float)
@@ -122,12 +122,12 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 
 
 def _build_page(environment: Environment, writer: _ShapeWriter, low: np.ndarray, high: np.ndarray) -> str:
-    """Return the drawing of a map between two corners, m."""
+    """Return the SVG text of the map between two corners, m."""
     x = writer.format_length(low[0])
     y = writer.format_length(-high[1])
     width = writer.format_length(high[0] - low[0])
     height = writer.format_length(high[1] - low[1])
-    # The lower left corner of the box with its decimals.
+    # The lower left corner of the view box as written, so that it can be imported at the same position.
     left = float(x) * writer.scale
     bottom = -(float(y) + float(height)) * writer.scale
     obstacles = [f"{writer.format_obstacle(obstacle)}\n" for obstacle in environment.obstacles]
@@ -160,5 +160,5 @@ def _format_color(color: tuple[int, int, int]) -> str:
 
 
 def _escape(text: str) -> str:
-    """Return printable text with entities for special characters."""
+    """Replace unprintable characters by blanks, and special ones by entities."""
     return escape("".join(character if character.isprintable() else " " for character in text))

@@ -1,4 +1,4 @@
-"""Well-known text: the grammar (`parser`), free space from polygons (`reading`, `holes`), and `writing`."""
+"""Well-known text: its grammar (`parser`), conversion to free space (`reading`, `holes`), and `writing`."""
 
 from robocov_app.formats.vector.wkt.parser import sniff
 from robocov_app.formats.vector.wkt.reading import read

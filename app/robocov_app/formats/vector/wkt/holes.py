@@ -1,4 +1,4 @@
-"""Holes of polygons, which are obstacles also where other polygons overlap them."""
+"""Holes of polygons, which are obstacles even where other polygons overlap them."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,25 +13,25 @@ from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 
 MAX_OVERLAPS = 50_000
-"""Largest number of pairs of a hole and a polygon that meet."""
+"""Largest number of pairs of a hole and a polygon that intersect."""
 _HOLES_PER_QUERY = 20
-"""Number of holes that are compared at once, which bounds the memory."""
+"""Number of holes that are compared at once, to limit the memory."""
 
 
 def exclude_holes(geometries: list[SourceGeometry], shapes: Shapes) -> list[SourceGeometry]:
-    """Subtract the holes of polygons from the other polygons, except for those completely in a hole.
+    """Subtract the holes of polygons from all other polygons, except for polygons completely inside the hole.
 
     Parameters
     ----------
     geometries : list of SourceGeometry
-        Coordinates in meters.
+        Geometries with coordinates in meters.
     shapes : Shapes
-        Takes a note about the changes.
+        Collects a note about the changes.
 
     Returns
     -------
     list of SourceGeometry
-        In the same order; a polygon may be in several parts.
+        The geometries in the same order. A polygon may have become several.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def exclude_holes(geometries: list[SourceGeometry], shapes: Shapes) -> list[Sour
 
 
 def _build_valid_polygons(geometries: list[SourceGeometry]) -> dict[int, Polygon]:
-    """Return the valid polygons by their index; others are repaired later, each by itself."""
+    """Return the valid polygons, keyed by their index; invalid ones are repaired later, one by one."""
     valid: dict[int, Polygon] = {}
     for index, geometry in enumerate(geometries):
         if geometry.kind != "polygon" or any(len(ring) < 4 for ring in geometry.rings):
@@ -73,7 +73,7 @@ def _build_valid_polygons(geometries: list[SourceGeometry]) -> dict[int, Polygon
 def _group_overlapping_holes(
     holes: list[Polygon], polygons: list[Polygon], where: str
 ) -> dict[int, list[Polygon]]:
-    """Return the holes that overlap each polygon, by its index."""
+    """Return the holes that overlap each polygon, keyed by the polygon's index."""
     groups: dict[int, list[Polygon]] = {}
     for hole, k in _find_overlaps(holes, polygons, where):
         groups.setdefault(k, []).append(hole)
@@ -83,7 +83,7 @@ def _group_overlapping_holes(
 def _find_overlaps(
     holes: list[Polygon], polygons: list[Polygon], where: str
 ) -> Iterator[tuple[Polygon, int]]:
-    """Yield each hole with the index of each polygon that overlaps it, unless the polygon is in the hole."""
+    """Yield the pairs of a hole and the index of a polygon that overlaps it but is not inside it."""
     tree = shapely.STRtree(polygons)
     pair_count = 0
     for start in range(0, len(holes), _HOLES_PER_QUERY):
@@ -103,7 +103,7 @@ def _find_overlaps(
 def _replace_polygons(
     geometries: list[SourceGeometry], remainders: dict[int, MultiPolygon]
 ) -> list[SourceGeometry]:
-    """Return geometries, with what remains of some polygons, by their index, instead of these."""
+    """Replace polygons by what remains of them; `remainders` is keyed by their indices."""
     result: list[SourceGeometry] = []
     for index, geometry in enumerate(geometries):
         if index not in remainders:

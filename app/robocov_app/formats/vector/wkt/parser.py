@@ -24,7 +24,7 @@ KINDS = (
 CURVED_KINDS = (
     "CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE",
 )  # fmt: skip
-"""Kinds that are known, but not read."""
+"""Kinds that are recognized, but not supported."""
 START = re.compile(
     rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
     % b"|".join(kind.encode() for kind in (*KINDS, *CURVED_KINDS)),
@@ -48,7 +48,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 class _Geometry(NamedTuple):
-    """The beginning of a geometry.
+    """The beginning of a geometry that is being parsed.
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ class _Geometry(NamedTuple):
     is_measured : bool
         Whether the last coordinate of its points is a measure, not a height.
     start : int
-        Index of its first character.
+        Index of its first character in the text.
     at : str
-        Number of the geometry, for messages, as in "geometry 2.1".
+        Number of the geometry, for messages, such as "geometry 2.1".
     depth : int
         Number of collections around it.
     """
@@ -73,7 +73,7 @@ class _Geometry(NamedTuple):
 class WktParser:
     """Parser of a sequence of geometries.
 
-    Between them are commas, semicolons or nothing. Lines that begin with # or -- are comments.
+    Geometries may be separated by commas or semicolons. Lines that begin with # or -- are comments.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class WktParser:
     where : str
         The file, for messages.
     shapes : Shapes
-        Counts geometries that are left out or mended.
+        Counts geometries that are left out or repaired.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class WktParser:
     """
 
     def __init__(self, text: str, where: str, shapes: Shapes) -> None:
-        # As many spaces replace a comment, so that the columns in messages are right.
+        # Comments become spaces of the same length, so that positions in messages are right.
         text = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
         self.srid: int | None = None
         self._scanner = Scanner(text, where)
@@ -111,7 +111,7 @@ class WktParser:
         }
 
     def parse(self) -> list[SourceGeometry]:
-        """Return all geometries. Raises MapError at the first mistake in the text."""
+        """Return all geometries; raise MapError at the first syntax error."""
         scanner = self._scanner
         number = 0
         while not scanner.is_at_end():
@@ -122,7 +122,7 @@ class WktParser:
         return self._geometries
 
     def _parse_srid(self) -> None:
-        """Read the reference system in front of a geometry, if there is one."""
+        """Parse the reference system in front of a geometry, if there is one."""
         match = self._scanner.match(_SRID)
         if match is None:
             return
@@ -160,7 +160,7 @@ class WktParser:
         return match[1].upper(), dimensions.upper() == "M"
 
     def _accept_empty(self) -> bool:
-        """Move past the word EMPTY, if it follows; return whether it did."""
+        """Move past the word EMPTY if it follows, and return whether it does."""
         self._scanner.skip_space()
         word = self._scanner.match(_WORD)
         if word is None or word[0].upper() != "EMPTY":
@@ -169,9 +169,9 @@ class WktParser:
         return True
 
     def _iterate_items(self, *, may_be_empty: bool = True) -> Iterator[int]:
-        """Read brackets and commas around items, which the caller reads; yield the number of each.
+        """Parse the brackets and commas of a list; yield the number of each item, which the caller parses.
 
-        Items that are EMPTY are skipped, unless that word would be part of a geometry.
+        Items that are EMPTY are skipped if `may_be_empty`.
         """
         self._scanner.expect("(")
         for number in count(1):
@@ -194,7 +194,7 @@ class WktParser:
             self._add_polygon(geometry, f"{geometry.at}.{number}", whole=geometry.at)
 
     def _add_polygon(self, geometry: _Geometry, at: str, whole: str = "") -> None:
-        """Read the rings of a polygon, which may be one of several in a geometry."""
+        """Parse the rings of a polygon; `whole` is the number of the geometry if it has several polygons."""
         rings = [self._parse_points(geometry, minimum=1) for _ in self._iterate_items()]
         if rings:
             self._geometries.append(self._shapes.build_polygon(rings, (), at, whole))
@@ -214,7 +214,7 @@ class WktParser:
         self._add_points(points, geometry)
 
     def _parse_multipoint(self, geometry: _Geometry) -> None:
-        """Read points in common brackets, or each in its own."""
+        """Parse points in a common pair of brackets, or in a pair of brackets each."""
         if self._scanner.match(_POINTS):
             self._add_points(self._parse_points(geometry, minimum=1), geometry)
             return
@@ -225,7 +225,7 @@ class WktParser:
         self._geometries += [SourceGeometry("point", (point[None],), at=geometry.at) for point in points]
 
     def _parse_points(self, geometry: _Geometry, *, minimum: int) -> Array:
-        """Return the points in brackets, (k, 2), at least `minimum`; heights are counted."""
+        """Parse at least `minimum` points in brackets; return their first two coordinates, (k, 2)."""
         scanner = self._scanner
         scanner.skip_space()
         match = scanner.match(_POINTS)
@@ -254,7 +254,7 @@ class WktParser:
         return points[:, :2]
 
     def _refuse_points(self) -> NoReturn:
-        """Raise MapError for the text that follows, which is not a list of points in brackets."""
+        """Raise MapError at the first character that follows which does not belong to a list of points."""
         scanner = self._scanner
         scanner.expect("(")
         end = len(scanner.text)
@@ -270,7 +270,7 @@ class WktParser:
         self._refuse_point()
 
     def _refuse_point(self) -> NoReturn:
-        """Raise the MapError of the following point."""
+        """Raise MapError for the point that follows."""
         scanner = self._scanner
         ahead = scanner.text[scanner.position : scanner.position + _MAX_POINT_CHARACTERS]
         point = ahead.split(",")[0].split(")")[0]

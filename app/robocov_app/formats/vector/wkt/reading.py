@@ -1,9 +1,9 @@
 """Well-known text as maps.
 
-Polygons are free space, also where they overlap or are in each other. Their holes are obstacles, also where
+Polygons are free space, even where they overlap or contain each other. Their holes are obstacles, even where
 another polygon overlaps them: JuPedSim unites accessible areas, and then excludes holes (``build_geometry``
-in the manual, https://www.jupedsim.org). Only a polygon that is completely in a hole is free there, as in a
-MULTIPOLYGON. In a file without polygons, lines are walls. The option ``outlines`` overrules this; see
+in the manual, https://www.jupedsim.org). Only a polygon completely inside a hole is free there, as in a
+MULTIPOLYGON. In a file without polygons, lines are walls. The option ``outlines`` takes precedence; see
 `Shapes.build_foreign_map`. Coordinates are meters, unless a prefix ``SRID=...;`` names another system.
 """
 

@@ -1,4 +1,4 @@
-"""A text that is read from its start to its end, and the position of errors in it."""
+"""A scanner for text, which reports the positions of errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MAX_QUOTED_CHARACTERS = 24
 
 
 class Scanner:
-    """A text and the position up to which it was read.
+    """A text and the position up to which it has been read.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Scanner:
     def skip_space(self) -> None:
         """Move past white space."""
         match = _SPACE.match(self.text, self.position)
-        assert match is not None  # The pattern matches an empty text, too.
+        assert match is not None  # the pattern also matches empty text
         self.position = match.end()
 
     def is_at_end(self) -> bool:
@@ -45,11 +45,14 @@ class Scanner:
         return self.position == len(self.text)
 
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """Return the match of a pattern at the position, without moving past it."""
+        """Match a pattern at the current position, without moving past it."""
         return pattern.match(self.text, self.position)
 
     def accept(self, characters: str) -> bool:
-        """Move past white space and one of some characters, if it follows; return whether it did."""
+        """Move past white space and then, if it is among `characters`, past the next character.
+
+        Return whether it is.
+        """
         self.skip_space()
         character = self.text[self.position : self.position + 1]
         if not character or character not in characters:
@@ -58,12 +61,12 @@ class Scanner:
         return True
 
     def expect(self, character: str) -> None:
-        """Move past white space and a character. Raises MapError if another one follows."""
+        """Move past white space and a given character; raise MapError if another one follows."""
         if not self.accept(character):
             self.refuse(f"expected {character}, got {self.quote_next()}")
 
     def quote_next(self) -> str:
-        """Move past white space, and return the beginning of the following line for a message."""
+        """Move past white space, and quote the beginning of the text that follows for a message."""
         self.skip_space()
         lines = self.text[self.position : self.position + _MAX_QUOTED_CHARACTERS].splitlines()
         return quote(lines[0]) if lines else "the end"

@@ -1,4 +1,4 @@
-"""The free space of maps as well-known text."""
+"""Writing the free space of maps as well-known text."""
 
 from pathlib import Path
 
@@ -45,7 +45,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 
 
 def _format_polygon(polygon: Polygon, digits: int) -> str:
-    """Return the rings of a polygon in brackets."""
+    """Return the rings of a polygon as well-known text, in brackets."""
     rings = [_format_ring(ring, digits) for ring in list_rings(polygon)]
     return f"({', '.join(rings)})"
 
