@@ -12,7 +12,7 @@ import pytest
 from driven_window import open_viewer
 from sample_sessions import advance_session, start_session
 
-from robocov.errors import MapError
+from robocov.errors import InputError, MapError
 from robocov_app.cli import main
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.viewer.lessons import player
@@ -233,8 +233,44 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
     content["lesson"]["chapters"][0]["touch"] = 9
     path.write_text(json.dumps(content))
     with pytest.raises(
-        MapError, match=r"lesson\.chapters\[0\]\.touch: expected the number of a touch, 0 to 2"
+        MapError, match=r"lesson\.chapters\[0\]\.touch: expected the index of an edit, 0 to 2"
     ):
+        load_lesson(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (("robot",), 99, r"\.robot: expected a robot of the session, 1 to \d+, got 99"),
+        (("until",), {}, r"\.until: expected \"step\", \"settled\".*, got \{\}"),
+        (("until",), {"robot": 1}, r"\.until: expected .* \"robot\" with \"inside\""),
+        (("until",), {"inside": [0, 0, 1, 1]}, r"\.until: expected .* \"robot\" with \"inside\""),
+        (
+            ("until",),
+            {"robot": 1, "inside": [3, 0, 1, 1]},
+            r"\.until\.inside: expected \[left, bottom, right, top\]",
+        ),
+        (
+            ("task",),
+            {"text": "Drag it.", "until": {"robot": 99, "outside": [0, 0, 1, 1]}},
+            r"\.task\.until\.robot: expected a robot",
+        ),
+        (
+            ("question",),
+            {"text": "Which?", "answers": ["A", "B"], "right": 3},
+            r"\.question\.right: expected the number of an answer, 1 to 2, got 3",
+        ),
+        (("show",), ["goal"], r"chapters\[0\]\.show: unknown layer 'goal': did you mean 'goals'"),
+    ],
+)
+def test_a_chapter_that_cannot_work_is_refused(
+    place: tuple[str], value: object, message: str, tmp_path: Path
+) -> None:
+    path = write_short_lesson(tmp_path)
+    content = json.loads(path.read_text())
+    content["lesson"]["chapters"][0][place[0]] = value
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=message):
         load_lesson(path)
 
 

@@ -129,10 +129,10 @@ def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_pat
 @pytest.mark.parametrize(
     ("json_path", "value", "message"),
     [
-        (("head",), 9, "head: expected the number of a touch, 0 to 1, got 9"),
+        (("head",), 9, "head: expected the index of an edit, 0 to 1, got 9"),
         (("step",), 999, "step: expected a step of the head, 10 to 30, got 999"),
         (("touches", 1, "parent"), 1, "touches[1].parent: expected null for the first"),
-        (("touches", 1, "at"), 999, "touches[1].at: expected a step of touch 0, 0 to 10, got 999"),
+        (("touches", 1, "at"), 999, "touches[1].at: expected a step of edit 0, 0 to 10, got 999"),
         (
             ("touches", 1, "end"),
             9,

@@ -6,6 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from robocov.errors import MapError, Mistake
+from robocov_app.render.layer_catalog import check_layer_names
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, QuestionModel, TaskModel
 from robocov_app.viewer.session.files.session_file import SavedSession, load_session
@@ -56,10 +57,14 @@ def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
     ------
     MapError
         If it cannot be read, or has no lesson.
+    ParameterError
+        If a chapter shows an unknown layer.
     """
     saved = load_session(path)
     if saved.lesson is None:
         raise MapError.from_mistakes(str(path), [Mistake.at_path(("lesson",), "missing")])
+    for index, chapter in enumerate(saved.lesson.chapters):
+        check_layer_names(f"{path}: lesson.chapters[{index}].show", chapter.show)
     return saved
 
 
@@ -332,7 +337,7 @@ class LessonPlayer:
         viewer.toolbox.current = viewer.toolbox.hand
         viewer.inspection.active_pane = 0
         viewer.inspection.selected = chapter.robot
-        viewer.view.layers = set(BASE_LAYERS) | set(chapter.show)
+        viewer.view.layers = set(BASE_LAYERS | check_layer_names("show", chapter.show))
         viewer.clear_message()
         self._fit_view()
         if chapter.question is None:

@@ -19,6 +19,7 @@ from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.edits import DragRobot, Restart, SessionEdit
+from robocov_app.viewer.session.files.lesson_checks import check_lesson_references
 from robocov_app.viewer.session.files.maps import FileContext, refuse_value
 from robocov_app.viewer.session.files.models import LessonModel, NodeModel, SessionModel
 
@@ -211,27 +212,15 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
     nodes: list[Node] = []
     for node_model in model.touches:
         nodes.append(_NodeReader(where, nodes).read(node_model))
-    numbers = f"the number of a touch, 0 to {len(nodes) - 1}"
     if model.head >= len(nodes):
-        refuse_value(where, ("head",), model.head, numbers)
+        refuse_value(where, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
     head = nodes[model.head]
     if not head.first_step <= model.step <= head.last_step:
         expected = f"a step of the head, {head.first_step} to {head.last_step}"
         refuse_value(where, ("step",), model.step, expected)
     if model.lesson is not None:
-        _check_lesson(model.lesson, where, len(nodes), numbers)
+        check_lesson_references(model.lesson, where, nodes)
     return SavedSession(SessionDocument(nodes), head, model.step, model.view, model.lesson)
-
-
-def _check_lesson(lesson: LessonModel, where: str, node_count: int, numbers: str) -> None:
-    """Raise a MapError if a chapter refers to a node or an answer that does not exist."""
-    for index, chapter in enumerate(lesson.chapters):
-        path = ("lesson", "chapters", index)
-        if chapter.touch >= node_count:
-            refuse_value(where, (*path, "touch"), chapter.touch, numbers)
-        question = chapter.question
-        if question is not None and question.right > len(question.answers):
-            refuse_value(where, (*path, "question", "right"), question.right, "the number of an answer")
 
 
 class _NodeReader:
@@ -276,13 +265,13 @@ class _NodeReader:
         is_root = model.parent is None
         is_unknown = model.parent is not None and model.parent >= len(self._nodes)
         if is_root != is_first or is_unknown:
-            self._refuse(("parent",), model.parent, "null for the first, or the number of an earlier touch")
+            self._refuse(("parent",), model.parent, "null for the first, or the index of an earlier edit")
 
     def _check_steps(self, model: NodeModel, node: Node) -> None:
         parent = node.parent
         if parent is not None and not parent.first_step <= model.at <= parent.last_step:
             steps = f"{parent.first_step} to {parent.last_step}"
-            self._refuse(("at",), model.at, f"a step of touch {model.parent}, {steps}")
+            self._refuse(("at",), model.at, f"a step of edit {model.parent}, {steps}")
         edit_steps = [edit.step for edit in node.edits]
         is_ordered = edit_steps == sorted(edit_steps) and edit_steps[0] == node.first_step
         if not is_ordered or node.last_step < edit_steps[-1]:
