@@ -1,4 +1,4 @@
-"""Targets of the user's attention: a robot, a pane, the point under the cursor."""
+"""What the user inspects: a robot, a pane, and the point under the cursor."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ class Inspection:
     Attributes
     ----------
     selected : int or None
-        Number of the selected robot; it may have been removed since.
+        Number of the selected robot, which may have been removed in the meantime.
     active_pane : int
         Index of the pane whose controller and gains are edited.
     cursor : Point or None

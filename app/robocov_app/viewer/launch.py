@@ -1,4 +1,4 @@
-"""Opening the viewer's window, with a display or without, and keeping its settings."""
+"""Opening the viewer's window, with or without a display, and saving its settings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,11 +32,11 @@ NO_DISPLAY = (
     "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR "
     "with --frames N (for a saved run, with --video); robocov run needs no display."
 )
-HEADLESS_FPS = 30  # frames per second without a display
+HEADLESS_FPS = 30  # frames per second of simulated real time without a display
 
 
 class ViewerSettings(WindowSettings):
-    """Appearance of the viewer, kept in the user's folder for settings.
+    """Appearance of the viewer, saved in the user's settings folder.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class ViewerSettings(WindowSettings):
     shown : tuple of str or None
         Names of the visible layers; None for the default ones.
     fade : bool
-        Whether trajectories show the last seconds only.
+        Whether trajectories show only the last seconds.
     suggests : bool
         Whether the window suggests what to try.
     """
@@ -65,24 +65,25 @@ class ViewerLauncher:
     session : Session
         The session.
     map_name : str
-        Bundled name or path of its map.
+        Bundled name or path of the session's map.
     folder : Path
         Folder in which files are saved.
     theme : str or None
-        ``light`` or ``dark``; None for the one used last.
+        ``light`` or ``dark``; None for that of the settings.
     size : tuple of int or None
-        Width and height, px; None for those used last.
+        Width and height, px; None for those of the settings.
     scale : float or None
-        Size of texts and widgets; None for the one used last.
+        Scale of texts and widgets; None for that of the settings.
     shown_layers : frozenset of str
-        Layers that are visible in addition to those used last.
+        Layers that are visible in addition to those of the settings.
     hidden_layers : frozenset of str
         Layers that are hidden.
     headless : bool
-        Whether to draw without a display, in steps of 1 / `HEADLESS_FPS` however long a frame takes.
+        Whether to draw without a display; each frame then advances time by 1 / `HEADLESS_FPS`, however long
+        it takes.
     served : bool
-        Whether to draw for a browser: without a display, but in real time. No settings are kept; drafts are
-        below `folder`.
+        Whether to draw for a browser: without a display, but in real time. No settings are saved; drafts are
+        in `folder`.
     controllers : tuple of str
         Names of controllers to offer in addition to the built-in ones.
     lattice : int
@@ -110,7 +111,7 @@ class ViewerLauncher:
 
     @contextmanager
     def window(self) -> Iterator[ViewerWindow]:
-        """Open the window with its settings, and save those that were changed.
+        """Open the window with its settings, and at the end save those that were changed.
 
         Raises
         ------
@@ -142,13 +143,13 @@ class ViewerLauncher:
 
     @property
     def _draft_folder(self) -> Path | None:
-        """Folder for drafts; None if none are kept."""
+        """Folder for drafts; None if no drafts are saved."""
         if self.headless:
             return None
         return find_draft_folder(self.folder if self.served else None)
 
     def _offer_help(self, window: ViewerWindow, settings_file: Path | None) -> None:
-        """Offer to recover unsaved work, or the lesson to users who have never opened the window."""
+        """Offer to recover unsaved work; otherwise, offer the lesson to users who open their first window."""
         drafts = find_recoverable_drafts(self._draft_folder)
         if drafts:
             window.offer_recovery(drafts)
@@ -156,6 +157,7 @@ class ViewerLauncher:
             window.dialogs.ask(build_lesson_offer(window.viewer, window.lesson.toggle))
 
     def _open_window(self, settings: ViewerSettings) -> ViewerWindow:
+        """Open the window with the settings; warn if it is too small for the requested scale."""
         scale = choose_scale(self.scale or settings.scale, has_display=not self._needs_no_display)
         size = self._choose_size(settings, scale)
         if not self.headless:
@@ -179,6 +181,7 @@ class ViewerLauncher:
         return window
 
     def _build_presenter(self, costs: Costs, settings: ViewerSettings) -> Presenter:
+        """Build the state of the window from the settings and the options that override them."""
         layers = (_list_usual_layers(settings) | self.shown_layers) - self.hidden_layers
         viewer = Presenter(
             self.session,
@@ -197,12 +200,13 @@ class ViewerLauncher:
         return viewer
 
     def _choose_size(self, settings: ViewerSettings, scale: float) -> tuple[int, int]:
+        """Return the width and height of the window, px: as requested, or from the settings."""
         if self.size is not None:
             return self.size
         width = settings.width
         height = settings.height
         if self.scale is not None:
-            # In a smaller window, the requested scale would be reduced.
+            # In a smaller window, the requested scale would have to be reduced.
             min_width, min_height = MIN_SIZE_PX
             width = max(width, round(min_width * scale))
             height = max(height, round(min_height * scale))
@@ -211,7 +215,7 @@ class ViewerLauncher:
         return fit_to_screen((width, height))
 
     def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
-        """Return the settings of a window, without the layers chosen on the command line."""
+        """Return the settings of a window, without layers that were shown or hidden by options."""
         viewer = window.viewer
         view = viewer.view
         usual = _list_usual_layers(before)
@@ -231,7 +235,7 @@ class ViewerLauncher:
 
 
 def _list_usual_layers(settings: ViewerSettings) -> set[str]:
-    """Return the layers used last, or the default ones."""
+    """Return the visible layers of the settings, or by default those that are visible initially."""
     layers = build_standard_layers()
     if settings.shown is None:
         return {layer.name for layer in layers if layer.is_default}
@@ -239,7 +243,7 @@ def _list_usual_layers(settings: ViewerSettings) -> set[str]:
 
 
 def _wait_for_runs(saver: RunSaver) -> None:
-    """Wait until all runs are saved, after the window is gone; print what went wrong."""
+    """After the window has closed, wait until all runs are saved; print errors."""
     saver.finish()
     for message, is_error in saver.poll():
         if is_error:

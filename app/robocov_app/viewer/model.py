@@ -17,14 +17,14 @@ from robocov_app.viewer.view import ViewState
 
 
 class ViewerModel(WindowModel):
-    """State of the viewer; knows no pygame.
+    """State of the viewer, independent of pygame.
 
     Parameters
     ----------
     session : Session
         The open session.
     costs : Costs
-        Computes the coverage cost of its panes.
+        Computes the coverage cost of the session's panes.
     layers : set of str
         Names of the visible layers.
     controllers : iterable of str
@@ -41,12 +41,13 @@ class ViewerModel(WindowModel):
     controllers : list of str
         Names of the controllers that are offered.
     settled_change : Node or None
-        Change after which the team has settled, even if it moves a little again.
+        Last node after whose edit the team has settled; it stays set even if the team moves again a little.
     """
 
     def __init__(
         self, session: Session, costs: Costs, layers: set[str], controllers: Iterable[str] = ()
     ) -> None:
+        """Build the state for a session, and start to prepare the cost on its map."""
         super().__init__()
         self.session = session
         self.costs = costs
@@ -87,25 +88,26 @@ class ViewerModel(WindowModel):
         return None
 
     def attempt(self, action: Callable[[], object]) -> None:
-        """Carry an action out; show the message that it returns, or its error."""
+        """Run an action, and show the message that it returns or the error that it raises."""
         super().attempt(action)
         self.update_cost_map()
 
     def describe_error(self, error: RobocovError) -> str:
-        """Return the message of an error without the names of places in files."""
+        """Return the message of an error without prefixes that refer to files."""
         return simplify_message(str(error))
 
     def update_cost_map(self) -> None:
-        """Prepare the cost for the map if it has changed."""
+        """Start to prepare the cost on the displayed map if the map has changed."""
         environment = self.session.displayed.environment
-        # While the density is being painted, the cost would never be ready.
+        # While the density is being painted, it changes too often to prepare the cost.
         if environment is not self._cost_map and not self.tool.is_painting:
             self._cost_map = environment
             self.costs.set_environment(environment)
 
     def show_session(self, session: Session) -> None:
-        """Replace the session that is shown."""
+        """Show another session."""
         session.playback.clock.budget = self.session.playback.clock.budget
+        # Objects that cache data of the past compare this version, which must not repeat an earlier value.
         session.timeline.past_version = (
             max(session.timeline.past_version, self.session.timeline.past_version) + 1
         )
@@ -115,7 +117,7 @@ class ViewerModel(WindowModel):
 
 
 def simplify_message(message: str) -> str:
-    """Remove prefixes of a message that only make sense for files.
+    """Remove prefixes from a message that only make sense for files.
 
     >>> simplify_message("team.max_speed: expected a number, got 0 m/s")
     'max_speed: expected a number, got 0 m/s'

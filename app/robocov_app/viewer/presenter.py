@@ -1,4 +1,4 @@
-"""The viewer's presenter: the state of the window, and all actions on it, grouped by subject."""
+"""The viewer's presenter: state of the window, and all actions on it, grouped by subject."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,14 +13,14 @@ from robocov_app.viewer.session.session import Session
 
 
 class Presenter(ViewerModel):
-    """State and actions of the viewer; knows no pygame.
+    """State and actions of the viewer, independent of pygame.
 
     Parameters
     ----------
     session : Session
-        The session to show.
+        The session that is shown first.
     costs : Costs
-        Computes the coverage cost of its panes.
+        Computes the coverage cost of the session's panes.
     layers : set of str
         Names of the visible layers.
     folder : Path
@@ -30,20 +30,20 @@ class Presenter(ViewerModel):
     controllers : iterable of str
         Names of controllers to offer in addition to the built-in ones.
     draft_folder : Path or None
-        Folder for unsaved work; None to keep none.
+        Folder for drafts of unsaved work; None to keep no drafts.
     file : Path or None
         File of the session.
 
     Attributes
     ----------
     playback : PlaybackActions
-        Play, speed, restart, looking back, branches, undo.
+        Actions on time: playing, speed, restarting, looking back, branches, undo.
     comparison : ComparisonActions
-        Controllers, gains and limits.
+        Actions on controllers, gains and limits.
     robots : RobotActions
-        Select, fail, revive and remove robots.
+        Actions on single robots.
     files : FileActions
-        Maps, sessions and drafts.
+        Actions on maps, sessions and drafts.
     """
 
     def __init__(
@@ -58,6 +58,7 @@ class Presenter(ViewerModel):
         draft_folder: Path | None = None,
         file: Path | None = None,
     ) -> None:
+        """Build the state, and the actions that share it."""
         super().__init__(session, costs, layers, controllers)
         self.playback = PlaybackActions(self)
         self.comparison = ComparisonActions(self)
@@ -65,20 +66,20 @@ class Presenter(ViewerModel):
         self.files = FileActions(self, folder, map_name=map_name, draft_folder=draft_folder, file=file)
 
     def choose_tool(self, name: str) -> None:
-        """Choose a tool, and show a hint on how to use it."""
+        """Switch to another tool, and show a hint on how to use it."""
         self.tool.cancel(self.session)
         self.toolbox.current = self.toolbox.by_name[name]
         self.show_message(f"{self.tool.title}: {self.tool.hint}")
 
     def finish_drawing(self) -> str | None:
-        """Complete the drawing; return a message."""
+        """Complete what the tool is drawing; return a message."""
         return self.tool.finish(self.session)
 
     def cancel(self) -> None:
-        """Discard the drawing; without a drawing, return to the hand."""
+        """Discard what the tool is drawing; if there is nothing to discard, switch to the hand."""
         if not self.tool.cancel(self.session) and self.tool is not self.toolbox.hand:
             self.toolbox.current = self.toolbox.hand
 
     def resize_tool(self, factor: float) -> None:
-        """Resize the tool in use; with a tool without a size, resize new walls."""
+        """Change the size of the tool in use by a factor; if it has no size, the width of new walls."""
         self.show_message(self.toolbox.resizable.resize(self.session, factor))

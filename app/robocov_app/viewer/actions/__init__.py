@@ -1,1 +1,1 @@
-"""Actions of the user, grouped by subject."""
+"""The user's actions, grouped by subject."""

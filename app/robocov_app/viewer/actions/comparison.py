@@ -1,4 +1,4 @@
-"""Actions on controllers: choose one, compare several side by side, set gains and limits."""
+"""Actions on controllers: choosing one, comparing several side by side, setting gains and limits."""
 
 from robocov.controllers.gains import Value
 from robocov_app.viewer.actions.playback import find_next
@@ -12,12 +12,12 @@ from robocov_app.viewer.panel.parameters import (
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 _KINDS_NOT_REPEATED = frozenset({"hand", "robot", "failure"})
-"""Kinds of events that a restart does not repeat. Maps, controllers and limits stay as they are."""
+"""Kinds of events that are lost when a run restarts; edited maps, controllers and limits are kept."""
 _MAX_LISTED_EVENTS = 3
 
 
 class ComparisonActions:
-    """Chooses controllers and their gains, in one pane or in several.
+    """Actions that choose controllers and set their gains, in one pane or in several.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class ComparisonActions:
         self._viewer = viewer
 
     def add_pane(self) -> None:
-        """Add a pane with a controller that is not shown yet, and restart."""
+        """Restart with one more pane, whose controller is one that is not shown yet, if there is one."""
         viewer = self._viewer
         present = {pane.controller.name for pane in viewer.session.timeline.panes}
         absent = [name for name in viewer.controllers if name not in present]
@@ -63,7 +63,7 @@ class ComparisonActions:
         viewer.session.set_controller(viewer.pane, ControllerChoice(name))
 
     def set_controller(self, number: int, name: str) -> None:
-        """Use a controller in the pane with an index; its gains stay if it is already used there."""
+        """Use a controller in a pane, given by its index; if it is already used there, its gains are kept."""
         session = self._viewer.session
         pane = session.timeline.panes[number]
         if session.displayed.get_setup(pane).controller.name != name:
@@ -90,7 +90,7 @@ class ComparisonActions:
         return [*list_gain_parameters(setup.controller), *list_limit_parameters(setup.properties)]
 
     def set_parameter(self, name: str, value: Value) -> None:
-        """Set a gain, or a limit with the prefix ``team.``."""
+        """Set a gain of the active pane's controller, or with the prefix ``team.`` a limit of the team."""
         viewer = self._viewer
         setup = viewer.session.displayed.get_setup(viewer.pane)
         if name.startswith("team."):

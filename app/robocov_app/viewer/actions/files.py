@@ -24,7 +24,7 @@ MAX_RECENT_FILES = 9
 
 
 class FileActions:
-    """Opens and saves maps and sessions.
+    """Actions that open and save maps and sessions.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class FileActions:
     map_name : str
         Bundled name or path of the open map.
     draft_folder : Path or None
-        Folder for unsaved work; None to keep none.
+        Folder for drafts of unsaved work; None to keep no drafts.
     file : Path or None
         File of the open session.
 
@@ -44,7 +44,7 @@ class FileActions:
     folder : Path
         Folder in which files are saved.
     recent : list of str
-        Paths of the sessions used last, the newest first.
+        Paths of the sessions used recently, newest first.
     workspace : SessionWorkspace
         File and drafts of the open session.
     """
@@ -58,6 +58,7 @@ class FileActions:
         draft_folder: Path | None = None,
         file: Path | None = None,
     ) -> None:
+        """Start with the open session of the viewer."""
         self.folder = folder
         self.recent: list[str] = []
         self.workspace = SessionWorkspace(viewer.session, draft_folder, file)
@@ -67,7 +68,7 @@ class FileActions:
 
     @property
     def map_name(self) -> str:
-        """Bundled name or path of the present map, also after undo has led to another one."""
+        """Bundled name or path of the displayed map, which undo and redo may change."""
         name = self._viewer.session.displayed.environment.name
         return self._map_names.get(name, name)
 
@@ -77,12 +78,12 @@ class FileActions:
 
     @property
     def view(self) -> dict[str, object]:
-        """Entries of a session file about the window."""
+        """Window settings that are saved in a session file."""
         view = self._viewer.view
         return {"shown": sorted(view.layers), "theme": view.theme, "map": self.map_name}
 
     def list_maps(self) -> list[str]:
-        """Return the names of the maps that are offered."""
+        """Return the names of the maps to choose from: the bundled ones, and the open one."""
         own = [self.map_name] if self.map_name else []
         return list(dict.fromkeys([*list_bundled_maps(), *own]))
 
@@ -100,7 +101,7 @@ class FileActions:
         self.map_name = name
 
     def open_next_map(self, steps: int) -> None:
-        """Restart on the next map that has space for the team, or on the previous one."""
+        """Restart on the next map with enough space for the team (`steps` 1), or on the previous one (-1)."""
         names = self.list_maps()
         index = names.index(self.map_name) if self.map_name in names else 0
         too_small: list[str] = []
@@ -153,7 +154,7 @@ class FileActions:
             self._viewer.show_message(f"map opened: {path}")
 
     def open_session(self, path: Path) -> None:
-        """Open a session file in place of the present session."""
+        """Open a session file in place of the current session."""
         saved = load_session(path, self._viewer.controllers)
         seconds = self._viewer.session.playback.seek_seconds
         workspace = SessionWorkspace(Session.open(saved, seconds), self._draft_folder, path)
@@ -179,11 +180,13 @@ class FileActions:
         self.recent = [name, *others][:MAX_RECENT_FILES]
 
     def _replace_workspace(self, workspace: SessionWorkspace, view: Mapping[str, Any]) -> None:
+        """Show the session of another workspace, with the map name and the layers in `view`."""
         self.workspace.close()
         self.workspace = workspace
         self._viewer.inspection.selected = None
         self._viewer.show_session(workspace.session)
-        # The session may still be on the way to its present, which is on another map than its start.
+        # While a seek is in progress, the session may still display another run, on another map. The name
+        # belongs to the map on which the destination's run starts.
         timeline = workspace.session.timeline
         root = timeline.document.get_path(timeline.destination[0])[0]
         environment_name = root.require_scenario().environment.name

@@ -1,4 +1,4 @@
-"""Actions on time: play, speed, restart, looking back, branches."""
+"""Actions on time: playing, speed, restarting, looking back, branches."""
 
 from robocov.errors import StartError
 from robocov_app.viewer.model import ViewerModel
@@ -9,7 +9,7 @@ UNIFORM = "uniform"
 
 
 class PlaybackActions:
-    """Plays the session, restarts it and goes to other times.
+    """Actions that play the session, restart it and go to other times.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class PlaybackActions:
         self._viewer.session.playback.step()
 
     def toggle_settling(self) -> None:
-        """Play until the team has settled; a second call plays on."""
+        """Play until the team has settled, then pause; a second call cancels this."""
         session = self._viewer.session
         session.playback.stop_when_settled = not session.playback.stop_when_settled
         if session.playback.stop_when_settled:
@@ -42,9 +42,10 @@ class PlaybackActions:
     def restart(
         self, *, robots: int | None = None, start: str | None = None, seed: int | None = None
     ) -> None:
-        """Restart at time 0, with another number of robots, start or seed if they are given.
+        """Restart at time 0, optionally with another number of robots, start or seed.
 
-        If there is no space for that many robots at the present start, they start uniformly.
+        If there is not enough space for that many robots at the present start, they start at random positions
+        anywhere in the free space.
         """
         session = self._viewer.session
         try:
@@ -59,7 +60,7 @@ class PlaybackActions:
             )
 
     def restart_with_next_seed(self) -> None:
-        """Restart from other starting positions."""
+        """Restart from other starting positions, which are sampled with the next seed."""
         self.restart(seed=self._viewer.session.timeline.scenario.seed + 1)
 
     def restart_with_more_robots(self, count: int) -> None:
@@ -72,11 +73,11 @@ class PlaybackActions:
 
     def restart_at_next_start(self) -> None:
         """Restart from the next start of the map."""
-        # An obstacle may have covered the present one.
+        # If an obstacle has covered the current start, it is not in the list, and the first one follows.
         self.restart(start=find_next(self.list_starts(), self._viewer.session.timeline.scenario.start_name))
 
     def change_speed(self, steps: int) -> None:
-        """Choose a faster or a slower speed of the list."""
+        """Choose a speed from `SPEEDS` that is `steps` places faster, or slower if negative."""
         index = find_speed_index(self._viewer.session.playback.clock.speed) + steps
         self.set_speed(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
 
@@ -86,7 +87,7 @@ class PlaybackActions:
         self._viewer.show_message(f"speed {format_speed(speed)}")
 
     def look_by(self, steps: int) -> None:
-        """Pause, and show an earlier or a later step."""
+        """Pause, and show the recorded state that is `steps` later, or earlier if negative."""
         self._viewer.session.playback.is_playing = False
         self._viewer.session.show_offset(steps)
 
@@ -96,7 +97,7 @@ class PlaybackActions:
         self._viewer.session.show_time(time)
 
     def look_by_seconds(self, seconds: float) -> None:
-        """Pause, and show an earlier or a later time."""
+        """Pause, and show the state that is a time, s, later, or earlier if negative."""
         self.look_at(self._viewer.session.displayed.time + seconds)
 
     def look_at_present(self) -> None:
@@ -105,7 +106,7 @@ class PlaybackActions:
         session.show_time(session.timeline.end_time)
 
     def branch(self) -> None:
-        """Continue from the displayed step; the later steps stay as a branch."""
+        """Continue from the displayed step; the later steps are kept as another branch."""
         session = self._viewer.session
         if session.branch():
             session.playback.is_playing = True
@@ -114,17 +115,17 @@ class PlaybackActions:
             self._viewer.show_message("this is the present: go back first (←, or drag the time line)")
 
     def list_branch_names(self) -> list[str]:
-        """Return the numbers of the branches as text, from 1."""
+        """Return the numbers of the branches as strings, starting from 1."""
         count = len(self._viewer.session.timeline.document.list_branches())
         return [str(number) for number in range(1, count + 1)]
 
     def enter_branch(self, name: str) -> None:
-        """Go to the end of a branch, by its number as text."""
+        """Go to the end of a branch, given by its name or its number as a string."""
         session = self._viewer.session
         session.seek(session.timeline.document.find_branch(name).node)
 
     def enter_next_branch(self, steps: int) -> None:
-        """Go to the end of the next branch, or of another one in the list."""
+        """Go to the end of the branch that is `steps` places further in the list; the list is cyclic."""
         session = self._viewer.session
         ends = [branch.node for branch in session.timeline.document.list_branches()]
         head, _ = session.timeline.destination
@@ -132,7 +133,7 @@ class PlaybackActions:
         self.enter_node(ends[(index + steps) % len(ends)].number)
 
     def enter_node(self, number: int) -> None:
-        """Go to the end of the branch that ends at a node of the session's history."""
+        """Go to the end of the branch whose last node has this number."""
         session = self._viewer.session
         branches = session.timeline.document.list_branches()
         index = [branch.node.number for branch in branches].index(number)
@@ -159,7 +160,7 @@ class PlaybackActions:
 
 
 def find_next(names: list[str], name: str) -> str:
-    """Return the name that follows another one in a list, or the first.
+    """Return the name that follows `name` in a cyclic list; the first one if `name` is not in the list.
 
     >>> find_next(["a", "b"], "b")
     'a'

@@ -1,4 +1,4 @@
-"""Actions on single robots: select, fail, revive, remove."""
+"""Actions on single robots: selecting, failing, reviving, removing."""
 
 from robocov.errors import ParameterError
 from robocov_app.viewer.model import ViewerModel
@@ -6,7 +6,7 @@ from robocov_app.viewer.session.session import toggle_failure
 
 
 class RobotActions:
-    """Selects robots and changes the selected one.
+    """Actions that select a robot and change the selected one.
 
     Parameters
     ----------
@@ -30,12 +30,13 @@ class RobotActions:
         self._viewer.inspection.selected = number
 
     def select_next(self, steps: int) -> None:
-        """Select the next robot, or another one in the order of their numbers."""
+        """Select the robot that is `steps` places further in the order of their numbers, cyclically."""
         numbers = self._viewer.robot_numbers
         selected = self._viewer.selected_robot
         if selected is not None:
             index = numbers.index(selected)
         else:
+            # So that the first selection is the first robot forwards, and the last robot backwards.
             index = -1 if steps > 0 else 0
         self._viewer.inspection.selected = numbers[(index + steps) % len(numbers)]
 

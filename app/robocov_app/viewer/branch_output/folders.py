@@ -1,4 +1,4 @@
-"""Folders of the parts of a saved branch, as ``story.json`` lists them."""
+"""Folders of the parts of a saved branch, which are listed in ``story.json``."""
 
 import json
 from pathlib import Path
@@ -28,12 +28,12 @@ def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
     Returns
     -------
     list of (Path, str)
-        Folders and descriptions of the parts; the folder itself if it is not that of a branch.
+        Folder and description of each part; for other results, the folder itself with an empty description.
 
     Raises
     ------
     InputError
-        If the list is damaged.
+        If ``story.json`` is damaged.
     """
     file = folder / STORY_FILE
     try:
@@ -42,7 +42,7 @@ def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
             return [(folder, "")]
         return [_read_part(folder, part) for part in content["parts"]]
     except OSError:
-        # Without the file it is another kind of result, whose reader reports what is wrong with it.
+        # Without the file, this is another kind of result, whose reader reports any problems.
         return [(folder, "")]
     except (ValueError, LookupError, TypeError) as error:
         raise InputError(f"{file}: cannot be read: {to_one_line(error)}") from None

@@ -1,4 +1,4 @@
-"""Parts of a branch: from edit to edit, each with one map, one team and one controller for each pane."""
+"""Parts of a branch, from edit to edit; in each part, map, team and controllers stay the same."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -53,7 +53,7 @@ class SelectedBranch:
         return self.root.require_scenario()
 
     def replay(self) -> Iterator[tuple[Lockstep, Node]]:
-        """Simulate the branch, and yield its run after each step, with the node it belongs to."""
+        """Simulate the branch; yield the run at each step, with the node whose time span contains it."""
         return replay(self.document, self.node, self.last_step)
 
     def is_end(self, run: Lockstep, node: Node) -> bool:
@@ -63,14 +63,14 @@ class SelectedBranch:
 
 @dataclass
 class HandledTime:
-    """Time during which the user dragged or placed a robot.
+    """A period in which the user dragged or placed a robot.
 
     Attributes
     ----------
     robot : int
         Number of the robot.
     first_step, last_step : int
-        First step, and the step after the last.
+        First step of the period, and the step after its last step.
     """
 
     robot: int
@@ -80,7 +80,7 @@ class HandledTime:
 
 @dataclass(frozen=True)
 class PartCost:
-    """Cost along a record.
+    """Cost during one part of a branch, for one controller.
 
     Attributes
     ----------
@@ -104,17 +104,18 @@ class BranchPart:
     Attributes
     ----------
     node : Node
-        Node at which it starts.
+        Node of the document at whose edit the part starts.
     first_step, last_step : int
         First and last step.
     setups : dict of int to PaneSetup
-        Setups by the number of the pane.
+        Setup of each pane, by its number.
     recorders : dict of int to Recorder
-        Recorders by the number of the pane.
+        Recorder of each pane, by its number.
     scenes : list of Scene
-        First scenes of all panes, and last scenes of the branch, for the legend.
+        Scenes for the legend: those of all panes at the start of the part; in the last part, also those at
+        the end of the branch.
     handled : list of HandledTime
-        When the user dragged or placed robots.
+        Periods in which the user dragged or placed robots.
     placed : list of (int, int)
         Steps at which the user placed robots, with their numbers.
     """
@@ -129,7 +130,7 @@ class BranchPart:
     last_step: int = 0
 
     def add_step(self, run: Lockstep, node: Node) -> None:
-        """Record a step."""
+        """Record the current step of a run, and what the user does to robots in it."""
         self.last_step = run.step
         for pane in run.panes:
             self.recorders[pane.number].add(pane.simulation.observe_and_decide())
@@ -140,7 +141,15 @@ class BranchPart:
             self._add_handled(robot, run.step)
 
     def _add_handled(self, robot: int, step: int) -> None:
-        """Extend the period in which a robot is handled by a step, or start a new period."""
+        """Extend the robot's current period by one step, or start a new period.
+
+        Parameters
+        ----------
+        robot : int
+            Number of the robot.
+        step : int
+            Step in which it is dragged or placed.
+        """
         for time in self.handled:
             if time.robot == robot and time.last_step >= step - 1:
                 time.last_step = step + 1
@@ -149,7 +158,7 @@ class BranchPart:
 
 
 def split_branch(branch: SelectedBranch) -> list[BranchPart]:
-    """Simulate a branch, and record its parts."""
+    """Simulate a branch, and split it into recorded parts: a new one starts whenever a setup changes."""
     parts: list[BranchPart] = []
     panes: list[Pane] = []
     for run, node in branch.replay():
@@ -157,7 +166,7 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
         setups = {pane.number: pane.setup for pane in panes}
         if not parts or parts[-1].setups != setups:
             # An edit that lasts several steps may change the setups in each of them. Only the last change
-            # starts a part.
+            # starts a part, so the part that an earlier change of the same node started is dropped.
             if parts and parts[-1].node is node and node.scenario is None:
                 parts.pop()
             recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}
@@ -169,7 +178,7 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
 
 
 def _build_recorder(setup: PaneSetup, dt: float) -> Recorder:
-    """Build the recorder of a pane. Failed robots are obstacles of its map."""
+    """Build the recorder of a pane. Its map contains failed robots as obstacles."""
     environment = setup.environment
     controller = setup.controller
     for number, position in setup.failed.items():
@@ -188,7 +197,7 @@ def _build_recorder(setup: PaneSetup, dt: float) -> Recorder:
 
 
 def build_part_records(part: BranchPart, root: Node) -> list[Record]:
-    """Return the records of a part, one for each pane; their time starts at 0.
+    """Return the records of a part, one for each pane; the times of each start at 0.
 
     Parameters
     ----------
@@ -198,6 +207,7 @@ def build_part_records(part: BranchPart, root: Node) -> list[Record]:
         Node at which the run starts.
     """
     scenario = root.require_scenario()
+    # Only the first part of a run starts at positions that can be sampled again from start and seed.
     is_reproducible_start = part.first_step == 0 and part.node is root and scenario.given_starts is None
     records: list[Record] = []
     for number, recorder in part.recorders.items():
@@ -214,7 +224,7 @@ def build_part_records(part: BranchPart, root: Node) -> list[Record]:
 
 
 def _describe_origin(part: BranchPart, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
-    """Return the entries of ``run.json`` on the origin of a record; none if it starts like any run."""
+    """Return entries for ``run.json`` on the origin of a record; none if it is like any other run."""
     origin = {**_describe_start(part, setup, record, dt), **_describe_user_actions(part, dt)}
     is_repeatable = _is_repeatable(part, setup, record)
     if not origin and is_repeatable:
@@ -246,7 +256,7 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
 
 
 def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
-    """Return whether a simulation from the start of the record, without the user, repeats the record."""
+    """Return whether a simulation from the start of the record, without user actions, reproduces it."""
     has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
     is_turned = record.steering is not None and bool(record.steering[0].any())
     return has_known_memory and not part.handled and not is_turned
@@ -259,14 +269,14 @@ def _describe_handled(time: HandledTime, first_step: int, dt: float) -> dict[str
 
 
 def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str = "") -> Scene:
-    """Return the scene of a pane at its present step.
+    """Return the scene of a pane at its current step.
 
     Parameters
     ----------
     pane : Pane
         The pane.
     costs : list of PartCost, optional
-        Costs along the branch, for the caption.
+        Costs during the parts of the branch; the newest one is shown as caption.
     name : str
         Name of the pane's controller in `costs`.
     """

@@ -1,4 +1,4 @@
-"""Save a branch: the records of its parts with costs and figures, and a video of the whole branch."""
+"""Saving of a branch: records of its parts with costs and figures, and a video of the whole branch."""
 
 import re
 from dataclasses import dataclass, replace
@@ -42,14 +42,14 @@ def save_branch(
     result : ResultFolder
         Folder for the files.
     settings : OutputSettings
-        Files to write, and their settings.
+        Which files to write, and how.
     interruption : Interruption
-        Request of the user to stop.
+        Tells whether the user has asked to stop.
 
     Returns
     -------
     dict
-        The parts with their folders and times, and the runs with their mean distances.
+        ``parts``: folder, times and description of each part. ``runs``: mean distance of each run.
     """
     return _BranchWriter(branch, result, settings, interruption).save()
 
@@ -64,7 +64,7 @@ class _BranchWriter:
     interruption: Interruption
 
     def save(self) -> dict[str, Any]:
-        """Write all files."""
+        """Write all files; see `save_branch` for the return value."""
         dt = self.branch.scenario.dt
         parts = split_branch(self.branch)
         has_several_parts = len(parts) > 1
@@ -88,7 +88,20 @@ class _BranchWriter:
         return {"parts": part_rows, "runs": run_rows}
 
     def _save_part(self, part: BranchPart, folder: str) -> dict[str, Run]:
-        """Write the files of a part; return its runs by the names of their controllers."""
+        """Write the files of a part.
+
+        Parameters
+        ----------
+        part : BranchPart
+            The part.
+        folder : str
+            Name of its folder in the result; empty for the result's folder itself.
+
+        Returns
+        -------
+        dict of str to Run
+            Runs by the folder names of their controllers.
+        """
         target = self.result.staging / folder
         records = build_part_records(part, self.branch.root)
         names = name_folders([record.controller for record in records])
@@ -112,13 +125,13 @@ class _BranchWriter:
         return runs
 
     def _evaluate(self, record: Record, cost: CoverageCost) -> Run:
-        """Return a record with its cost. Failed robots are no obstacles of the cost, as in the window."""
+        """Evaluate the cost of a record. As in the window, failed robots are not obstacles for the cost."""
         bare = replace(record, environment=cost.environment)
         history = evaluate_record(bare, cost, self.interruption, quiet=self.settings.quiet).history
         return Run(record, history, summarize(record, history))
 
     def _write_cost_table(self, costs: list[PartCost]) -> None:
-        """Write the costs of all parts to one table, with times since the start of the branch."""
+        """Write the costs of all parts to one table, with times measured from the start of the branch."""
         header = ""
         rows: list[tuple[object, ...]] = []
         for cost in costs:
@@ -138,7 +151,7 @@ class _BranchWriter:
 
 
 def _build_folder_name(description: str) -> str:
-    """Turn a description into the name of a folder.
+    """Convert a description to the name of a folder.
 
     >>> _build_folder_name("robot 3 failed: RAPF, k_rep = 0.5")
     'robot-3-failed-RAPF-k_rep-0.5'

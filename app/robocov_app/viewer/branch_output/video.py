@@ -1,4 +1,4 @@
-"""The video of a branch: trajectories continue through all edits, and each edit is named below."""
+"""The video of a branch: trajectories continue through all edits, and a caption names the last edit."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,9 +40,9 @@ def count_video_frames(branch: SelectedBranch, settings: VideoSettings) -> int:
 def draw_branch_frames(
     branch: SelectedBranch, parts: list[BranchPart], costs: list[PartCost], settings: VideoSettings
 ) -> Iterator[Frame]:
-    """Draw a branch from its start; its last frame is held for a while.
+    """Draw the frames of a branch from its start; the last frame is repeated for `VIDEO_HOLD_S` seconds.
 
-    All frames have the same layout and one legend, of everything that the branch shows.
+    All frames have the same layout, and one legend that covers everything shown in the branch.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def draw_branch_frames(
     costs : list of PartCost
         Costs along the parts, for captions.
     settings : VideoSettings
-        Size, speed and layers.
+        Size, speed and layers of the video.
     """
     drawer = _build_drawer(branch, parts, costs, settings)
     due = 0.0
@@ -72,6 +72,7 @@ def draw_branch_frames(
 def _build_drawer(
     branch: SelectedBranch, parts: list[BranchPart], costs: list[PartCost], settings: VideoSettings
 ) -> "_FrameDrawer":
+    """Build the drawer of the frames, with a layout for the largest number of panes in the branch."""
     widest = max(parts, key=lambda part: len(part.setups))
     width, height = settings.video_size
     caption_height = round(CAPTION_PX * choose_scale((width, height)))
@@ -94,13 +95,13 @@ class _FrameDrawer:
     costs : list of PartCost
         Costs along the branch.
     layout : PaneLayout or None
-        Layout of several panes.
+        Layout of the panes and their legend; None if there is a single pane.
     picture_size : tuple of int
         Width and height of a frame without its caption, px.
     caption_height : int
         Height of the caption, px.
     painters : dict of int to Painter
-        Painters by the number of the pane.
+        Painter of each pane, by its number; filled as panes are drawn.
     """
 
     settings: VideoSettings
@@ -111,7 +112,7 @@ class _FrameDrawer:
     painters: dict[int, Painter]
 
     def draw(self, run: Lockstep, node: Node) -> Frame:
-        """Draw the present step of a run."""
+        """Draw the current step of a run, with the caption of the last edit."""
         names = name_folders([pane.controller.name for pane in run.panes])
         frames: list[Frame] = []
         for pane, name in zip(run.panes, names, strict=True):
@@ -124,7 +125,7 @@ class _FrameDrawer:
         return np.concatenate([page, caption])
 
     def _get_painter(self, run: Lockstep, pane: Pane) -> Painter:
-        """Return the painter of a pane; a new one after the boundary has changed."""
+        """Return the painter of a pane; build a new one if the boundary of the map has changed."""
         environment = run.scenario.environment
         painter = self.painters.get(pane.number)
         if painter is None or painter.environment.boundary != environment.boundary:
@@ -134,6 +135,7 @@ class _FrameDrawer:
         return painter
 
     def _build_painter(self, run: Lockstep) -> Painter:
+        """Build the painter of a pane with the visible layers and the size that the layout gives it."""
         settings = self.settings
         if self.layout is None:
             layers = build_standard_layers(settings.colors)

@@ -1,4 +1,4 @@
-"""The canvas: one painted pane for each controller, one camera for all, and previews of tools on top."""
+"""The canvas: a painted pane for each controller, one camera for all panes, and overlays of tools."""
 
 from dataclasses import replace
 
@@ -41,16 +41,16 @@ MAX_RAYS_PER_SCAN = 120
 MAX_RAYS_PER_PANE = 720
 MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
 UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
-MAX_COST_LAG_S = 0.25  # an older cost is shown with its time
+MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, the caption says of which time it is
 
 # Lengths in pixels at scale 1.
-_HIT_MARGIN_PX = 3.0  # around a robot
-_COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while it is filled to a fraction between these
+_HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
+_COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while the largest distance is in this fraction of it
 _NO_ROBOT = (-1, -1)
 
 
 class ViewerCanvas:
-    """Draws the panes of a session, and finds points and robots at pixels.
+    """Draws the panes of a session, and converts between pixels, map points and robots.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class ViewerCanvas:
     Attributes
     ----------
     hovered : tuple of int
-        Index of the pane and number of the robot under the cursor; -1 for none.
+        Index of the pane and number of the robot under the cursor; (-1, -1) for none.
     layout : Layout
         Layout of the window, from `arrange`.
     """
@@ -70,6 +70,7 @@ class ViewerCanvas:
     layout: Layout
 
     def __init__(self, viewer: Presenter, theme: Theme) -> None:
+        """Build a canvas without painters; `arrange` adds them."""
         self.viewer = viewer
         self.theme = theme
         self.hovered = _NO_ROBOT
@@ -90,7 +91,7 @@ class ViewerCanvas:
         for _, _, width, height in layout.panes:
             layers = build_standard_layers()
             if len(layout.panes) > 1:
-                # Panes share the time, which is in the window's own status line.
+                # All panes show the same time, which is in the status line of the window.
                 layers = [layer for layer in build_pane_layers() if layer.name != "status"]
             painter = Painter(environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
@@ -113,13 +114,13 @@ class ViewerCanvas:
         self._set_camera(zoom_about(camera, factor, (pixel[0] - left, pixel[1] - top), map_size))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the map by a number of pixels; the center of the panes stays within its bounds."""
+        """Move the map by dx and dy pixels; the center of the view stays within the bounds of the map."""
         camera = self._painters[0].camera.pan(dx, dy)
         x, y = np.clip(camera.center, *self._get_bounds()).tolist()
         self._set_camera(replace(camera, center=(x, y)))
 
     def _get_bounds(self) -> Array:
-        """Return the bounds of the map, lowest and highest x and y, (2, 2) m."""
+        """Return the bounds of the map as rows (x_min, y_min) and (x_max, y_max), (2, 2) m."""
         return np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2))
 
     def _set_camera(self, camera: Camera) -> None:
@@ -128,33 +129,34 @@ class ViewerCanvas:
             painter.camera = camera.with_view(painter.camera.view)
 
     def find_pane(self, pixel: tuple[float, float]) -> int | None:
-        """Return the index of the pane at a pixel."""
+        """Return the index of the pane at a pixel; None if there is none."""
         for pane, box in enumerate(self.layout.panes):
             if is_inside(box, pixel):
                 return pane
         return None
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
-        """Return the point of the map at a pixel of a pane, m."""
+        """Return the point of the map, m, at a pixel of the window, as shown by a pane."""
         x, y = self._painters[pane].camera.to_world(np.subtract(pixel, self.layout.panes[pane][:2])).tolist()
         return x, y
 
     def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
-        """Return the pixel at which a pane shows a point of the map, m."""
+        """Return the pixel of the window at which a pane shows a point of the map, m."""
         left, top, _, _ = self.layout.panes[pane]
         x, y = self._painters[pane].camera.to_pixels(np.array(point)).tolist()
         return x + left, y + top
 
     def get_reach(self, pane: int) -> float:
-        """Return the width of a finger on the map, m."""
+        """Return the reach of the pointer (see `REACH_PX`) on the map of a pane, m."""
         return REACH_PX * self.layout.scale / self._painters[pane].camera.zoom
 
     def find_robot(self, pixel: tuple[float, float], pane: int) -> int | None:
-        """Return the number of the robot, or failed robot, at a pixel of a pane."""
+        """Return the number of the working or failed robot at a pixel of a pane; None if there is none."""
         if pane >= len(self._scenes):
             return None
         scene = self._scenes[pane]
         point = np.array(self.to_world(pixel, pane))
+        # Nothing is drawn: this canvas only provides the radii at which robots are drawn.
         canvas = self._build_canvas(pygame.Surface((1, 1)), pane, scene)
         distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
         radii = np.array(compute_drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
@@ -174,9 +176,9 @@ class ViewerCanvas:
         self._adopt_environment()
         self._scenes = []
         panes = session.timeline.panes
-        # A pane that was just added has no place in the layout yet.
+        # A pane that was just added has no painter and no box in the layout yet.
         for pane, painter, box in zip(panes, self._painters, self.layout.panes, strict=False):
-            # The caption of a pane cannot be hidden.
+            # The caption of a pane is always visible.
             fixed_layers = {"caption"} & {layer.name for layer in painter.layers}
             painter.visible = self.viewer.view.layers | fixed_layers
             scene = self._build_scene(pane, painter)
@@ -189,7 +191,13 @@ class ViewerCanvas:
             self._legend.draw(screen, self._list_legend_entries(), self.layout, self._get_layers())
 
     def _adopt_environment(self) -> Environment:
-        """Show the present map: all of it if it is another one, not only edited."""
+        """Pass the displayed map to the painters; show all of it if it is a different map or has grown.
+
+        Returns
+        -------
+        Environment
+            The displayed map.
+        """
         environment = self.viewer.session.displayed.environment
         timeline = self.viewer.session.timeline
         root = timeline.document.get_path(timeline.head)[0]
@@ -207,6 +215,7 @@ class ViewerCanvas:
         return environment
 
     def _build_scene(self, pane: Pane, painter: Painter) -> Scene:
+        """Build the scene of a pane at the displayed step, with those costs and scans that are visible."""
         viewer = self.viewer
         displayed = viewer.session.displayed
         setup = displayed.get_setup(pane)
@@ -231,13 +240,13 @@ class ViewerCanvas:
         )
 
     def _update_color_limit(self, largest: float) -> None:
-        """Let the color scale follow the largest distance, m, without changing it in every frame."""
+        """Adapt the color scale to the largest distance, m, but only when it has changed considerably."""
         low, high = _COLOR_LIMIT_RANGE
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
             self._color_limit = choose_color_limit(1.1 * largest)
 
     def _get_path(self, known: KnownCost | None) -> Array | None:
-        """Return the path from the cursor to its nearest robot, (k, 2) m."""
+        """Return the path from the cursor to its nearest robot, (k, 2) m; None if it is not shown."""
         if known is None or self.viewer.inspection.cursor is None:
             return None
         return known.path
@@ -245,12 +254,12 @@ class ViewerCanvas:
     def _list_scans(
         self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
     ) -> list[tuple[Array, Array]]:
-        """Return the scan of the selected robot; without one, those of all robots unless there are too many.
+        """Return the scan of the selected robot; without a selection, of all robots unless they are too many.
 
         Returns
         -------
         list of tuple of array
-            Position of a robot, (2,) m, and the ends of its rays, (k, 2) m.
+            For each scan, the position of the robot, (2,) m, and the end points of its rays, (k, 2) m.
         """
         if "scan" not in self.viewer.view.layers:
             return []
@@ -264,7 +273,7 @@ class ViewerCanvas:
         return [(positions[row], sensor.scan_from(positions[row], rays, reach[row])[1]) for row in rows]
 
     def _describe_cost(self, pane: Pane) -> str:
-        """Return the caption of a pane's cost. All panes show the cost of the same time."""
+        """Return the caption with a pane's cost. All panes show their cost at the same time."""
         displayed = self.viewer.session.displayed
         time, distances = displayed.get_costs()
         _, travel_times = displayed.get_costs("time")
@@ -274,7 +283,7 @@ class ViewerCanvas:
         text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
         known = self.viewer.costs.known.get(pane.number)
         if known is not None and known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
-            # The mean is that of the rest, and gets better when robots are locked out of a room.
+            # The mean only covers the reachable area, so it decreases when robots are locked out of a room.
             text += f" ({known.result.uncovered_area:.1f} m² cut off)"
         if displayed.time - time > MAX_COST_LAG_S:
             return f"{text} at {time:.1f} s"
@@ -297,7 +306,7 @@ class ViewerCanvas:
         surface.set_clip(None)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
-        """Draw a frame around each pane, and a bar in the color of the controller above the active one."""
+        """Draw a frame around each pane, and a bar in its controller's color at the top of the active one."""
         theme = self.theme
         for pane, box in enumerate(self.layout.panes):
             rect = pygame.Rect(box)
@@ -308,7 +317,7 @@ class ViewerCanvas:
                 screen.fill(theme.get_controller_color(controller.name), bar)
 
     def count_legend_rows(self) -> int:
-        """Return the number of rows of the legend that the panes share; 0 for a single pane."""
+        """Return the number of rows of the shared legend; 0 for a single pane."""
         if len(self._scenes) < 2:
             return 0
         return self._legend.count_rows(self._list_legend_entries(), self.layout, self._get_layers())

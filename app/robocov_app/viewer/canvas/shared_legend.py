@@ -11,7 +11,7 @@ from robocov_app.toolkit.window.layout import Layout
 
 
 class SharedLegend:
-    """Draws the legend of several panes, and keeps its picture.
+    """Draws the legend of several panes, and caches its image.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ class SharedLegend:
     def __init__(self, theme: Theme) -> None:
         self.theme = theme
         self._rows = 1
-        self._rows_key: object = None  # layout and layers of the number of rows
+        self._rows_key: object = None  # layout and layers for which `_rows` was computed
         self._picture = pygame.Surface((1, 1))
-        self._picture_key: object = None  # entries and size of the picture
+        self._picture_key: object = None  # entries and size for which `_picture` was drawn
 
     def count_rows(self, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]) -> int:
-        """Return how many rows are needed; never fewer than before in a layout, so that panes do not jump."""
+        """Return the number of rows needed; it never decreases within a layout, so that panes do not jump."""
         page = pygame.Surface((layout.arena[2], 1))
         rows = len(arrange_legend_rows(create_flat_canvas(page, self.theme, layout.scale), entries))
         key = (layout.size, layout.scale, len(layout.panes), layers)
@@ -45,7 +45,7 @@ class SharedLegend:
     def draw(
         self, screen: pygame.Surface, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]
     ) -> None:
-        """Draw the legend at its place in the layout."""
+        """Draw the legend at its position in the layout."""
         x, y, width, height = layout.legend
         key = (tuple(entry.key for entry in entries), layout.legend, self.theme.name, layout.scale)
         if key != self._picture_key:

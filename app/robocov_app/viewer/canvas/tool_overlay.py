@@ -1,4 +1,4 @@
-"""Overlay of a pane: dragged and hovered robots, previews of tools."""
+"""Overlays on a pane: dragged and hovered robots, and previews of tools."""
 
 from functools import partial
 
@@ -16,13 +16,13 @@ from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.viewer.tools.tool import ViewerDrawState
 
 # Lengths in pixels at scale 1.
-FAILED_RADIUS_PX = 9.0  # within which a failed robot is hit, even if it is drawn smaller
+FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
 _MARK_PX = 3.0  # half the side of the mark of a point
 _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
 _OBSTACLE_ALPHA = 89  # opacity of a preview, 0 to 255
-_PREMULTIPLIED_FRACTION = 0.35  # the same opacity as a fraction, by which the color is multiplied
-_MAX_PIXEL = 1e4  # coordinates of polygons are clipped to it
+_PREMULTIPLIED_FRACTION = 0.35  # the same opacity as a fraction, for premultiplied colors
+_MAX_PIXEL = 1e4  # limit of the coordinates of polygons, which may be far outside the window
 
 
 def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> None:
@@ -37,7 +37,7 @@ def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> N
 
 
 def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) -> None:
-    """Draw a ring around the selected robot if it has failed; painters do so around others."""
+    """Draw a ring around the selected robot if it has failed; the painter does this for working robots."""
     if selected is None or selected not in scene.failed:
         return
     radius = scene.get_failed_radius(selected) * canvas.camera.zoom
@@ -49,7 +49,7 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
 
 
 def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
-    """Draw a ring around a robot that a press would act on."""
+    """Draw a ring around the robot under the cursor, unless it is selected and has a ring already."""
     numbers = list(scene.numbers or ())
     if number not in numbers:
         return
@@ -79,7 +79,7 @@ def draw_tool_state(canvas: Canvas, state: ViewerDrawState) -> None:
 
 
 def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
-    """Draw an obstacle that would be drawn or moved, half transparent."""
+    """Draw a translucent preview of an obstacle that is being drawn or moved."""
     fill = [round(channel * _PREMULTIPLIED_FRACTION) for channel in canvas.theme.obstacle]
     for polygon in shapely.get_parts(obstacle.polygon):
         corners = canvas.camera.to_pixels(np.asarray(polygon.exterior.coords)[:-1])

@@ -3,15 +3,15 @@
 Modules
 -------
 chart
-    `Chart`, the part of the window.
+    `Chart`, the area of the window with chart and time slider.
 scale
-    Positions of times and values.
+    Conversion of times and values to pixels.
 frame
-    Place, look and content that all parts share.
+    Layout, theme and content that all parts share.
 axes, events, curves
-    Parts of the page, which changes seldom.
+    Parts of the cached page, which rarely changes.
 captions, time_slider, pointer_tag
-    Parts that change in each frame.
+    Parts that are drawn in each frame.
 scrubbing
     Dragging the time slider.
 """

@@ -19,7 +19,7 @@ _MIN_TIME_STEP_S = 1.0
 
 
 def draw_title(canvas: Canvas, frame: ChartFrame) -> float:
-    """Draw the name of the plotted quantity, and return the right end of the text, px."""
+    """Draw the name and unit of the plotted quantity, and return the right end of the text, px."""
     left = _TITLE_LEFT_PX * frame.scale
     row = 0.5 * TOP_PX * frame.scale
     density = describe_density(frame.session.displayed.environment)
@@ -32,25 +32,26 @@ def draw_title(canvas: Canvas, frame: ChartFrame) -> float:
 def draw_computation_state(
     canvas: Canvas, frame: ChartFrame, state: str, *, left: float, right: float
 ) -> None:
-    """Draw the state of the computation of costs, if there is space between two columns, px."""
+    """Draw the progress of the cost computation, if there is space between columns `left` and `right`, px."""
     if state and right - canvas.measure_text(state) > left:
         row = 0.5 * TOP_PX * frame.scale
         canvas.draw_text(state, (right, row), color=frame.theme.faint, anchor="right")
 
 
 def draw_switch(canvas: Canvas, frame: ChartFrame, title_end: float) -> Box:
-    """Draw the name of the other quantity, which a click plots, next to the title.
+    """Draw a link next to the title: the name of the other quantity, which a click on it plots.
 
     Parameters
     ----------
     canvas : Canvas
     frame : ChartFrame
     title_end : float, px
+        Right end of the title.
 
     Returns
     -------
     Box
-        Box in the window in which a click counts.
+        Area in the window that reacts to a click.
     """
     scale = frame.scale
     size = frame.theme.small_text
@@ -65,7 +66,7 @@ def draw_switch(canvas: Canvas, frame: ChartFrame, title_end: float) -> Box:
 
 
 def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
-    """Draw the grid, its values at the left and the times below it."""
+    """Draw the horizontal grid lines, the values to the left of them and the times below."""
     times = scale.times
     size = frame.theme.small_text
     line_color = mix(frame.theme.panel, frame.theme.ink, 0.12)
@@ -82,7 +83,7 @@ def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
 
 
 def _choose_time_step(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> float:
-    """Return the time between two labels, s, which must not overlap."""
+    """Return the interval of the time labels, s, at which they do not overlap."""
     widest_label = f"{times.end:.0f} s"
     label_width = canvas.measure_text(widest_label, frame.theme.small_text) + _TIME_GAP_PX * frame.scale
     max_intervals = min(MAX_TIME_INTERVALS, times.width / label_width)

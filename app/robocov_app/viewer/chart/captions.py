@@ -1,4 +1,4 @@
-"""Captions at the right of the chart: the displayed value of each curve, and its gap to the best."""
+"""Captions to the right of the chart: the displayed value of each curve, and its gap to the best one."""
 
 import pygame
 
@@ -12,7 +12,7 @@ from robocov_app.viewer.chart.scale import ChartScale
 
 # Lengths in pixels at scale 1.
 MIN_CAPTION_GAP_PX = 15.0
-"""Minimum distance between the middles of captions."""
+"""Minimum distance between the centers of captions."""
 _LEFT_PX = 9
 _RIGHT_PX = 6
 _BOTTOM_PX = 8
@@ -20,14 +20,14 @@ _MAX_PERCENT_WITH_DECIMAL = 99.95
 
 
 def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) -> None:
-    """Draw the captions onto the window; they are newer than the page.
+    """Draw the captions directly onto the window, since they change more often than the cached page.
 
     Parameters
     ----------
     screen : pygame.Surface
     frame : ChartFrame
     scale : ChartScale
-        That of the page.
+        Scale with which the page was drawn.
     """
     chart = screen.subsurface(pygame.Rect(frame.layout.chart).clip(screen.get_rect()))
     canvas = create_flat_canvas(chart, frame.theme, frame.scale)
@@ -35,6 +35,7 @@ def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) 
     _, values = frame.session.displayed.get_costs(frame.quantity.name)
     colors = map_curve_colors(frame.timeline.panes, frame.theme)
     panes = [pane for pane in frame.timeline.panes if pane.number in values]
+    # From top to bottom: the largest value is at the top of the chart.
     panes.sort(key=lambda pane: -values[pane.number])
     gap = MIN_CAPTION_GAP_PX * frame.scale
     rows = spread_labels(
@@ -55,7 +56,7 @@ def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) 
 
 
 def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
-    """Return a name and a text, the name shortened so that both fit into a width, px."""
+    """Return a name followed by a text; the name is shortened so that both fit into a width, px."""
     size = canvas.theme.small_text
     name_width = width - canvas.measure_text(f"  {text}", size, bold=True)
     short_name = shorten_to_width(name, canvas.scale_text_size(size), name_width, bold=True)
@@ -63,7 +64,7 @@ def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
 
 
 def format_gap(value: float, best: float) -> str:
-    """Return how much a value is above the best one, as text.
+    """Format by how much a value exceeds the best one.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The chart of the coverage cost against time, and the time line below it."""
+"""The chart of the coverage cost over time, and the time slider below it."""
 
 import numpy as np
 import pygame
@@ -24,11 +24,11 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
 
 REFRESH_INTERVAL_S = 0.1
-"""Curves that grow are drawn again after this time, not in each frame."""
+"""Minimum time between two drawings of curves that grow."""
 
 
 class Chart:
-    """Chart and time line of a session. The parts that seldom change are drawn once, on a page.
+    """Chart and time slider of a session. Parts that rarely change are cached as an image, the page.
 
     Parameters
     ----------
@@ -37,14 +37,15 @@ class Chart:
     Attributes
     ----------
     hover : (x, y) or None, px
-        Position of the pointer in the window.
+        Position of the pointer in the window; None if the tag at the pointer is not shown.
     ghosts : list of GhostLine
         Curves of other branches on the page.
     switch_box : Box or None
-        Box in the window that switches to the other quantity; None if there is none.
+        Area of the window where a click plots the other quantity; None if there is no other.
     """
 
     def __init__(self, viewer: Presenter) -> None:
+        """Build a chart without a page; it is drawn after `arrange`."""
         self.viewer = viewer
         self.hover: tuple[int, int] | None = None
         self.ghosts: list[GhostLine] = []
@@ -76,7 +77,7 @@ class Chart:
 
     @property
     def _has_times(self) -> bool:
-        """Whether mean times are known, since robots are not equally fast."""
+        """Whether mean times are known; they are computed only if robots differ in maximum speed."""
         return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
 
     @property
@@ -97,12 +98,12 @@ class Chart:
         return self.switch_box is not None and is_inside(self.switch_box, pixel)
 
     def find_ghost(self, pixel: tuple[int, int]) -> int | None:
-        """Return the node of the branch whose curve is at a pixel of the window; None without one."""
+        """Return the number of the last node of the branch whose curve is at a pixel; None without one."""
         point = np.array([pixel[0], pixel[1] - self._layout.chart[1]])
         return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self._layout.scale)
 
     def to_time(self, column: float) -> float:
-        """Return the time, s, of a column of the window, within the session."""
+        """Return the time, s, at a column of the window, limited to the simulated time."""
         end_time = self.viewer.session.timeline.end_time
         return float(np.clip(self.times.to_time(column), 0.0, end_time))
 
@@ -111,7 +112,7 @@ class Chart:
         return self.times.to_column(time)
 
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw the chart and the time line onto the window."""
+        """Draw the chart and the time slider onto the window."""
         frame = self._frame
         page = self._page
         if self._update_page_key(frame) or page is None:
@@ -123,7 +124,10 @@ class Chart:
             draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]))
 
     def _update_page_key(self, frame: ChartFrame) -> bool:
-        """Update the key of the content of the page; return whether the page has to be drawn again."""
+        """Update the key of the page's content; return whether the page must be redrawn.
+
+        Samples that are appended to the curves alone cause a redraw only every `REFRESH_INTERVAL_S`.
+        """
         timeline = frame.timeline
         samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
         key = (
@@ -145,7 +149,7 @@ class Chart:
         return True
 
     def _draw_page(self, frame: ChartFrame) -> pygame.Surface:
-        """Draw the parts that seldom change: axes, events, curves and the time line."""
+        """Draw the page: axes, events, curves, and the empty time slider."""
         layout = frame.layout
         page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
         self._page = page

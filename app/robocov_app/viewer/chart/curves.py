@@ -1,4 +1,4 @@
-"""Curves of the panes and of other branches."""
+"""Curves of the panes, and curves of other branches (ghosts)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.curves import GhostCurve
 
 GHOST_REACH_PX = 6.0
-"""A click within this distance of the curve of another branch opens it, at scale 1."""
+"""Maximum distance, at scale 1, of a click from the curve of another branch that it opens."""
 MIN_DASHED_POINTS = 12
 """Curves of other branches with at least this many points are dashed."""
 MIN_THINNED_POINTS = 400
@@ -25,7 +25,7 @@ _MAX_POINTS_PER_PX = 1.5
 _CURVE_WIDTH_PX = 1.8
 _GHOST_STRENGTH = 0.45
 _SEGMENTS_PER_DASH = 4
-"""Number of segments from one dash to the next; the last of them is left out."""
+"""Number of curve segments per dash; the last of them is the gap."""
 
 # Position of the name of a branch relative to the end of its curve, px at scale 1.
 _NAME_LEFT_PX = 4
@@ -40,7 +40,7 @@ class GhostLine(NamedTuple):
     node : int
         Node at which the branch ends.
     points : (k, 2) array, px
-        On the page of the chart.
+        Points of the curve on the page of the chart.
     """
 
     node: int
@@ -60,7 +60,7 @@ def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
 
 
 def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[GhostLine]:
-    """Draw the curves of other branches, pale and dashed, with their names at their ends.
+    """Draw the curves of other branches, pale and dashed, each with its name at the end.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def _draw_ghost_line(canvas: Canvas, points: Array, color: Color) -> None:
 
 
 def _draw_ghost_name(canvas: Canvas, frame: ChartFrame, ghost: GhostCurve, end: Array, color: Color) -> None:
-    """Draw the description of a branch at the end, (2,) px, of its curve."""
+    """Draw the description of a branch near the last point of its curve, `end`, (2,) px."""
     size = frame.theme.small_text
     name_width = canvas.measure_text(ghost.description, size)
     right = max(end[0] - _NAME_LEFT_PX * frame.scale, frame.times.left + name_width)
@@ -96,7 +96,7 @@ def _draw_ghost_name(canvas: Canvas, frame: ChartFrame, ghost: GhostCurve, end: 
 
 
 def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) -> int | None:
-    """Return the node of the branch whose curve is nearest to a point of the page.
+    """Return the last node of the branch whose curve is nearest to a point of the page.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) 
     Returns
     -------
     int or None
-        None if no curve is within reach.
+        Number of the node; None if no curve is within reach.
     """
     nearest_node = None
     min_distance = reach
@@ -121,16 +121,16 @@ def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) 
 
 
 def map_curve_colors(panes: Sequence[Pane], theme: Theme) -> dict[int, Color]:
-    """Return the color of the curve of each pane by its number."""
+    """Return the curve color of each pane, by the number of the pane."""
     controllers = {pane.number: pane.controller.name for pane in panes}
     colors = choose_curve_colors(list(controllers.values()), theme)
     return dict(zip(controllers, colors, strict=True))
 
 
 def thin_points(points: Array) -> Array:
-    """Drop points of a curve, (k, 2) px, that are too close to the next one to be told apart.
+    """Drop points of a curve, (k, 2) px, that are indistinguishable from the next point.
 
-    The last point always stays, since the curve grows there.
+    The last point is always kept, since the curve grows there.
     """
     if len(points) < MIN_THINNED_POINTS:
         return points

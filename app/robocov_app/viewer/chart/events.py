@@ -1,4 +1,4 @@
-"""Events on the chart."""
+"""Marks of events, such as edits and failures, on the chart."""
 
 from robocov_app.look.colors import mix
 from robocov_app.render.canvas import Canvas
@@ -6,7 +6,7 @@ from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import ChartScale
 
 EVENT_REACH_PX = 5
-"""The pointer shows an event within this distance, at scale 1."""
+"""Maximum distance, at scale 1, of the pointer from an event that its tag describes."""
 _EVENT_SIGNS = {
     "obstacle": "■",
     "robot": "+",
@@ -16,7 +16,7 @@ _EVENT_SIGNS = {
     "hand": "●",
     "density": "▲",
 }
-"""Sign of each kind of event."""
+"""Symbol of each kind of event."""
 _OTHER_EVENT_SIGN = "•"
 _MAX_DESCRIBED_EVENTS = 3
 
@@ -28,7 +28,7 @@ _SIGN_WIDTH_PX = 8
 
 
 def draw_events(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
-    """Draw a line for each event, with its text if there is space, else with its sign alone."""
+    """Draw a line for each event, with its text if there is space, or else with its symbol alone."""
     events = frame.timeline.events
     times = frame.times
     line_color = mix(frame.theme.panel, frame.theme.ink, 0.3)
@@ -52,7 +52,7 @@ def draw_events(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
 
 
 def describe_events_at(frame: ChartFrame, column: int) -> str:
-    """Return the last events near a column of the window as text; empty if there are none."""
+    """Describe the last few events near a column of the window; empty if there are none."""
     reach = EVENT_REACH_PX * frame.scale
     times = frame.times
     events = [event for event in frame.timeline.events if abs(times.to_column(event.time) - column) < reach]

@@ -1,4 +1,4 @@
-"""Place, look and content that all parts of the chart share."""
+"""Layout, theme and content that all parts of the chart share."""
 
 from dataclasses import dataclass
 
@@ -15,12 +15,12 @@ from robocov_app.viewer.session.timeline import Timeline
 
 @dataclass(frozen=True, eq=False)
 class ChartFrame:
-    """Place, look and content of the chart.
+    """Layout, theme and content of the chart.
 
     Attributes
     ----------
     layout : Layout
-        Of the window.
+        Layout of the window.
     theme : Theme
     session : Session
     quantity : PlottedQuantity
@@ -43,7 +43,7 @@ class ChartFrame:
 
     @property
     def times(self) -> TimeScale:
-        """The axis of times, in pixels of the window."""
+        """The time axis, in pixels of the window."""
         return build_time_scale(self.layout, self.timeline, self.theme.small_text)
 
     def list_curves(self) -> list[Curve]:
@@ -51,10 +51,10 @@ class ChartFrame:
         return [pane.curves[self.quantity.name] for pane in self.timeline.panes]
 
     def list_ghosts(self) -> list[GhostCurve]:
-        """Return the curves of other branches."""
+        """Return the curves of other branches, for the plotted quantity."""
         return [ghost for ghost in self.timeline.ghosts if ghost.quantity == self.quantity.name]
 
     def draw_rule(self, surface: pygame.Surface, column: float, color: Color, *, top: int) -> None:
-        """Draw a vertical line over the curves; the chart starts at row `top` of the surface."""
+        """Draw a vertical line across the chart, whose upper edge is at row `top` of the surface."""
         height = self.layout.chart[3] - (TOP_PX + BOTTOM_PX) * self.scale
         surface.fill(color, (round(column), round(top + TOP_PX * self.scale), 1, round(height)))

@@ -1,4 +1,4 @@
-"""The tag at the pointer: events or values at its time."""
+"""The tag at the pointer, which shows events or values at the time under the pointer."""
 
 import numpy as np
 import pygame
@@ -16,14 +16,14 @@ _TOP_GAP_PX = 16
 
 
 def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int, int], time: float) -> None:
-    """Draw the tag onto the window, if the pointer is over the curves or the time line.
+    """Draw the tag onto the window, if the pointer is over the curves or the time slider.
 
     Parameters
     ----------
     screen : pygame.Surface
     frame : ChartFrame
     pixel : (int, int), px
-        The pointer in the window.
+        Position of the pointer in the window.
     time : float, s
         The time at the pointer.
     """
@@ -42,14 +42,14 @@ def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int
 
 
 def _is_over_axis(frame: ChartFrame, pixel: tuple[int, int]) -> bool:
-    """Return whether a pixel of the window is over the curves or the time line."""
+    """Return whether a pixel of the window is over the curves or the time slider."""
     is_in_box = is_inside(frame.layout.chart, pixel) or is_inside(frame.layout.track, pixel)
     times = frame.times
     return is_in_box and times.left <= pixel[0] <= times.right
 
 
 def _describe_values(frame: ChartFrame, time: float) -> str:
-    """Return the values of all curves at a time, s, as text."""
+    """Describe the values of all curves at a time, s."""
     texts = [f"{time:.1f} s"]
     for pane in frame.timeline.panes:
         value = pane.curves[frame.quantity.name].interpolate(time)

@@ -1,4 +1,4 @@
-"""Positions of times and values on the chart of a session."""
+"""Conversion of times and values to pixels of the chart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,30 +13,30 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.timeline import Timeline
 
 LEFT_PX = 52
-"""Space to the left of the curves, at scale 1: numbers of the axis of values."""
+"""Space to the left of the curves, at scale 1, for the numbers of the value axis."""
 RIGHT_PX = 70
-"""Space to the right: values of the captions."""
+"""Space to the right, for the values of the captions."""
 TOP_PX = 26
-"""Space above: the title."""
+"""Space above, for the title."""
 BOTTOM_PX = 20
-"""Space below: numbers of the axis of times."""
+"""Space below, for the numbers of the time axis."""
 MIN_TICK_GAP_PX = 22
-"""Minimum distance between the lines of the grid."""
+"""Minimum distance between grid lines."""
 _WIDEST_VALUE = "  8.888  +88.8 %"
 _MAX_NAMES_FRACTION = 0.4
-"""Fraction of the chart that names of controllers may take."""
+"""Maximum fraction of the chart's width for captions with names of controllers."""
 
 
 @dataclass(frozen=True)
 class TimeScale:
-    """Columns of times in the window.
+    """The time axis: converts times to columns of the window.
 
     Attributes
     ----------
     left, right : float, px
-        Ends of the axis.
+        Columns at the ends of the axis.
     end : float, s
-        Time at the right end; the left end is at 0.
+        Time at the right end; the left end is at time 0.
     """
 
     left: float
@@ -49,7 +49,7 @@ class TimeScale:
         return self.right - self.left
 
     def to_column(self, time: float) -> float:
-        """Return the column of a time, s, px."""
+        """Return the column, px, of a time, s."""
         return self.left + self.width * time / self.end
 
     def to_time(self, column: float) -> float:
@@ -58,12 +58,12 @@ class TimeScale:
 
 
 def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> TimeScale:
-    """Build the axis of times.
+    """Build the time axis, which ends somewhat after the latest time of all curves.
 
     Parameters
     ----------
     layout : Layout
-        Of the window.
+        Layout of the window.
     timeline : Timeline
     text_size : float
         Size of the captions at scale 1.
@@ -83,20 +83,20 @@ def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> Ti
 
 
 def _measure_captions(panes: Sequence[Pane], text_size: int) -> int:
-    """Return the width of the longest name with its value, px."""
+    """Return the width of the widest caption, a name with its value, px."""
     return max(measure_text(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, True) for pane in panes)
 
 
 @dataclass(frozen=True)
 class ChartScale:
-    """Pixels of times and values on the page of the chart.
+    """Converts times and values to pixels of the chart's page.
 
     Attributes
     ----------
     times : TimeScale
     values : Axis
     top, bottom : float, px
-        Rows of the end and of the start of the axis of values.
+        Rows of the largest and the smallest value of the value axis.
     """
 
     times: TimeScale
@@ -110,7 +110,7 @@ class ChartScale:
         return self.bottom + (self.top - self.bottom) * fraction
 
     def to_points(self, times: Array, values: Array) -> Array:
-        """Return the points of a curve, (k, 2) px, of (k,) times, s, and values."""
+        """Return the points of a curve, (k, 2) px, for times, (k,) s, and values, (k,)."""
         columns = self.times.left + self.times.width * times / self.times.end
         fractions = (values - self.values.start) / (self.values.end - self.values.start)
         rows = self.bottom + (self.top - self.bottom) * fractions

@@ -1,4 +1,4 @@
-"""The time line below the chart."""
+"""The time slider below the chart."""
 
 from functools import partial
 
@@ -23,15 +23,15 @@ _HANDLE_RING_PX = 2.0
 
 
 def draw_empty_time_line(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
-    """Draw the bar of the time line, and whether the present or the past is shown.
+    """Draw the empty bar of the time slider, and a label that tells whether present or past is shown.
 
     Parameters
     ----------
     canvas : Canvas
-        Of the page, on which the time line is below the chart.
+        Canvas of the page, on which the time slider is below the chart.
     frame : ChartFrame
     times : TimeScale
-        That of the page.
+        Time axis of the page.
     """
     theme = frame.theme
     top = frame.layout.chart[3]
@@ -48,7 +48,7 @@ def draw_empty_time_line(canvas: Canvas, frame: ChartFrame, times: TimeScale) ->
 
 
 def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -> None:
-    """Draw whether the present is shown, and whether the past is coarser than it was."""
+    """Draw a label: whether the past is shown, or the present, and whether the past was thinned."""
     theme = frame.theme
     size = theme.small_text
     if not frame.timeline.is_live:
@@ -64,7 +64,7 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
 
 
 def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
-    """Draw the simulated and the displayed time onto the window, and the events."""
+    """Draw the changing parts of the time slider onto the window: bar, events, and handle."""
     theme = frame.theme
     times = frame.times
     timeline = frame.timeline
@@ -72,6 +72,7 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
     middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
     column = times.to_column(frame.session.displayed.time)
     end_column = times.to_column(timeline.end_time)
+    # Gray up to the simulated time; if the past is displayed, colored up to the displayed time.
     _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, 0.4))
     if not timeline.is_live:
         _fill_bar(screen, frame, column, theme.final)
@@ -92,7 +93,7 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
 
 
 def _fill_bar(screen: pygame.Surface, frame: ChartFrame, end: float, color: Color) -> None:
-    """Fill the time line in the window from its start to a column."""
+    """Fill the bar of the time slider from its start to column `end` of the window."""
     thickness = _get_thickness(frame)
     middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
     left = round(frame.times.to_column(0.0))
@@ -102,5 +103,5 @@ def _fill_bar(screen: pygame.Surface, frame: ChartFrame, end: float, color: Colo
 
 
 def _get_thickness(frame: ChartFrame) -> int:
-    """Return the thickness of the time line, px."""
+    """Return the thickness of the bar, px."""
     return max(_MIN_THICKNESS_PX, round(_THICKNESS_PX * frame.scale))

@@ -1,4 +1,4 @@
-"""Commands of the viewer that need no window: keys, buttons, tool tips, help and palette read this list."""
+"""Commands of the viewer that need no window, with the keys and texts for buttons, tool tips and help."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -12,9 +12,9 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, format_speed
 
 GROUPS = ("Run", "Time", "Compare", "Edit", "Tools", "View", "File", "Help", "Show")
-"""Headings of the help, in their order."""
+"""Headings of the help page, in the order in which they are shown."""
 
-RESIZE_STEP = 1.25  # factor of the keys [ and ]
+RESIZE_STEP = 1.25  # factor by which the keys [ and ] change the size of a tool
 MIN_SPEED = 0.01
 MAX_SPEED = 1000.0
 
@@ -61,12 +61,12 @@ def list_viewer_commands(viewer: Presenter, layer_titles: dict[str, str]) -> lis
     viewer : Presenter
         The viewer.
     layer_titles : dict of str to str
-        Titles of the layers by their names.
+        Title of each layer, by its name.
 
     Returns
     -------
     list of Command
-        The commands, in the order of help and palette.
+        The commands, in the order of the help page and the palette.
     """
     return [
         *_list_run_commands(viewer),
@@ -81,6 +81,7 @@ def list_viewer_commands(viewer: Presenter, layer_titles: dict[str, str]) -> lis
 
 
 def _list_run_commands(viewer: Presenter) -> list[Command]:
+    """Return the commands that play and restart the simulation, or change what it starts from."""
     playback = viewer.playback
     files = viewer.files
     add_robot = partial(playback.restart_with_more_robots, 1)
@@ -126,6 +127,7 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
 
 
 def _list_time_commands(viewer: Presenter) -> list[Command]:
+    """Return the commands that go to another time or branch."""
     playback = viewer.playback
     step_back = partial(playback.look_by, -1)
     step_forward = partial(playback.look_by, 1)
@@ -164,6 +166,7 @@ def _list_compare_commands(viewer: Presenter) -> list[Command]:
 
 
 def _list_edit_commands(viewer: Presenter) -> list[Command]:
+    """Return the commands for undo, the selected robot, and the drawing tools."""
     playback = viewer.playback
     robots = viewer.robots
     select_next = partial(robots.select_next, 1)
@@ -197,6 +200,7 @@ def _list_view_commands(viewer: Presenter) -> list[Command]:
 
 
 def _list_file_commands(viewer: Presenter) -> list[Command]:
+    """Return the commands that open and save sessions, and save maps."""
     files = viewer.files
     session_argument = Argument("file", Path, files.list_sessions)
     target_argument = Argument("file", _read_path)
@@ -218,7 +222,7 @@ def _list_tool_commands(viewer: Presenter) -> list[Command]:
 
 
 def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
-    """Return the commands that show or hide layers: those with keys first, in the order of the keys."""
+    """Return the commands that show or hide layers; those with keys come first, in the order of the keys."""
     names = [name for name in _LAYER_KEYS if name in titles]
     names += [name for name in titles if name not in _LAYER_KEYS]
     group = CommandGroup("Show")
@@ -229,7 +233,10 @@ def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Comm
 
 
 def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:
-    """Yield a typed command for each gain of the controller in use and each limit of the team."""
+    """Yield a command for each gain of the controller in use and each limit of the team.
+
+    A limit can also be typed with the prefix ``team.``, for which a hidden command is yielded.
+    """
     for parameter in viewer.comparison.list_parameters():
         title = f"Set {parameter.label}"
         set_value = partial(viewer.comparison.set_parameter, parameter.name)
@@ -255,7 +262,7 @@ def _build_whole_number_argument(name: str, options: Callable[[], Iterable[str]]
 
 
 def _read_path(text: str) -> Path | None:
-    """Return a path; None for an empty text, for the session's own file."""
+    """Convert typed text to a path; None, which means the session's own file, if it is empty."""
     if text:
         return Path(text)
     return None

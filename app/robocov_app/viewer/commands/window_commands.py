@@ -13,24 +13,24 @@ from robocov_app.viewer.chart.chart import Chart
 
 @dataclass(frozen=True)
 class ViewerWindowActions(WindowActions):
-    """Actions of the window that commands start.
+    """Functions of the viewer's window that are called by commands.
 
     Attributes
     ----------
     show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
         See `WindowActions`.
     zoom : callable
-        Zooms by a factor.
+        Zooms by a given factor.
     toggle_recording : callable
         Starts or stops a video.
     save_run : callable
         Saves the run in a new folder.
     open_file : callable
-        Asks for a session or a map, and opens it.
+        Opens the dialog that opens a session or a map.
     list_branches : callable
-        Asks for a branch, and enters it.
+        Opens the dialog that lists and enters branches.
     toggle_lesson : callable
-        Starts a lesson, leaves it, or returns to it.
+        Starts the lesson, leaves it, or returns to it.
     quit : callable
         Closes the window.
     """
@@ -54,6 +54,7 @@ def list_window_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWind
 
 
 def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindowActions) -> list[Command]:
+    """Return the commands that move the camera or change what the window shows."""
     zoom_in = partial(actions.zoom, ZOOM_STEP)
     zoom_out = partial(actions.zoom, 1 / ZOOM_STEP)
     pan_left = partial(canvas.pan, PAN_STEP_PX, 0)

@@ -1,4 +1,4 @@
-"""Costs of the displayed step: requested in every frame, added to the curves when they arrive."""
+"""Costs of the displayed step, which are requested in every frame and added to the curves on arrival."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from robocov.arrays import Array
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
 
-MAX_INITIAL_GAP_S = 0.3  # if a curve starts later, earlier costs are requested
+MAX_INITIAL_GAP_S = 0.3  # if a curve starts later than this, earlier costs are requested
 TIME_TOLERANCE_S = 1e-9
 
 
@@ -30,7 +30,7 @@ class CostCurves:
         self._past_version = -1  # of the timeline at the last request
 
     def update(self) -> None:
-        """Request new costs, and add those that have arrived."""
+        """Request the costs of the displayed step, and add those that have arrived to the curves."""
         session = self._viewer.session
         if session.timeline.past_version != self._past_version:
             self._past_version = session.timeline.past_version
@@ -41,7 +41,7 @@ class CostCurves:
         self._add_answers()
 
     def _ask_for_pane(self, pane: Pane) -> None:
-        """Request the cost of a pane, unless it is known and no path to the cursor is shown."""
+        """Request the cost of a pane, unless it is known and no path from the cursor is shown."""
         session = self._viewer.session
         costs = self._viewer.costs
         positions = session.displayed.get_positions(pane)
@@ -63,16 +63,17 @@ class CostCurves:
             )
 
     def _find_path_target(self) -> Array | None:
-        """Return the point to which a path is shown, (2,) m."""
+        """Return the point whose path to its nearest robot is shown, (2,) m; None if no path is shown."""
         cursor = self._viewer.inspection.cursor
         if cursor is None or "path" not in self._viewer.view.layers:
             return None
         return np.array(cursor)
 
     def _ask_for_first_seconds(self) -> None:
-        """Request costs of the first seconds, which passed before the map was prepared.
+        """Request costs of the first seconds, which had passed before costs could be computed on the map.
 
-        They are requested backwards from the first known cost; while the run plays, only every other time.
+        They are requested backwards in time from the first known cost. While the run plays, requests for them
+        alternate with those for the displayed step.
         """
         session = self._viewer.session
         if not session.timeline.is_live:
@@ -89,7 +90,7 @@ class CostCurves:
                 target = first_time - MAX_INITIAL_GAP_S
             index = history.find_index(target)
             state = history[index].states.get(pane.number)
-            # The costs are those of the displayed map.
+            # Costs can only be computed on the displayed map.
             if state is None or state.setup.environment is not session.displayed.environment:
                 continue
             self._viewer.costs.ask(

@@ -1,4 +1,4 @@
-"""The exact coverage cost of all panes, computed in another process; each answer has its own time."""
+"""The exact coverage cost of all panes, computed in another process; answers arrive some frames later."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_map.field import DistanceField
 from robocov_app.render.distance_map.lattice import FieldLattice
 
-PROGRESS_INTERVAL_S = 0.05  # between two reports on the preparation of a map
+PROGRESS_INTERVAL_S = 0.05  # between progress reports while a map is prepared
 MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown
 
 
@@ -31,15 +31,15 @@ class KnownCost:
     Attributes
     ----------
     time : float
-        Time to which it belongs, s.
+        Simulation time to which the cost belongs, s.
     result : CoverageResult
         The cost.
     path : (k, 2) array, m, or None
         Path from the cursor to its nearest robot; empty if there is none.
     get_lattice : callable
-        Returns the sites for drawing.
+        Returns the lattice of sites for drawing the distance field.
     travel_time : float or None
-        Mean time until the first robot arrives, s.
+        Mean time until the first robot can reach a point, s; None if all robots are equally fast.
     """
 
     time: float
@@ -55,7 +55,7 @@ class KnownCost:
 
 
 class _SharedSites(NamedTuple):
-    """Data that all results on a map share: sites, corners of geodesics, and weights of the sites."""
+    """Data shared by all results on a map: sites, corners of geodesic paths, and weights of the sites."""
 
     sites: Sites
     corners: Array
@@ -64,14 +64,14 @@ class _SharedSites(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CostQuestion:
-    """Request for the cost on a map; without positions, a request to prepare the map.
+    """Request for the cost on a map; without positions, only a request to prepare the map.
 
     Attributes
     ----------
     number : int
         Number of the map.
     environment : Environment or None
-        The map; it is sent only once.
+        The map; None if it was sent before.
     lattice : int
         Number of sites along the longer side of the map.
     time : float
@@ -79,11 +79,11 @@ class CostQuestion:
     positions : (n, 2) array, m, or None
         Positions of the robots.
     point : (2,) array, m, or None
-        Start of a path to its nearest robot.
+        Point whose path to its nearest robot is requested.
     speeds : (n,) array, m/s, or None
         Maximum speeds of the robots, for the mean time.
     is_for_curve : bool
-        Whether the answer is meant for a curve, and is not the latest cost of its pane.
+        Whether the answer is only added to a curve, and is not displayed as the latest cost of its pane.
     """
 
     number: int
@@ -104,20 +104,21 @@ class Costs:
     lattice : int
         Number of sites along the longer side of the map.
     direct : bool
-        Whether to compute costs at once instead of in another process: for pictures that must not depend on
-        its speed.
+        Whether to compute costs synchronously instead of in another process, for images that must not depend
+        on computing speed.
 
     Attributes
     ----------
     known : dict of int to KnownCost
-        Latest costs by the number of the pane.
+        Latest cost of each pane, by its number.
     state : str
-        Progress of the preparation of a map, or why there is no cost; otherwise empty.
+        Progress of preparing a map, or why there is no cost; otherwise empty.
     lattice : int
         Number of sites along the longer side of the map.
     """
 
     def __init__(self, lattice: int = DEFAULT_LATTICE, *, direct: bool = False) -> None:
+        """Start the worker, which computes nothing until `set_environment` is called."""
         self.known: dict[int, KnownCost] = {}
         self.state = ""
         self.lattice = lattice
@@ -130,10 +131,10 @@ class Costs:
         self._map_number = 0
         self._is_prepared = False
         self._waiting: dict[int, CostQuestion] = {}
-        self._asked_pane: int | None = None  # None if the answer is no longer wanted
+        self._asked_pane: int | None = None  # None if the pending answer is no longer wanted
 
     def set_environment(self, environment: Environment) -> None:
-        """Prepare the costs on another map."""
+        """Start to prepare the computation of costs on another map."""
         self._map_number += 1
         self._map_question = CostQuestion(self._map_number, environment, self.lattice)
         self.known = {}
@@ -142,7 +143,7 @@ class Costs:
         self.poll()
 
     def forget(self) -> None:
-        """Drop all costs and questions, because they belong to another run."""
+        """Drop all known costs and pending questions, because they belong to another run."""
         self._waiting = {}
         self.known = {}
         self._asked_pane = None
@@ -157,7 +158,7 @@ class Costs:
         *,
         is_for_curve: bool = False,
     ) -> None:
-        """Ask for the cost of a pane. A question about it that is still pending is replaced.
+        """Queue a question about the cost of a pane; it replaces one about the same pane that still waits.
 
         Parameters
         ----------
@@ -168,15 +169,15 @@ class Costs:
         positions : (n, 2) array, m
             Positions of the robots.
         point : (2,) array, m, optional
-            Start of a path to its nearest robot.
+            Point whose path to its nearest robot is requested.
         speeds : (n,) array, m/s, optional
             Maximum speeds of the robots, for the mean time.
         is_for_curve : bool
-            Whether the answer is meant for a curve only.
+            Whether the answer is only added to a curve.
         """
         if self._map_question is None:
             return
-        # A replaced question keeps its place, so that panes take turns.
+        # A replaced question keeps its place in the queue, so that panes take turns.
         self._waiting[pane] = replace(
             self._map_question,
             time=time,
@@ -187,7 +188,13 @@ class Costs:
         )
 
     def poll(self) -> list[tuple[int, KnownCost]]:
-        """Ask the next question; return the answers since the last call, with the numbers of their panes."""
+        """Collect answers, and send the next question to the worker.
+
+        Returns
+        -------
+        list of (int, KnownCost)
+            The answers since the last call, each with the number of its pane.
+        """
         answers: list[tuple[int, KnownCost]] = []
         while self._asked is not None or self._ask_next():
             answer = self._worker.poll()
@@ -205,8 +212,7 @@ class Costs:
                     if asked is None or not asked.is_for_curve:
                         self.known[self._asked_pane] = answer
             elif not self._worker.is_alive:
-                # The process has died. It starts again to prepare the map; if it dies during that, there is
-                # no cost.
+                # The process has died. Preparing the map starts a new one; if it dies, too, there is no cost.
                 self._prepare_map()
         return answers
 
@@ -230,7 +236,7 @@ class Costs:
         self._worker.put(self._map_question)
 
     def _ask_next(self) -> bool:
-        """Ask the question that has waited longest; return whether there was one."""
+        """Send the question that has waited longest; return whether there was one."""
         if not self._waiting or not self._is_prepared:
             return False
         self._asked_pane = next(iter(self._waiting))
@@ -240,7 +246,7 @@ class Costs:
 
 
 class _Answer(NamedTuple):
-    """Answer of the service; with the shared sites only if they have changed."""
+    """Answer of the service. It contains the shared data only if they have changed."""
 
     shared: _SharedSites | None
     time: float = 0.0
@@ -250,7 +256,7 @@ class _Answer(NamedTuple):
 
 
 class _CostWire(Wire):
-    """Sends each map once, and completes answers with the sites that were sent once."""
+    """Encoding that sends each map and each set of shared data only once."""
 
     def __init__(self) -> None:
         self._sent_map = -1
@@ -258,15 +264,15 @@ class _CostWire(Wire):
         self._get_lattice: Callable[[], FieldLattice] | None = None
 
     def encode(self, question: CostQuestion) -> CostQuestion:
-        """Leave the map out if it was sent already."""
+        """Remove the map from a question if it was sent before."""
         if question.number == self._sent_map or question.environment is None:
             return replace(question, environment=None)
         self._sent_map = question.number
-        # A copy has no cached properties, which take long to send and are quickly computed again.
+        # A copy lacks the cached properties, which are large and quickly computed again.
         return replace(question, environment=replace(question.environment))
 
     def decode(self, answer: _Answer) -> KnownCost | _SharedSites:
-        """Add the shared sites to an answer."""
+        """Complete an answer with the shared data."""
         if answer.shared is not None:
             self._shared = answer.shared
             sites = answer.shared.sites
@@ -287,19 +293,19 @@ class _CostWire(Wire):
 
 
 class CostService:
-    """Prepares the latest map, and answers the latest question about it."""
+    """Service in the other process: prepares the latest map, and answers the latest question about it."""
 
     failure_message = "the cost could not be computed"
 
     def __init__(self) -> None:
-        # If another process is compiling these kernels already, wait for it.
+        # If another process is already compiling these kernels, this waits for it.
         compile_kernels([call_cost_kernels])
         self._cost: CoverageCost | None = None
-        self._sent_cost: CoverageCost | None = None  # whose sites were sent last
+        self._sent_cost: CoverageCost | None = None  # the cost whose shared data were sent last
         self._varying_cost: TimeVaryingCost | None = None
 
     def __call__(self, questions: list[CostQuestion], channel: Channel) -> _Answer:
-        """Answer the last of several questions."""
+        """Answer the last of several questions; the map may have come with an earlier one."""
         maps = [question for question in questions if question.environment is not None]
         if maps:
             self._prepare(maps[-1], channel)
@@ -319,7 +325,7 @@ class CostService:
         return answer._replace(shared=shared)
 
     def _prepare(self, question: CostQuestion, channel: Channel) -> None:
-        """Build the cost of a map; raise RobocovError as soon as there is a question about a newer map."""
+        """Prepare the cost of a map; stop with a RobocovError as soon as a newer map has been sent."""
         environment = question.environment
         assert environment is not None
         started_at = time.perf_counter()
@@ -353,7 +359,7 @@ class CostService:
 
 
 def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:
-    """Compute the answer to a question, without the data that all results on a map share."""
+    """Compute the answer to a question, without the shared data."""
     result = cost.evaluate_all_robots(question.time, positions)
     if result is None:
         raise InputError("positions: expected at least one at a free position, got none")
@@ -363,7 +369,7 @@ def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -
         with suppress(RobocovError):
             available = cost.find_available_robots(question.time, positions)
             path = cost.get_cost(question.time).find_path(positions[available], question.point)
-    # Integers of 32 bits take half as long to send.
+    # Sending 32-bit integers takes half as long.
     result = replace(
         result,
         owner=result.owner.astype(np.int32),
@@ -380,7 +386,7 @@ def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -
 
 
 def _compute_travel_time(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> float | None:
-    """Return the mean time until the first robot arrives, s, if speeds are given."""
+    """Return the mean time until the first robot can reach a point, s; None without speeds."""
     if question.speeds is None:
         return None
     result = cost(question.time, positions, speeds=question.speeds)

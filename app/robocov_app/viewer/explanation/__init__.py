@@ -1,8 +1,8 @@
-"""Why a robot moves, or why it does not, in words and numbers. Knows no pygame.
+"""Reports in words and numbers on why a robot moves, or why it does not. Independent of pygame.
 
 ``explain``         the report on a robot
 ``situation``       the facts: forces, goal, obstacles and robots nearby
-``motion``          moving, trembling, at rest or setting off
+``motion``          classification: moving, trembling, at rest or setting off
 ``first_sentence``  the first sentence of the report: why the robot moves or has stopped
 ``sentences``       the other sentences
 ``quantities``      lengths, forces and directions as text

@@ -40,7 +40,7 @@ class RobotReport:
 
 
 def explain_robot(viewer: Presenter, number: int) -> RobotReport:
-    """Explain a robot of the active pane at the displayed step, by its number."""
+    """Build the report on a robot of the active pane, given by its number, at the displayed step."""
     displayed = viewer.session.displayed
     pane = viewer.pane
     setup = displayed.get_setup(pane)
@@ -78,7 +78,7 @@ def explain(
     environment : Environment
         The map, with failed robots as obstacles.
     robot : int
-        Row of the robot.
+        Row of the robot in arrays.
     numbers : sequence of int, optional
         Numbers of the robots; by default 1, 2, ...
     recent : (k, 2) array, m, optional

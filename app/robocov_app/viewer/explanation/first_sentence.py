@@ -17,10 +17,10 @@ from robocov_app.viewer.explanation.situation import (
 )
 
 MIN_AHEAD_ALIGNMENT = 0.7
-"""A robot heads for its goal if the cosine of the angle between the two is greater."""
+"""A robot heads for its goal if the cosine of the angle between its direction and the goal is greater."""
 
-_SLIDING_ALIGNMENT = 0.95  # below it the force points away from the direction of motion
-_BRAKING_ALIGNMENT = -0.5
+_SLIDING_ALIGNMENT = 0.95  # cosine below which force and motion differ in direction: the robot slides
+_BRAKING_ALIGNMENT = -0.5  # cosine below which the force is opposed to the motion: the robot brakes
 
 
 def describe_motion(situation: RobotSituation, motion: Motion) -> str:
@@ -55,6 +55,7 @@ def _describe_starting(situation: RobotSituation) -> str:
 
 
 def _describe_rest(situation: RobotSituation) -> str:
+    """Describe a robot at rest: stuck, pushed, arrived, or held short of its goal."""
     goal = situation.goal
     if situation.is_stuck:
         return f"at rest, stuck: {_describe_goal(situation)}"
@@ -104,7 +105,7 @@ _DESCRIPTIONS = {
 
 
 def _is_ahead(goal: NearbyObject | None, direction: complex) -> bool:
-    """Return whether the goal lies in a direction."""
+    """Return whether the goal lies approximately in a direction."""
     return goal is not None and compute_alignment(direction, goal.offset) > MIN_AHEAD_ALIGNMENT
 
 

@@ -1,4 +1,4 @@
-"""Kinds of motion of a robot: steady, to and fro, none, or just begun."""
+"""Kinds of motion of a robot: steady, back and forth, none, or just beginning."""
 
 from enum import Enum
 
@@ -9,10 +9,10 @@ from robocov.metrics import SETTLED_DISTANCE_M
 from robocov_app.viewer.explanation.situation import RobotSituation, compute_alignment
 
 MAX_REST_SPEED_M_S = 0.05
-"""Slower robots seem to be at rest."""
+"""Robots that are slower appear to be at rest."""
 
-_MIN_STEADY_SPEED_M_S = 0.1 * MAX_REST_SPEED_M_S  # of a robot that has covered some distance
-_MIN_SWAY_M = 0.02  # a robot that moves to and fro by less seems to stand still
+_MIN_STEADY_SPEED_M_S = 0.1 * MAX_REST_SPEED_M_S  # enough for a robot that has covered some distance
+_MIN_SWAY_M = 0.02  # a robot that moves back and forth by less appears to stand still
 _TREMBLING_RATIO = 3.0  # a robot trembles if its path length is more than this many times its extent
 _STRAIGHT_RATIO = 1.5  # a path is straight if it is less than this many times the distance covered
 _MIN_FORWARD_ALIGNMENT = 0.7  # cosine between the distance covered and the velocity of a robot that sets off
@@ -36,7 +36,7 @@ def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
     situation : RobotSituation
         The robot.
     recent : (k, 2) array, m, or None
-        Its positions of the last seconds, oldest first. Without them its speed decides.
+        Its positions during the last seconds, oldest first. Without them, only its speed is used.
     """
     path = np.empty((0, 2)) if recent is None else recent[np.isfinite(recent).all(axis=1)]
     path_length = float(np.hypot(*np.diff(path, axis=0).T).sum())
@@ -60,7 +60,7 @@ def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
 
 
 def _classify_rest(situation: RobotSituation, path_length: float) -> Motion:
-    """Return whether a robot at rest is about to move."""
+    """Classify a robot without noticeable motion: setting off if a force pushes it, else at rest."""
     is_pushed = not situation.is_balanced and not situation.holding_names
     if is_pushed and path_length < _MIN_SWAY_M:
         return Motion.STARTING
@@ -68,7 +68,17 @@ def _classify_rest(situation: RobotSituation, path_length: float) -> Motion:
 
 
 def _has_set_off(situation: RobotSituation, covered: complex, path_length: float) -> bool:
-    """Return whether a fast robot has covered little distance because it has just started, straight ahead."""
+    """Return whether a robot has covered little distance because it has only just started to move.
+
+    Parameters
+    ----------
+    situation : RobotSituation
+        The robot, which is faster than `MAX_REST_SPEED_M_S`.
+    covered : complex
+        Displacement during the last seconds, x + i y, m.
+    path_length : float
+        Length of the path during that time, m.
+    """
     is_straight = path_length < _STRAIGHT_RATIO * abs(covered)
     if not is_straight or compute_alignment(covered, situation.velocity) <= _MIN_FORWARD_ALIGNMENT:
         return False

@@ -3,13 +3,13 @@
 import math
 
 MIN_FORCE_N = 5e-4
-"""Smaller forces are written as 0 N, and have no arrow."""
+"""Smaller forces are written as 0 N and are drawn without an arrow."""
 
 _DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 
 
 def format_direction(vector: complex) -> str:
-    """Return the nearest of eight directions of a plane vector, x + i y; empty for a zero vector.
+    """Return the nearest of eight compass directions of a vector x + i y; empty for a zero vector.
 
     >>> format_direction(1 + 1j)
     'north-east'
@@ -20,7 +20,7 @@ def format_direction(vector: complex) -> str:
 
 
 def format_number(value: float) -> str:
-    """Return a number that is not negative with about two digits.
+    """Format a non-negative number with about two digits.
 
     >>> [format_number(value) for value in (0.001, 0.314, 2.44, 12.3, 1e9)]
     ['0', '0.31', '2.4', '12', 'over a million']
@@ -37,7 +37,7 @@ def format_number(value: float) -> str:
 
 
 def format_length(meters: float) -> str:
-    """Return a length with a unit that suits it.
+    """Format a length in a suitable unit.
 
     >>> [format_length(length) for length in (0.0042, 0.42, 2.44)]
     ['4 mm', '42 cm', '2.4 m']
@@ -50,7 +50,7 @@ def format_length(meters: float) -> str:
 
 
 def format_force(newtons: float) -> str:
-    """Return the magnitude of a force with a unit that suits it.
+    """Format the magnitude of a force in a suitable unit.
 
     >>> [format_force(force) for force in (0.0042, 0.314)]
     ['4 mN', '0.31 N']
@@ -61,7 +61,7 @@ def format_force(newtons: float) -> str:
 
 
 def format_robot_count(count: int) -> str:
-    """Return a number of robots."""
+    """Format a number of robots, such as "3 robots"."""
     if count == 1:
         return f"{count} robot"
     return f"{count} robots"

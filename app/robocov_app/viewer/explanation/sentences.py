@@ -1,4 +1,4 @@
-"""The sentences of the report on a robot: position, forces, reasons, surroundings."""
+"""Sentences of the report on a robot: position, forces, reasons, surroundings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from robocov_app.viewer.explanation.situation import (
 )
 
 MAX_NAMED_FORCES = 3
-_MIN_SPEED_M_S = 0.005  # slower robots are written as at rest
+_MIN_SPEED_M_S = 0.005  # slower robots are described as at rest
 _PAIR_FRACTION = 0.2  # two forces balance if their sum is below this fraction of the larger one
-_STRAIGHT_ALIGNMENT = 0.9  # cosine above which a force points at something
-_NEIGHBOR_RATIO = 1.5  # the second neighbor is named if it is at most this much farther than the first
-_FAST_ACCELERATION = 1.001  # fraction of the maximum acceleration above which the forces are limited
+_STRAIGHT_ALIGNMENT = 0.9  # cosine above which a force points straight at something, or straight away from it
+_NEIGHBOR_RATIO = 1.5  # the second neighbor is named if it is at most this many times as far as the first
+_FAST_ACCELERATION = 1.001  # fraction of the maximum acceleration above which the acceleration is limited
 _FULL_SPEED = (0.995, 1.005)  # fractions of the maximum speed between which a robot is at that speed
 _MAX_LISTED_RANGE_M = 1e100
 
@@ -43,10 +43,10 @@ class ReportLine:
     text : str
         The sentence.
     vector : tuple of float or None
-        The force that it is about, (x, y) N.
+        The force that the sentence is about, (x, y) N.
     kind : str
-        Term of the controller, `UNEXPLAINED_FORCE`, ``viscosity`` or ``resultant``; empty if it is not about
-        a force.
+        Kind of force: a term of the controller, `UNEXPLAINED_FORCE`, ``viscosity`` or ``resultant``; empty if
+        the sentence is not about a force.
     """
 
     text: str
@@ -66,7 +66,7 @@ def build_position_line(situation: RobotSituation) -> ReportLine:
 
 
 def list_force_lines(situation: RobotSituation) -> list[ReportLine]:
-    """Return a sentence for each force. The vectors sum up to that of the resultant, the last one."""
+    """Return a sentence for each force, and last one for the resultant, which is their sum."""
     lines: list[ReportLine] = []
     for kind, force in situation.forces.items():
         describe = _FORCE_DESCRIPTIONS.get(kind, _describe_push)
@@ -87,6 +87,7 @@ def _build_force_line(text: str, kind: str, force: complex) -> ReportLine:
 
 
 def _describe_attraction(situation: RobotSituation, kind: str, force: complex) -> str:
+    """Describe the pull to the goal, which may point elsewhere to avoid obstacles or to brake."""
     goal = situation.goal
     if goal is None:
         return _describe_push(situation, kind, force)
@@ -105,6 +106,7 @@ def _describe_attraction(situation: RobotSituation, kind: str, force: complex) -
 
 
 def _describe_robot_repulsion(situation: RobotSituation, kind: str, force: complex) -> str:
+    """Describe the push by other robots, and name the nearest one or two."""
     neighbors = situation.neighbors
     if not neighbors or abs(force) < MIN_FORCE_N:
         return _describe_push(situation, kind, force)
@@ -130,7 +132,7 @@ def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: co
 
 
 def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
-    """Describe a force by its name alone."""
+    """Describe a force only by its name, magnitude and direction."""
     source = _name_force(kind)
     if kind == UNEXPLAINED_FORCE and len(situation.forces) > 1:
         source = "other forces of its controller"
@@ -147,11 +149,12 @@ _FORCE_DESCRIPTIONS: dict[str, Callable[[RobotSituation, str, complex], str]] = 
 
 
 def list_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
-    """Return why the robot is slower than its forces suggest, or does not move."""
+    """Return the reasons why the robot is slower than its forces suggest, or does not move."""
     return [*_list_limits(situation), *_list_rest_reasons(situation, motion)]
 
 
 def _list_limits(situation: RobotSituation) -> list[str]:
+    """Return which limits of acceleration and speed the robot has reached."""
     texts: list[str] = []
     if not situation.forces:
         texts.append("its controller gives a force that is not a number")
@@ -168,7 +171,7 @@ def _list_limits(situation: RobotSituation) -> list[str]:
 
 
 def _list_rest_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
-    """Return which obstacle holds a robot, or which forces balance, if it does not move steadily."""
+    """For a robot that does not move steadily, return which object holds it, or which forces balance."""
     forces = {kind: force for kind, force in situation.forces.items() if abs(force) >= MIN_FORCE_N}
     if motion in (Motion.MOVING, Motion.STARTING) or not forces:
         return []
@@ -189,7 +192,7 @@ def _compute_component(force: complex, direction: complex) -> float:
 
 
 def _find_balancing_forces(forces: dict[str, complex]) -> list[str]:
-    """Return the kinds of the two strongest forces if they cancel, otherwise of the three strongest."""
+    """Return the kinds of the two strongest forces if they cancel, or else of the three strongest."""
     strongest = sorted(forces, key=lambda kind: -abs(forces[kind]))
     pair = sum((forces[kind] for kind in strongest[:2]), 0j)
     is_pair = abs(pair) < _PAIR_FRACTION * abs(forces[strongest[0]])
@@ -213,7 +216,7 @@ def _name_force(kind: str) -> str:
 
 
 def list_surroundings(situation: RobotSituation) -> list[str]:
-    """Return the objects that the robot touches, senses and communicates with."""
+    """Describe what the robot touches and senses, and with whom it communicates."""
     texts = [f"touches {touched.side_text}" for touched in situation.touched]
     goal = situation.goal
     if goal is not None and "attraction" not in situation.forces:

@@ -1,7 +1,7 @@
 """The situation of one robot: its forces, its goal and its surroundings.
 
-Plane vectors are complex numbers, x + i y. Distances to goals, obstacle points and other robots are measured
-from the robot's center, as controllers do; gaps are measured from its rim.
+Vectors in the plane are complex numbers, x + i y. Distances to goals, obstacle points and other robots are
+measured from the robot's center, as in the controllers; gaps are measured from its rim.
 """
 
 import math
@@ -18,12 +18,12 @@ from robocov.team import Team
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N, format_direction, format_length
 
 UNEXPLAINED_FORCE = "law"
-"""Kind of the force that a controller's terms do not explain."""
+"""Kind of the remainder of a controller's force that its terms do not account for."""
 MIN_SHORTFALL_M = 0.3
-"""A robot at rest farther from its goal than this has not arrived."""
+"""A robot that rests farther from its goal than this has not arrived."""
 
-_BALANCE_FRACTION = 0.1  # a resultant below this fraction of the largest force counts as zero,
-_BALANCE_ACCELERATION = 0.1  # and so does one that accelerates the robot by less, m/s²
+_BALANCE_FRACTION = 0.1  # a resultant below this fraction of the largest force counts as zero;
+_BALANCE_ACCELERATION = 0.1  # so does one that accelerates the robot by less than this, m/s²
 _MIN_PRESSING_ALIGNMENT = 0.1  # cosine above which the resultant presses the robot against an object
 _MAX_VALUE = 1e100  # larger numbers would overflow in products
 _RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
@@ -38,11 +38,11 @@ class NearbyObject:
     name : str
         Its name in a sentence.
     offset : complex
-        From the robot's center, m.
+        Vector from the robot's center, m.
     gap : float
-        From the robot's rim, m.
+        Distance from the robot's rim, m.
     obstruction : str
-        Description of the obstacle between the robot and it; empty for none.
+        What obstructs the straight way from the robot to it; empty for nothing.
     """
 
     name: str
@@ -73,7 +73,7 @@ class NearbyObject:
 
 
 class RobotSituation:
-    """All facts that the report on a robot uses, in SI units.
+    """All facts for the report on a robot, in SI units.
 
     Parameters
     ----------
@@ -82,9 +82,9 @@ class RobotSituation:
     team : Team
         The team.
     environment : Environment
-        The map, with failed robots as obstacles. The robot does not know it.
+        The map, with failed robots as obstacles. The robot itself does not know the map.
     robot : int
-        Row of the robot.
+        Row of the robot in arrays.
     numbers : sequence of int
         Numbers of the robots.
 
@@ -97,32 +97,33 @@ class RobotSituation:
     position, velocity : complex
         Position, m, and velocity, m/s.
     goal : NearbyObject or None
-        Where it wants to go.
+        Goal of the robot; None if its controller has none.
     senses_obstacle : bool
         Whether there is an obstacle in sensing range.
     obstacle : NearbyObject or None
-        The obstacle that it senses, or touches.
+        The nearest obstacle point that it senses, or one that it touches without sensing it.
     neighbors : list of NearbyObject
-        Robots in communication range, the nearest first.
+        Robots in communication range, nearest first.
     forces : dict of str to complex
-        Terms of the controller's force, N, and the rest of it; empty if it is not finite.
+        Terms of the controller's force, N, and the unexplained remainder; empty if the force is not finite.
     drag : complex
         Viscous force, N.
     resultant : complex
-        Sum of all forces, N, without limits and contacts.
+        Sum of all forces, N, before limits and contact forces.
     is_balanced : bool
-        Whether the resultant is too small to move the robot visibly from rest.
+        Whether the resultant is too small to set the robot visibly in motion.
     touched : list of NearbyObject
         Objects that it touches.
     holding_names : str
         Names of the objects against which it is pressed; empty for none.
     is_stuck : bool
-        Whether it is far from its goal, and something is in between.
+        Whether it is far from its goal, and something obstructs the straight way there.
     """
 
     def __init__(
         self, snapshot: Snapshot, team: Team, environment: Environment, robot: int, numbers: Sequence[int]
     ) -> None:
+        """Collect the facts in the order in which they depend on each other."""
         self.number = numbers[robot]
         self.mass = float(team.mass[robot])
         self.radius = float(team.radius[robot])
@@ -190,7 +191,7 @@ def compute_alignment(first: complex, second: complex) -> float:
 
 
 def _get_vector(values: object, row: int) -> complex | None:
-    """Return one row of an array (n, 2); None if there is none, or it is not finite.
+    """Return one row of an (n, 2) array as x + i y; None if it does not exist or is not finite.
 
     User-defined controllers may return anything as a term.
     """
@@ -205,7 +206,7 @@ def _get_vector(values: object, row: int) -> complex | None:
 
 
 def _split_force(decision: Decision, robot: int) -> dict[str, complex]:
-    """Return the force of a controller by term, N; empty if it is not finite."""
+    """Return the controller's force on a robot, split into its terms, N; empty if it is not finite."""
     total = _get_vector(decision.forces, robot)
     if total is None:
         return {}
@@ -233,7 +234,7 @@ def _build_goal(
 
 
 def _find_obstruction(environment: Environment, position: complex, goal: complex) -> str:
-    """Return what prevents a robot from going straight to its goal; empty for nothing."""
+    """Describe what prevents a robot from moving straight to its goal; empty if nothing does."""
     point = shapely.Point(goal.real, goal.imag)
     if not environment.boundary_polygon.intersects(point):
         return "outside the map"
@@ -264,7 +265,7 @@ def _build_obstacle(
 
 
 def _name_obstacle(environment: Environment, position: complex) -> str:
-    """Return the name of the obstacle that has a point on its rim."""
+    """Return the name of the obstacle with a given point on its outline."""
     point = shapely.Point(position.real, position.imag)
     name = "the obstacle"
     nearest = MAX_CONTACT_GAP_M

@@ -1,1 +1,1 @@
-"""Lessons: played, drawn, and used with the mouse and keys."""
+"""Lessons: playing them, drawing them, and handling the user's input."""

@@ -1,4 +1,4 @@
-"""The lesson in the window: started, drawn, clicked, left and ended."""
+"""The lesson in a window: starting, drawing, input of the user, leaving and ending."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -30,12 +30,12 @@ COMMANDS_WITHIN_LESSON = frozenset(
         "tour",
     }
 )
-"""Commands after which the lesson continues; with all others the user takes over."""
+"""Commands after which the lesson continues; with any other command, the user takes over."""
 
 _ANSWER_KEYS = ("1", "2", "3", "4")
 
 _CHAPTER_STEPS = {"forward": 1, "back": -1}
-"""Commands that turn chapters while a lesson is shown."""
+"""Commands that go to another chapter while a lesson is shown."""
 
 
 class LessonGuide:
@@ -48,14 +48,14 @@ class LessonGuide:
     fit_view : callable
         Shows the whole map.
     is_unattended : bool
-        Whether there is no user who answers and does tasks.
+        Whether there is no user who could answer questions and do tasks.
 
     Attributes
     ----------
     player : LessonPlayer or None
         The lesson, if there is one.
     click_areas : list of ClickArea
-        Answers and chapters on the page.
+        Answers and chapters on the page that can be clicked.
     """
 
     def __init__(self, viewer: Presenter, fit_view: Callable[[], None], *, is_unattended: bool) -> None:
@@ -67,7 +67,7 @@ class LessonGuide:
 
     @property
     def shown(self) -> LessonPlayer | None:
-        """The lesson while it is in place of the panel; None while the user plays with it."""
+        """The lesson while it is shown; None while the user has taken over, or if there is none."""
         if self.player is None or self.player.state is LessonState.LEFT:
             return None
         return self.player
@@ -119,7 +119,7 @@ class LessonGuide:
         return True
 
     def advance(self, seconds: float) -> None:
-        """Let real time pass."""
+        """Advance the lesson by real time, s."""
         if self.player is None:
             return
         self.player.advance(seconds)
@@ -127,7 +127,7 @@ class LessonGuide:
             self.player = None
 
     def handle_command(self, name: str) -> bool:
-        """Let the lesson handle a command of the window; return whether it did."""
+        """Let the lesson handle a command of the window; return whether the command is thereby done."""
         if self.shown is not None and name in _CHAPTER_STEPS:
             self.shown.skip(_CHAPTER_STEPS[name])
             return True
@@ -149,7 +149,7 @@ class LessonGuide:
         return False
 
     def handle_key(self, character: str) -> bool:
-        """Answer with a key; return whether it was an answer."""
+        """Answer the question by a number key; return whether the key was an answer."""
         player = self.player
         if player is None or player.state is not LessonState.ASKING or character not in _ANSWER_KEYS:
             return False
@@ -157,7 +157,7 @@ class LessonGuide:
         return True
 
     def click(self, pixel: tuple[int, int]) -> bool:
-        """Answer with a click, or choose a chapter; return whether there is something to click."""
+        """Answer the question or choose a chapter by a click; return whether something was clicked."""
         for area in self.click_areas:
             if area.box.collidepoint(pixel):
                 area.action()
@@ -165,11 +165,11 @@ class LessonGuide:
         return False
 
     def draw(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> bool:
-        """Draw the lesson; return whether it is in place of the panel."""
+        """Draw the lesson in place of the panel, or as a caption; return whether there is one to draw."""
         self.click_areas = []
         if self.shown is None:
             return False
-        if layout.panel[2]:
+        if layout.panel[2]:  # the width of the panel; 0 while it is hidden
             self.click_areas = draw_lesson_page(screen, layout, theme, self.shown)
         else:
             draw_caption(screen, layout, theme, self.shown)

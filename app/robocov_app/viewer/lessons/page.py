@@ -24,7 +24,7 @@ class ClickArea(NamedTuple):
     box : Rect
         Position and size, px.
     action : callable
-        Called by a click.
+        Called when the area is clicked.
     """
 
     box: pygame.Rect
@@ -80,7 +80,7 @@ def draw_lesson_page(
     Returns
     -------
     list of ClickArea
-        Answers and chapters.
+        Areas of the answers and chapters that can be clicked.
     """
     screen.fill(theme.panel, layout.panel)
     page = _LessonPage(screen, layout, theme, lesson)
@@ -90,7 +90,7 @@ def draw_lesson_page(
 
 @dataclass
 class _LessonPage:
-    """A page that is drawn from top to bottom; `y` is where it continues, px."""
+    """The page of a lesson, which is drawn from top to bottom; `y` is the top of the next item, px."""
 
     screen: pygame.Surface
     layout: Layout
@@ -107,7 +107,7 @@ class _LessonPage:
         self.y = top + 18 * self.scale
 
     def draw(self) -> None:
-        """Draw heading, text, questions and tasks, the list of chapters and the progress."""
+        """Draw the heading, the text, the question or task, the list of chapters and the progress bar."""
         lesson = self.lesson
         scale = self.scale
         self._write("LESSON", 11, self.theme.faint, bold=True)
@@ -120,6 +120,7 @@ class _LessonPage:
         self._write_paragraph(lesson.chapter.text, self.theme.ink)
         self.y += 8 * scale
         for k, line in enumerate(lesson.lines):
+            # While the lesson asks, the first line is the question, and the others are the answers.
             if lesson.state is LessonState.ASKING and k > 0:
                 self._draw_answer(k, line)
             else:
@@ -136,14 +137,14 @@ class _LessonPage:
         self.screen.blit(picture, (round(self.x + indent * self.scale), round(self.y)))
 
     def _write_paragraph(self, text: str, color: Color, *, indent: float = 0.0) -> None:
-        """Write wrapped text, indented on both sides, and continue below it."""
+        """Write wrapped text, indented on both sides by a length at scale 1, px, and move below it."""
         width = self.width - 2 * indent * self.scale
         for line in wrap_text(text, round(_PAGE_TEXT_PX * self.scale), width):
             self._write(line, _PAGE_TEXT_PX, color, indent=indent)
             self.y += _PAGE_LINE_PX * self.scale
 
     def _draw_answer(self, number: int, text: str) -> None:
-        """Draw an answer in a frame that can be clicked."""
+        """Draw an answer in a frame that can be clicked; `number` counts from 1."""
         top = self.y
         scale = self.scale
         self._write_paragraph(text, self.theme.final, indent=_ANSWER_INDENT_PX)
@@ -153,7 +154,7 @@ class _LessonPage:
         self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
 
     def _draw_chapters(self) -> None:
-        """Draw the list of chapters, above the progress if there is space."""
+        """Draw the list of chapters at the bottom, above the progress bar, if there is enough space."""
         _, top, _, height = self.layout.panel
         scale = self.scale
         count = len(self.lesson.lesson.chapters)
@@ -166,6 +167,7 @@ class _LessonPage:
             self.y += row
 
     def _draw_chapter(self, number: int, row: float) -> None:
+        """Draw the title of a chapter, in a row of the given height, px, that can be clicked."""
         theme = self.theme
         scale = self.scale
         lesson = self.lesson
@@ -185,6 +187,7 @@ class _LessonPage:
         self.areas.append(ClickArea(box, partial(lesson.skip, number - lesson.number)))
 
     def _draw_progress(self) -> None:
+        """Draw the progress bar and the hint at the bottom of the page."""
         _, top, _, height = self.layout.panel
         theme = self.theme
         scale = self.scale

@@ -1,4 +1,4 @@
-"""Lessons: session files with chapters that play, ask, let the user try, and continue."""
+"""Playing of lessons: session files with chapters that play, ask questions, and set tasks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.tool import ViewerTool
 
-FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # comes with robocov
+FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # bundled with robocov
 READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
 READING_S_PER_WORD = 0.25
 MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
@@ -44,8 +44,8 @@ class LessonState(StrEnum):
     """State of a chapter."""
 
     PLAYING = "playing"
-    ASKING = "asking"  # for an answer, before it plays
-    TASK = "task"  # the user does something
+    ASKING = "asking"  # waits for an answer before the chapter plays
+    TASK = "task"  # waits until the user has done a task
     ENDED = "ended"
     LEFT = "left"  # the user has taken over
 
@@ -83,7 +83,7 @@ def is_fulfilled(condition: ConditionModel, session: Session) -> bool:
 
 
 def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) -> bool:
-    """Return whether a robot is inside the one box of a condition, or outside the other."""
+    """Return whether a robot is inside the box `inside` of a condition, or outside its box `outside`."""
     pane = session.timeline.panes[0]
     row = pane.get_row(robot)
     if row is None:
@@ -100,7 +100,7 @@ def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) 
 
 @dataclass(frozen=True)
 class _ViewerBefore:
-    """State of the viewer before a lesson."""
+    """State of the viewer before a lesson, which is restored at its end."""
 
     workspace: SessionWorkspace
     map_name: str
@@ -111,7 +111,7 @@ class _ViewerBefore:
 
 
 class LessonPlayer:
-    """Plays the chapters of a lesson, and restores the session from before at the end.
+    """Plays the chapters of a lesson, and at the end restores the session from before the lesson.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class LessonPlayer:
     saved : SavedSession
         A session with a lesson.
     is_unattended : bool
-        Whether there is no user who answers and does tasks, as in a video.
+        Whether there is no user who could answer questions and do tasks, as in a video.
 
     Attributes
     ----------
@@ -131,15 +131,15 @@ class LessonPlayer:
     session : Session
         The session that the lesson plays.
     number : int
-        Index of the chapter.
+        Index of the current chapter.
     state : LessonState
-        State of the chapter.
+        State of the current chapter.
     answer : int or None
         Number of the user's answer, from 1.
     is_done : bool
         Whether the lesson has ended.
     is_held : bool
-        Whether the chapter stays after its end.
+        Whether the user has asked to stay at a chapter that has ended.
     """
 
     def __init__(
@@ -150,6 +150,7 @@ class LessonPlayer:
         *,
         is_unattended: bool = False,
     ) -> None:
+        """Remember the state of the viewer, and start the first chapter."""
         assert saved.lesson is not None
         self.lesson = saved.lesson
         self.is_unattended = is_unattended
@@ -162,7 +163,7 @@ class LessonPlayer:
         self.is_held = False
         self._viewer = viewer
         self._fit_view = fit_view
-        self._waited_s = 0.0  # in the present state
+        self._waited_s = 0.0  # real time since the current state was entered
         self._workspace = SessionWorkspace(self.session, None)
         self._before = _ViewerBefore(
             workspace=viewer.files.workspace,
@@ -176,12 +177,12 @@ class LessonPlayer:
 
     @property
     def chapter(self) -> ChapterModel:
-        """The chapter that is shown."""
+        """The current chapter."""
         return self.lesson.chapters[self.number]
 
     @property
     def lines(self) -> list[str]:
-        """Texts of the present state: question and answers, comment on the user's answer, task."""
+        """Texts for the current state: question and answers, comment on the user's answer, task."""
         lines: list[str] = []
         if self.chapter.question is not None:
             lines += self._list_question_lines(self.chapter.question)
@@ -220,7 +221,7 @@ class LessonPlayer:
 
     @property
     def progress(self) -> float:
-        """Fraction of the lesson that is over."""
+        """Fraction of the lesson that has been played, 0 to 1."""
         fraction = 0.5
         if self.state is LessonState.ENDED:
             fraction = 1.0
@@ -229,7 +230,7 @@ class LessonPlayer:
         return (self.number + fraction) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
-        """Let real time pass: a chapter ends, and the next one starts after a while."""
+        """Advance by real time, s: a chapter may end, and after a while the next one starts."""
         if self.is_done or self.state is LessonState.LEFT:
             return
         self._waited_s += seconds
@@ -269,7 +270,7 @@ class LessonPlayer:
             self.skip(1)
 
     def reply(self, answer: int) -> None:
-        """Answer the question with a number from 1, and play the chapter."""
+        """Answer the question, and play the chapter; `answer` counts from 1."""
         question = self.chapter.question
         if self.state is not LessonState.ASKING or question is None:
             return
@@ -279,7 +280,7 @@ class LessonPlayer:
             self.session.playback.is_playing = True
 
     def skip(self, chapters: int) -> None:
-        """Go to a later or an earlier chapter, or to the end."""
+        """Go to the chapter that is `chapters` later, or earlier if negative; after the last one, end."""
         number = self.number + chapters
         if number >= len(self.lesson.chapters):
             self.end()
@@ -292,7 +293,7 @@ class LessonPlayer:
             self._enter_state(LessonState.LEFT)
 
     def end(self) -> None:
-        """Restore the session from before the lesson."""
+        """End the lesson, and restore the session from before it."""
         viewer = self._viewer
         before = self._before
         self._workspace.close()
@@ -308,7 +309,7 @@ class LessonPlayer:
         self.is_done = True
 
     def toggle_hold(self) -> str:
-        """Keep a chapter that has ended, or let the next one start; return a message."""
+        """Stay at a chapter that has ended, or let the next one start; return a message."""
         self.is_held = not self.is_held
         self.session.playback.is_playing = False
         if self.is_held:
@@ -322,6 +323,7 @@ class LessonPlayer:
         self._viewer.revision += 1
 
     def _start_chapter(self, number: int) -> None:
+        """Show the start of a chapter: its session, layers and selected robot; ask its question."""
         self.number = number
         self.answer = None
         chapter = self.chapter
@@ -347,7 +349,7 @@ class LessonPlayer:
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:
-    """Go to the start of a chapter, and repeat its edits as time passes."""
+    """Go to the start of a chapter's run, and let its edits be repeated when their time comes."""
     target = session.timeline.document.nodes[chapter.touch]
     session.seek(session.timeline.document.get_path(target)[0], 0)
     session.timeline.finish_seek()
@@ -360,7 +362,7 @@ def _open_at_start(saved: SavedSession) -> Session:
 
 @dataclass(frozen=True)
 class ChapterResult:
-    """Outcome of a chapter without a user.
+    """Outcome of playing a chapter without a user.
 
     Attributes
     ----------
@@ -369,7 +371,7 @@ class ChapterResult:
     duration : float
         Simulated time, s.
     ends : bool
-        Whether it ends within `MAX_TASK_S`.
+        Whether the chapter ends within `MAX_TASK_S`.
     """
 
     title: str

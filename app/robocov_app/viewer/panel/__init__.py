@@ -1,1 +1,1 @@
-"""The panel at the right of the window."""
+"""The panel on the right of the window."""

@@ -1,4 +1,4 @@
-"""The panel at the right: settings that are often used stay visible, the others are on pages."""
+"""The panel on the right: frequently used settings are always visible, the others are on tabbed pages."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -26,7 +26,7 @@ from robocov_app.viewer.session.scenario import MAX_PANES
 
 TOOL_COLUMNS = 5
 LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-"""Layers that are nearly always visible. Their keys still toggle them."""
+"""Layers that are nearly always visible. They can still be toggled by keys."""
 
 _FILE_BUTTONS = (
     PanelButton("Screenshot", "screenshot"),
@@ -58,7 +58,7 @@ _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
 _NUMBER_PX = (50, 34)  # the value and its unit
 _UNLIMITED_PX = (87,)  # a word in place of both
-# Columns of the rows with the controllers; each has a button that removes its pane, and a gap.
+# Column widths of the rows with controllers: each controller has a button that removes its pane, and a gap.
 _SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
 _TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
 _CONTROLLER_PAIR_PX = (0, 24, 3, 0, 24)  # two of three or four
@@ -72,7 +72,7 @@ class ViewerPanel(CommandPanel):
     viewer : Presenter
         The viewer.
     layer_titles : dict of str to str
-        Titles of the layers by their names.
+        Title of each layer, by its name.
     commands : CommandTable
         The window's commands.
     run_command : callable
@@ -96,11 +96,12 @@ class ViewerPanel(CommandPanel):
         commands: CommandTable,
         run_command: Callable[[str], object],
     ) -> None:
+        """Build the panel without a report."""
         super().__init__(commands, run_command)
         self.viewer = viewer
         self.titles = layer_titles
         self.report: RobotReport | None = None
-        self._age_s = 0.0  # of the picture
+        self._age_s = 0.0  # time since the panel was drawn
 
     def list_pages(self) -> dict[str, PanelPage]:
         """Return the pages by the names of their tabs."""
@@ -112,7 +113,7 @@ class ViewerPanel(CommandPanel):
         }
 
     def update(self, seconds: float) -> None:
-        """Redraw the panel if its content has changed."""
+        """Request a redraw of the panel if its content has changed; called once per frame."""
         self._age_s += seconds
         if self.is_covered and self.ui.is_busy:
             self.ui.stop_typing()
@@ -125,7 +126,7 @@ class ViewerPanel(CommandPanel):
             viewer.view.theme,
             session.playback.is_playing,
             id(self.report),
-            # A seek ends some frames after the command that started it.
+            # Changes when a seek ends, which may be some frames after the command that started it.
             session.timeline.past_version,
             setups,
         )
@@ -137,7 +138,7 @@ class ViewerPanel(CommandPanel):
             self.ui.needs_redraw = True
 
     def show_content(self, ui: Ui) -> None:
-        """Show the settings that stay visible, and the chosen page."""
+        """Show the settings that are always visible, and the page of the open tab."""
         ui.inset(12, 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
@@ -146,6 +147,7 @@ class ViewerPanel(CommandPanel):
         self.show_pages(ui, {})
 
     def _show_environment(self, ui: Ui) -> None:
+        """Show the map, the start, the number of robots and the seed."""
         viewer = self.viewer
         scenario = viewer.session.timeline.scenario
         files = viewer.files
@@ -174,6 +176,7 @@ class ViewerPanel(CommandPanel):
         self.show_button(ui, "↻", "seed:next")
 
     def _show_controllers(self, ui: Ui) -> None:
+        """Show the controller of each pane, with buttons that remove and add panes."""
         viewer = self.viewer
         session = viewer.session
         choices = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
@@ -201,6 +204,7 @@ class ViewerPanel(CommandPanel):
         ui.space(4)
 
     def _show_run(self, ui: Ui) -> None:
+        """Show the buttons for playback, and the speed."""
         session = self.viewer.session
         ui.header("RUN")
         ui.row(0, 0, 0, 0, height=28, below=5)
@@ -246,6 +250,7 @@ class ViewerPanel(CommandPanel):
         self.viewer.attempt(partial(self.viewer.comparison.set_parameter, name, value))
 
     def _show_slider(self, ui: Ui, parameter: NumberParameter) -> None:
+        """Show a row for a numeric parameter: name, slider, text field, unit and reset button."""
         name = parameter.name
         unit = parameter.unit
         columns: tuple[int, ...] = _NUMBER_PX
@@ -265,7 +270,7 @@ class ViewerPanel(CommandPanel):
         self._show_reset(ui, parameter, default)
 
     def _show_options(self, ui: Ui, parameter: OptionParameter) -> None:
-        """Show the choices next to each other if they fit, otherwise as a menu."""
+        """Show a row for a parameter with choices: as buttons if they fit side by side, else as a menu."""
         name = parameter.name
         choices = parameter.choices
         free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
@@ -292,12 +297,13 @@ class ViewerPanel(CommandPanel):
             self._set(parameter.name, parameter.default)
 
     def _show_layers(self, ui: Ui) -> None:
+        """Show a check box for each layer, in two columns, and buttons for the appearance."""
         view = self.viewer.view
         names = [name for name in self.titles if name not in LAYERS_WITHOUT_CHECK_BOX]
         rows = math.ceil(len(names) / 2)
         with ui.scroll("show"):
             ui.row(0, 0, height=21, below=3)
-            # The names continue from the bottom of the first column at the top of the second.
+            # The list of names runs down the first column, and continues at the top of the second.
             for name in chain.from_iterable(zip_longest(names[:rows], names[rows:])):
                 if name is None:
                     ui.cell()
@@ -312,6 +318,7 @@ class ViewerPanel(CommandPanel):
             self.show_button(ui, "Whole map", "fit")
 
     def _show_robot(self, ui: Ui) -> None:
+        """Show buttons that select and change a robot, and the report on it."""
         viewer = self.viewer
         number = viewer.selected_robot
         reason = "" if number is not None else _NO_ROBOT_REASON
@@ -350,7 +357,17 @@ def show_report(ui: Ui, report: RobotReport) -> None:
 
 
 def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
-    """Draw the arrow of a force left of its text, longer for larger forces."""
+    """Draw an arrow to the left of the text of a force; its length increases with the force.
+
+    Parameters
+    ----------
+    ui : Ui
+        The page of the panel.
+    line : ReportLine
+        The sentence about the force.
+    largest : float
+        Magnitude of the largest force in the report, N.
+    """
     if ui.surface is None or line.vector is None:
         return
     size = float(np.hypot(*line.vector))
@@ -358,6 +375,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
         return
     fraction = _MIN_ARROW_FRACTION + (1 - _MIN_ARROW_FRACTION) * size / max(largest, MIN_FORCE_N)
     length = _ARROW_PX * ui.scale * fraction
+    # On the screen, y points down.
     half = np.array(line.vector) / size * (length, -length)
     center = np.array(ui.rest.topleft) + np.array(_ARROW_CENTER_PX) * ui.scale
     canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
@@ -366,7 +384,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
 
 
 def shorten_names(files: list[str]) -> dict[str, str]:
-    """Return the labels of maps in the menu: files without their folders, if that is unique.
+    """Return the label of each map in the menu: the file name without its folder, if that is unique.
 
     >>> shorten_names(["rooms", "/tmp/a/rooms-1.json", "a/x.json", "b/x.json"])
     {'rooms': 'rooms', '/tmp/a/rooms-1.json': 'rooms-1.json', 'a/x.json': 'a/x.json', 'b/x.json': 'b/x.json'}
@@ -384,14 +402,14 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
     Parameters
     ----------
     names : iterable of str
-        Names of the offered controllers. Those in files of users are loaded for their labels.
+        Names of the offered controllers. Controllers in users' files are loaded to find their labels.
     shown : mapping of str to str
-        Labels of the controllers in use, by name. These are not loaded: they may come from a saved run.
+        Label of each controller in use, by name. These are not loaded: they may come from a saved run.
 
     Returns
     -------
     dict of str to str
-        Labels by name.
+        Label of each controller, by name.
 
     Examples
     --------
@@ -410,5 +428,5 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
 def _load_label(name: str) -> str:
     try:
         return str(load_controller_class(name).label)
-    except ParameterError:  # its file has changed since
+    except ParameterError:  # its file has been changed in the meantime
         return get_controller_label(name)

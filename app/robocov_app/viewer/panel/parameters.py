@@ -11,7 +11,7 @@ from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, UNITS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
-SLIDER_SPAN = 30.0  # a slider reaches from 1 / 30 of the default to 30 times the default
+SLIDER_SPAN = 30.0  # a slider ranges from 1 / 30 of the default to 30 times the default
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
 NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
 
@@ -48,19 +48,19 @@ class NumberParameter:
     Attributes
     ----------
     name : str
-        A gain, or ``team.`` and a limit.
+        Name of a gain; for a limit, its name with the prefix ``team.``.
     label : str
         Name in the panel.
     unit : str
         Unit; empty for none.
     meaning : str
-        Tool tip.
+        Meaning of the parameter, for the tool tip.
     value, default : float or None
-        Present and default value; None for no limit.
+        Current and default value; None for no limit.
     low, high : float
-        Ends of the slider; typed values may lie outside.
+        Values at the ends of the slider; typed values may lie outside.
     is_optional : bool
-        Whether there may be no limit.
+        Whether "no limit" is a possible value.
     """
 
     name: str
@@ -75,16 +75,16 @@ class NumberParameter:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """Values that can be listed: none."""
+        """No values, because there are too many to list."""
         return ()
 
     @property
     def is_unlimited(self) -> bool:
-        """Whether there is no limit at present."""
+        """Whether the current value is "no limit"."""
         return self.value is None or math.isinf(self.value)
 
     def compute_position(self) -> float:
-        """Return the position of the slider, 0 to 1: logarithmic, unless the range includes 0."""
+        """Return the position of the slider, 0 to 1; the scale is logarithmic unless the range includes 0."""
         if self.is_unlimited or self.value is None:
             return 1.0
         position = 0.0
@@ -107,13 +107,13 @@ class NumberParameter:
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def format(self) -> str:
-        """Return the value as text."""
+        """Format the value, without its unit."""
         if self.is_unlimited:
             return "unlimited"
         return f"{self.value:.4g}"
 
     def parse(self, text: str) -> float | None:
-        """Return the value of a typed text; None for no limit.
+        """Convert typed text to a value; None for no limit.
 
         Raises
         ------
@@ -133,16 +133,16 @@ class NumberParameter:
 
 @dataclass(frozen=True)
 class OptionParameter:
-    """A parameter whose value is one of several words.
+    """A parameter whose value is one of several choices.
 
     Attributes
     ----------
     name, label, meaning : str
-        As of a `NumberParameter`.
+        As in `NumberParameter`.
     value, default : str
-        Present and default value.
+        Current and default value.
     choices : tuple of str
-        All values.
+        All possible values.
     """
 
     name: str
@@ -157,12 +157,12 @@ class OptionParameter:
         return self.value
 
     def parse(self, text: str) -> str:
-        """Return the choice that is equal to a typed text, or the only one that starts with it.
+        """Return the choice that equals the typed text, or the only one that starts with it.
 
         Raises
         ------
         ParameterError
-            If there is no such choice, or several.
+            If no choice matches, or several do.
         """
         plain = text.strip().lower()
         matches = [choice for choice in self.choices if plain and choice.lower().startswith(plain)]
@@ -178,7 +178,7 @@ Parameter = NumberParameter | OptionParameter
 
 
 def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
-    """Yield the gains of a controller."""
+    """Yield a parameter for each gain of a controller."""
     for name, gain in controller.available_gains.items():
         value = controller.get_value(name)
         if isinstance(gain, Option):
@@ -189,6 +189,7 @@ def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
 
 
 def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParameter:
+    """Build the parameter of a numeric gain; its slider covers a range around the default value."""
     usual = min(max(gain.default or 1.0, gain.low), gain.high)
     if usual > 0 and gain.low >= 0:
         lowest = usual / SLIDER_SPAN
@@ -208,7 +209,7 @@ def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParamete
 
 
 def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
-    """Yield the limits of a team."""
+    """Yield a parameter for each limit of a team, and one for its kinematics."""
     defaults = RobotProperties()
     for name, slider in _LIMITS.items():
         label = slider.label
@@ -227,6 +228,7 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
             high=slider.high,
             is_optional=name.endswith("_range"),
         )
+    # KINEMATICS is ("point", "unicycle"); only unicycles have a track width.
     kinematics = KINEMATICS[1] if limits.track_width > 0.0 else KINEMATICS[0]
     yield OptionParameter(
         "team.kinematics", "kinematics", _KINEMATICS_MEANING, kinematics, KINEMATICS[0], KINEMATICS
@@ -245,11 +247,15 @@ def replace_limit(limits: RobotProperties, name: str, value: float | str | None)
     Parameters
     ----------
     limits : RobotProperties
-        Present limits.
+        Current limits.
     name : str
         The limit, with or without ``team.``; ``kinematics`` for one of `KINEMATICS`.
     value : float, str or None
-        Its new value; None for no limit.
+        The new value; None for no limit.
+
+    Returns
+    -------
+    RobotProperties
     """
     name = name.removeprefix("team.")
     if name == "kinematics":
@@ -257,6 +263,6 @@ def replace_limit(limits: RobotProperties, name: str, value: float | str | None)
         name = "track_width"
         value = DEFAULT_TRACK_PER_RADIUS * limits.radius if is_unicycle else 0.0
     number = math.inf if value is None else float(value)
-    # The value of single robots is replaced, too.
+    # Values of single robots that differ from the others are dropped for this limit.
     different = {other: values for other, values in limits.different.items() if other != name}
     return replace(limits, **{name: number}, different=different)

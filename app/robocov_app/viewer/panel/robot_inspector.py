@@ -1,14 +1,14 @@
-"""Keeps the explanation of the selected robot up to date while it is visible."""
+"""Updates the report on the selected robot while it is visible."""
 
 from robocov_app.viewer.explanation.explain import explain_robot
 from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
 
-REPORT_INTERVAL_S = 0.2  # between two explanations
+REPORT_INTERVAL_S = 0.2  # minimum time between two reports
 
 
 class RobotInspector:
-    """Explains the selected robot in the panel.
+    """Keeps the report on the selected robot in the panel up to date.
 
     Parameters
     ----------
@@ -21,11 +21,17 @@ class RobotInspector:
     def __init__(self, viewer: Presenter, panel: ViewerPanel) -> None:
         self._viewer = viewer
         self._panel = panel
-        self._explained: object = None  # robot, time and session of the latest explanation
+        self._explained: object = None  # robot, time and version of the session in the latest report
         self._explained_at = 0.0
 
     def update(self, now: float) -> None:
-        """Explain the robot again at a time, s, if it has changed and the explanation is old enough."""
+        """Build a new report if the robot's state has changed and the report is old enough.
+
+        Parameters
+        ----------
+        now : float
+            Time since the window was opened, s.
+        """
         viewer = self._viewer
         number = viewer.selected_robot
         if number is None or self._panel.tab != "robot" or self._panel.hidden:

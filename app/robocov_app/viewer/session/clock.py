@@ -1,4 +1,4 @@
-"""The clock: how many simulation steps are due at a speed, within the computing time of a frame."""
+"""The clock, which takes the simulation steps that are due, within the computing time of a frame."""
 
 import math
 from collections.abc import Callable
@@ -8,11 +8,11 @@ from time import perf_counter
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Selectable speeds, simulated seconds per second; infinite for as fast as possible."""
 MAX_FRAME_S = 0.1
-"""Maximum time of a frame that is simulated. Longer frames slow the simulation down."""
+"""Maximum real time of a frame that counts. Longer frames slow the simulation down."""
 FRAME_BUDGET_S = 0.008
-"""Computing time for the simulation in each frame of a window on a display."""
+"""Maximum computing time for the simulation in each frame of a visible window."""
 MAX_SPEED_WITHOUT_BUDGET = 16.0
-"""Speed instead of an infinite one where the computing time of a frame is not limited."""
+"""Speed that replaces an infinite one if the computing time of a frame is not limited."""
 _MAX_COMPARED_SPEED = 1e4
 _STEP_TOLERANCE = 1e-9
 
@@ -25,7 +25,7 @@ def format_speed(speed: float) -> str:
 
 
 def find_speed_index(speed: float) -> int:
-    """Return the index of the selectable speed that is nearest to a speed, compared by their ratio."""
+    """Return the index in `SPEEDS` of the speed that is nearest to a given one, by their ratio."""
 
     def compute_distance(index: int) -> float:
         return abs(_compute_log(SPEEDS[index]) - _compute_log(speed))
@@ -39,18 +39,18 @@ def _compute_log(speed: float) -> float:
 
 @dataclass
 class Clock:
-    """Converts the time that passes into simulation steps.
+    """Converts elapsed real time into simulation steps.
 
     Attributes
     ----------
     dt : float, s
-        Simulated time of a step.
+        Simulated time per step.
     speed : float
         Simulated seconds per second.
     budget : float, s
-        Computing time for the steps of a frame; infinite to take all steps that are due.
+        Maximum computing time for the steps of a frame; infinite to take all steps that are due.
     is_behind : bool
-        Whether the computing time was not enough for the steps of the last frame.
+        Whether the last frame had too little computing time for all its steps.
     """
 
     dt: float
@@ -60,12 +60,12 @@ class Clock:
     _due_s: float = 0.0
 
     def advance(self, seconds: float, take_step: Callable[[], bool]) -> int:
-        """Take the steps that are due. Those beyond the computing time are dropped.
+        """Take the steps that are due; drop those for which the computing time does not suffice.
 
         Parameters
         ----------
         seconds : float, s
-            Time since the previous call.
+            Real time since the previous call.
         take_step : callable
             Takes a step, and returns whether to continue.
 
@@ -82,7 +82,7 @@ class Clock:
             speed = MAX_SPEED_WITHOUT_BUDGET if math.isinf(self.speed) else self.speed
             due_s += min(seconds, MAX_FRAME_S) * speed
             due_steps = math.floor(due_s / self.dt + _STEP_TOLERANCE)
-        # Nothing stays due if a step ends the playback or raises.
+        # If a step ends the playback or raises, nothing stays due.
         self._due_s = 0.0
         self.is_behind = False
         taken = 0

@@ -23,7 +23,7 @@ _GAINS = convert_field(
 
 @dataclass(frozen=True)
 class ControllerChoice:
-    """A controller by name, with its gains.
+    """A controller, given by its name and its gains.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class ControllerChoice:
     gains: Annotated[Mapping[str, Value], _GAINS] = field(default_factory=dict)
 
     def build(self) -> Controller:
-        """Build the controller. If it is in a file, this runs the file.
+        """Build the controller. If it is in a user's file, that file is executed.
 
         Returns
         -------
@@ -52,7 +52,7 @@ class ControllerChoice:
         """
         return make_controller(self.name, self.gains)
 
-    # The following two are cached because a controller in a file is loaded by running that file.
+    # The following two are cached, because loading a controller from a user's file executes that file.
     @cached_property
     def label(self) -> str:
         """Name of the controller in the window."""
@@ -64,13 +64,13 @@ class ControllerChoice:
         return get_gains(load_controller_class(self.name))
 
     def get_value(self, gain: str) -> Value:
-        """Return the value of a gain, which is its default unless it was chosen."""
+        """Return the chosen value of a gain, or its default."""
         if gain in self.gains:
             return self.gains[gain]
         return self.available_gains[gain].default
 
     def with_gain(self, gain: str, value: Value) -> Self:
-        """Return the choice with another value of one gain.
+        """Return a choice with another value for one gain.
 
         Raises
         ------
@@ -82,7 +82,7 @@ class ControllerChoice:
         return changed.drop_defaults()
 
     def drop_defaults(self) -> Self:
-        """Return the choice without the gains that have their default value."""
+        """Return a choice without the gains that have their default values."""
         defaults = {name: gain.default for name, gain in self.available_gains.items()}
         gains = {
             name: value
@@ -108,13 +108,15 @@ def _format_gain(value: Value) -> str:
 
 
 def _require_known_controller(choice: ControllerChoice, info: Any) -> ControllerChoice:
-    """Return the controller of a session file, by the name that the user has typed.
+    """Check the controller of a session file, and return it with the name that the user has typed.
 
-    A controller in a file of the user's own is never run because a session file names it.
+    A controller in a user's file is loaded only if the user has named it, never just because a session file
+    names it.
     """
     user_names = info.context.controllers
     if choice.name not in CONTROLLERS and choice.name not in user_names:
         class_name = choice.name.rpartition(":")[2]
+        # The session file may have been saved where the user's file had another path.
         same_class = [name for name in user_names if name.rpartition(":")[2] == class_name]
         if not same_class:
             advice = f"to run it, open the session with --controller {choice.name}"

@@ -16,9 +16,9 @@ from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECENT_POSITIONS = 30
-"""Approximate maximum number of recent positions of a robot."""
+"""Approximate maximum number of positions that `get_recent_positions` returns."""
 MAX_TRAIL_GAP_S = 1.5 / MAX_TRAIL_RATE_HZ
-"""Time between the last row of a trail and the displayed state, above which the latter is appended."""
+"""If the last row of a trail is older than this, the displayed positions are appended to it."""
 
 
 class DisplayedState:
@@ -49,7 +49,7 @@ class DisplayedState:
         return self.get_setup(self._timeline.panes[0]).numbers
 
     def get_setup(self, pane: Pane) -> PaneSetup:
-        """Return the setup of a pane."""
+        """Return the setup of a pane in the displayed state."""
         return self._get_state(pane).setup
 
     def get_positions(self, pane: Pane) -> Array:
@@ -59,7 +59,7 @@ class DisplayedState:
         return self._get_state(pane).positions
 
     def get_snapshot(self, pane: Pane) -> Snapshot:
-        """Return observations and decision of a pane. Where the controller raises, there is no decision."""
+        """Return the observations and decision of a pane; the forces are zero if the controller raises."""
         if self._timeline.is_live:
             with suppress(RobocovError):
                 return pane.simulation.observe_and_decide()
@@ -76,20 +76,21 @@ class DisplayedState:
         Returns
         -------
         positions : (k, n, 2) array, m
-            Of the working robots, then of those that failed, which are nan since then.
+            Positions of the working robots, then of the failed ones, which are nan from their failure on.
         times : (k,) array, s
         """
         positions, times = pane.trail.get_until(self.time)
         if self._timeline.is_live or self.time - times[-1] <= MAX_TRAIL_GAP_S:
             return positions, times
-        # Rows of a straight path were removed. The path leads on to the robots.
+        # Rows on a straight section may have been removed; append the displayed positions, so that the
+        # trajectories lead up to the robots.
         last = np.full((1, *positions.shape[1:]), np.nan)
         displayed = self.get_positions(pane)
         last[0, : len(displayed)] = displayed
         return np.concatenate([positions, last]), np.append(times, self.time)
 
     def get_recent_positions(self, pane: Pane, number: int) -> Array:
-        """Return positions of a robot during the seconds before the displayed time.
+        """Return positions of a robot during the last `SETTLED_WINDOW_S` before the displayed time.
 
         Parameters
         ----------
@@ -101,7 +102,7 @@ class DisplayedState:
         Returns
         -------
         (k, 2) array, m
-            Positions, the oldest first; none where the robot does not work.
+            Positions, oldest first, without times at which the robot was not working.
         """
         history = self._timeline.history
         last = self._timeline.displayed_index
@@ -115,7 +116,7 @@ class DisplayedState:
         return np.array(positions).reshape(-1, 2)
 
     def get_costs(self, quantity: str = "distance") -> tuple[float, dict[int, float]]:
-        """Return the coverage costs of all panes at the newest time for which all are known.
+        """Return the coverage costs of all panes at the latest time at which all are known.
 
         Parameters
         ----------
@@ -125,9 +126,9 @@ class DisplayedState:
         Returns
         -------
         time : float, s
-            At most the displayed time.
+            The time of the costs, which is at most the displayed time.
         costs : dict of int to float
-            Cost by pane, without panes whose cost is unknown.
+            Cost of each pane, by its number; panes without a known cost are missing.
         """
         panes = [pane for pane in self._timeline.panes if len(pane.curves[quantity])]
         time = min([self.time, *(pane.curves[quantity].last_time for pane in panes)])

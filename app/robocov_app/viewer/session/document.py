@@ -1,8 +1,8 @@
 """The document of a session: a tree of edits from which every state can be recomputed.
 
-The simulation is deterministic, so that a scenario and the edits with their steps determine the run. Nothing
-is ever removed from the tree: undo returns to the parent of a node, and an edit in the past adds another
-child.
+The simulation is deterministic, so a scenario and the edits with their steps determine the run. Nothing is
+ever removed from the tree: undo returns to the parent of a node, and an edit in the past adds another child
+to a node.
 """
 
 from collections import defaultdict
@@ -22,12 +22,12 @@ from robocov_app.viewer.session.past.trails import TrailSection
 from robocov_app.viewer.session.scenario import SessionScenario
 
 MAX_CACHED_STATES = 160
-"""Maximum number of states of a node that are kept while another branch is displayed."""
+"""Maximum number of states that a node keeps while another branch is displayed."""
 
 
 @dataclass(eq=False)
 class Node:
-    """An edit, or several that belong together, and the time span until the next one.
+    """A node of the tree: an edit, or several that belong together, and the time span until the next node.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Node:
     parent : Node or None
         The node whose time span contains the edit.
     branch_step : int
-        Step in the time span of the parent at which the edit was made.
+        Step at which the edit was made, in the time span of the parent.
     kind : str
         Kind of the edit, as in `SessionEvent`.
     description : str
@@ -44,19 +44,19 @@ class Node:
     edits : list of SessionEdit
         The edits in the order in which they were made.
     last_step : int
-        Step up to which the run was simulated.
+        Last step of the time span that has been simulated.
     name : str
-        Name of the branch that ends here; empty if it has none.
+        Name of the branch that ends at this node; empty if it has none.
     redo : Node or None
-        The child that the last undo left.
+        The child from which the last undo returned to this node.
     cached_states : list of RunState
-        States in the time span of the node; they are not in files, because they can be recomputed.
+        States in the time span of the node. They are not saved in files, because they can be recomputed.
     curves : dict
-        Cost curves by pane and quantity.
+        Cost curve for each pair of pane number and quantity, in the time span of the node.
     trails : dict
-        Trajectories in the time span of the node, by pane; like the states, they are not in files.
+        Trajectories in the time span of the node, by pane number; they are not saved in files either.
     automatic_events : set of AutomaticEvent
-        Robots that failed or joined by themselves.
+        Failures and joins of robots that the conditions cause, in the time span of the node.
     """
 
     number: int
@@ -76,14 +76,14 @@ class Node:
 
     @property
     def scenario(self) -> SessionScenario | None:
-        """The scenario that starts here; None if the run of the parent continues."""
+        """The scenario, if the edit restarts the run; None if the run of the parent continues."""
         edit = self.edits[0]
         if isinstance(edit, Restart):
             return edit.scenario
         return None
 
     def require_scenario(self) -> SessionScenario:
-        """Return the scenario that starts here, at the root of a run."""
+        """Return the scenario of a node that is the root of a run."""
         assert self.scenario is not None
         return self.scenario
 
@@ -95,12 +95,12 @@ class Node:
         return 0
 
     def apply_edits(self, run: Lockstep) -> None:
-        """Apply the edits that were made at the present step of a run.
+        """Apply those edits of the node that were made at the current step of a run.
 
         Raises
         ------
         InputError
-            If an edit is not possible; it names the node.
+            If an edit is not possible; the message names the node.
         """
         for edit in self.edits:
             if edit.step == run.step and not isinstance(edit, Restart):
@@ -112,18 +112,18 @@ class Node:
 
 
 class Branch(NamedTuple):
-    """A path through the tree that ends with a node after which nothing was edited.
+    """A path through the tree to a node after whose last step nothing was edited.
 
     Attributes
     ----------
     node : Node
-        The node at its end.
+        The last node of the path.
     last_step : int
-        Its last step.
+        The last step of the branch.
     description : str
-        Its name, or the description of the last edit.
+        Name of the branch, or description of its last edit.
     controllers : mapping of int to ControllerChoice
-        Controllers at its end, by pane.
+        Controllers at the end of the branch, by pane number.
     """
 
     node: Node
@@ -154,7 +154,7 @@ class Branch(NamedTuple):
 
 
 class SessionDocument:
-    """The nodes of a session in the order in which they were added. The first one starts a run.
+    """The nodes of a session, in the order in which they were added. The first one starts a run.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class SessionDocument:
     def build_node(
         self, parent: Node | None, branch_step: int, kind: str, description: str, edit: SessionEdit
     ) -> Node:
-        """Build the next node. It is not added to the document.
+        """Build the next node without adding it to the document.
 
         Parameters
         ----------
@@ -205,14 +205,14 @@ class SessionDocument:
         return Node(len(self.nodes), parent, branch_step, kind, description, edits, first_step)
 
     def get_path(self, node: Node) -> list[Node]:
-        """Return the nodes from the root of a run, at time 0, to a node."""
+        """Return the nodes on the path from the root of the run, at time 0, to a node."""
         path = [node]
         while path[-1].parent is not None and path[-1].scenario is None:
             path.append(path[-1].parent)
         return path[::-1]
 
     def get_last_steps(self, node: Node, step: int) -> dict[int, int]:
-        """Return the last step of each node on the path to a step of a node, by number."""
+        """Return the last step of each node on the path to a step of a node, by the node's number."""
         last_steps = {before.number: after.branch_step for before, after in pairwise(self.get_path(node))}
         last_steps[node.number] = step
         return last_steps
@@ -221,7 +221,7 @@ class SessionDocument:
         """Return all branches, in the order of the nodes at their ends."""
         branches = []
         for node in self.nodes:
-            # If a child starts at the end of its parent, the branch goes on with the child.
+            # If a child starts at the last step of its parent, the branch continues with the child.
             children = [child for child in self.nodes if child.parent is node]
             if all(child.branch_step < node.last_step for child in children):
                 controllers = self.find_controllers(node)
@@ -229,7 +229,7 @@ class SessionDocument:
         return branches
 
     def find_controllers(self, node: Node) -> dict[int, ControllerChoice]:
-        """Return the controllers at the end of a node, by pane."""
+        """Return the controllers at the end of a node, by pane number."""
         path = self.get_path(node)
         controllers = dict(enumerate(path[0].require_scenario().controllers))
         for ancestor in path:
@@ -241,7 +241,7 @@ class SessionDocument:
         return controllers
 
     def find_branch(self, name: str) -> Branch:
-        """Return the branch with a name, or with a number from 1 on.
+        """Return the branch with a given name, or with a given number as a string, counted from 1.
 
         Raises
         ------
@@ -256,7 +256,7 @@ class SessionDocument:
         raise ParameterError(f"branch: expected one of {known}, got {name!r}")
 
     def list_events(self, node: Node, step: int, dt: float) -> list[SessionEvent]:
-        """Return the events on the path to a step of a node, in the order of time.
+        """Return the events on the path to a step of a node, in chronological order.
 
         Parameters
         ----------
@@ -293,7 +293,7 @@ def replay(
     run: Lockstep | None = None,
     since: Node | None = None,
 ) -> Iterator[tuple[Lockstep, Node]]:
-    """Simulate the path to a step of a node again.
+    """Simulate the path to a step of a node again, with all its edits.
 
     Parameters
     ----------
@@ -304,9 +304,9 @@ def replay(
     step : int
         The step.
     run : Lockstep or None
-        The run at a step of the node `since`; by default it starts at time 0.
+        A run at some step of the node `since`, with which to start; by default a new run at time 0.
     since : Node or None
-        The node whose time span contains the step of the run.
+        The node whose time span contains the current step of `run`.
 
     Yields
     ------

@@ -7,9 +7,9 @@ from robocov.environment import Point
 from robocov.simulation import Simulation
 
 STIFFNESS_PER_KG = 60.0
-"""Stiffness of the spring, divided by the mass of the robot, 1/s²."""
+"""Stiffness of the spring divided by the mass of the robot, 1/s²."""
 MAX_ACCELERATION_M_S2 = 80.0
-"""Maximum pull of the spring, divided by the mass of the robot."""
+"""Maximum force of the spring divided by the mass of the robot."""
 _MIN_MAGNITUDE = 1e-12
 """Avoids a division by zero."""
 
@@ -20,18 +20,19 @@ def compute_spring_forces(simulation: Simulation, robot: int, target: Point) -> 
     Parameters
     ----------
     simulation : Simulation
-        n robots.
+        Simulation of n robots.
     robot : int
-        Index of the pulled robot.
+        Row of the dragged robot.
     target : (x, y), m
         Position of the pointer.
 
     Returns
     -------
     (n, 2) array, N
-        Zero for the other robots.
+        Forces on all robots; zero except for the dragged one.
     """
     acceleration = STIFFNESS_PER_KG * (np.array(target) - simulation.positions[robot])
+    # Critical damping: 2 sqrt(k / m).
     acceleration -= 2.0 * np.sqrt(STIFFNESS_PER_KG) * simulation.velocities[robot]
     magnitude = float(np.hypot(*acceleration))
     fraction = min(1.0, MAX_ACCELERATION_M_S2 / max(magnitude, _MIN_MAGNITUDE))

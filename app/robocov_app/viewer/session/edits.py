@@ -1,4 +1,4 @@
-"""Edits of a session, as session files contain them, and the effect of each on a pane or the map."""
+"""Edits of a session in the form in which files contain them, and their effects on a pane or the map."""
 
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
@@ -23,7 +23,7 @@ from robocov_app.viewer.session.scenario import MAX_ROBOTS, SessionScenario
 MAX_PANE_NUMBER = 100
 MAX_BRUSH_RADIUS_M = 1e6
 UNDATED_STEP = -1
-"""Step of an edit that has not been made yet."""
+"""Step of an edit that has not been applied yet."""
 
 _PaneNumber: TypeAlias = Annotated[
     int, Field(strict=True, ge=0, le=MAX_PANE_NUMBER, description="Number of a pane")
@@ -44,7 +44,7 @@ def _load_density(model: Any, context: Any) -> Density | None:
 
 
 def _dump_density(density: Density | None, _: object) -> object:
-    """Write a density as in a map file, where it only occurs together with a map."""
+    """Return a density as in a map file. Densities are only written with a map, so a square serves as one."""
     square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
     return to_json(square.with_density(density)).get("density")
 
@@ -53,7 +53,7 @@ _DENSITY = convert_field(DensityModel | None, load=_load_density, dump=_dump_den
 
 
 def _load_scenario(content: object, read: Any) -> SessionScenario:
-    """Read a scenario; errors of its values become validation errors, which have a position in the file."""
+    """Read a scenario; convert errors to validation errors, which contain a position in the file."""
     try:
         return cast(SessionScenario, read(content))
     except MapError:
@@ -128,7 +128,7 @@ class PlaceRobot(RobotEdit):
     do: Literal["place"] = field(default="place", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         row = _find_row(pane, self.robot)
         position = _find_free_position(pane, self.robot, self.at)
         if row is None:
@@ -150,7 +150,7 @@ class AddRobot(RobotEdit):
     do: Literal["join"] = field(default="join", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         numbers = pane.setup.all_numbers
         if len(numbers) >= MAX_ROBOTS:
             raise ParameterError(f"there are {MAX_ROBOTS} robots already")
@@ -166,7 +166,7 @@ class RemoveRobot(RobotEdit):
     do: Literal["leave"] = field(default="leave", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         _find_row(pane, self.robot)
         _require_another_robot(pane, self.robot)
         return _change_robot(pane, self.robot)
@@ -179,7 +179,7 @@ class FailRobot(RobotEdit):
     do: Literal["fail"] = field(default="fail", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         row = _find_row(pane, self.robot)
         if row is None:
             raise ParameterError(f"robot {self.robot} has failed already")
@@ -195,7 +195,7 @@ class ReviveRobot(RobotEdit):
     do: Literal["revive"] = field(default="revive", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         if _find_row(pane, self.robot) is not None:
             raise ParameterError(f"robot {self.robot} has not failed")
         failed_at = pane.setup.failed[self.robot]
@@ -286,7 +286,7 @@ class SetController(_Edit):
     do: Literal["controller"] = field(default="controller", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         if pane.number != self.pane:
             return Continuation(pane.setup)
         return Continuation(replace(pane.setup, controller=self.controller))
@@ -306,7 +306,7 @@ class SetRobotProperties(_Edit):
     do: Literal["team"] = field(default="team", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:
-        """Return the state from which a pane continues."""
+        """Return the setup and state with which a pane continues after the edit."""
         return Continuation(replace(pane.setup, properties=self.properties))
 
 
@@ -348,7 +348,10 @@ SessionEdit: TypeAlias = RunEdit | Restart
 
 
 def compare_obstacles(before: Environment, after: Environment) -> EditObstacles:
-    """Return the edit that replaces the obstacles of one map by those of another."""
+    """Return the edit that replaces the obstacles of one map with those of another.
+
+    It leaves out the obstacles at the beginning and at the end that are the same in both.
+    """
     old = before.obstacles
     new = after.obstacles
     first = _count_equal(old, new)
@@ -357,26 +360,26 @@ def compare_obstacles(before: Environment, after: Environment) -> EditObstacles:
 
 
 def _count_equal(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
-    """Return the number of obstacles at the beginning that are the same."""
+    """Return how many obstacles at the beginning are the same."""
     equal_pairs = takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False))
     return sum(1 for _ in equal_pairs)
 
 
 def _find_row(pane: Pane, number: int) -> int | None:
-    """Return the row of a robot; None if it has failed."""
+    """Return the row of a robot in arrays; None if it has failed; raise a ParameterError if unknown."""
     if number not in pane.setup.all_numbers:
         raise ParameterError(f"there is no robot {number}")
     return pane.get_row(number)
 
 
 def _require_another_robot(pane: Pane, number: int) -> None:
-    """Raise a ParameterError if a robot is the last one that works."""
+    """Raise a ParameterError if a robot is the last working one."""
     if not set(pane.numbers) - {number}:
         raise ParameterError("cannot remove the last working robot")
 
 
 def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
-    """Return the position nearest to a point at which a robot overlaps neither obstacles nor robots."""
+    """Return the position nearest to a point at which a robot overlaps no obstacle and no other robot."""
     setup = pane.setup
     simulation = pane.simulation
     other_rows = [row for row, other in enumerate(pane.numbers) if other != number]
@@ -393,7 +396,23 @@ def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
 def _change_robot(
     pane: Pane, number: int, working_at: Point | None = None, failed_at: Point | None = None
 ) -> Continuation:
-    """Return the state of a pane with a robot at rest or failed at a position; without one, it is removed."""
+    """Return the setup and state of a pane after one robot has changed.
+
+    Parameters
+    ----------
+    pane : Pane
+        The pane.
+    number : int
+        Number of the robot.
+    working_at : (x, y), m, optional
+        Position at which the robot works from now on, initially at rest.
+    failed_at : (x, y), m, optional
+        Position at which the robot has failed. Without either position, the robot is removed.
+
+    Returns
+    -------
+    Continuation
+    """
     setup = pane.setup
     positions = dict(zip(pane.numbers, pane.simulation.positions, strict=True))
     velocities = dict(zip(pane.numbers, pane.simulation.velocities, strict=True))

@@ -1,4 +1,4 @@
-"""Panes that advance together, with dragged robots and robots that join or fail by themselves."""
+"""Panes that advance together, with a dragged robot, and robots that join or fail by the conditions."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,11 +31,11 @@ from robocov_app.viewer.session.past.states import PaneSetup, RunState
 from robocov_app.viewer.session.scenario import SessionScenario
 
 MIN_REPORTED_OFFSET_M = 5e-4
-"""A robot that joins farther than this from the requested position is reported with the distance."""
+"""If a robot joins farther than this from the requested position, the event states the distance."""
 
 
 class AutomaticEvent(NamedTuple):
-    """An event that no user causes: a robot that fails or joins according to the conditions.
+    """An event that the conditions cause, not the user: a robot fails or joins.
 
     Attributes
     ----------
@@ -63,13 +63,13 @@ class Lockstep:
     Attributes
     ----------
     scenario : SessionScenario
-        Map, controllers and properties as they are now.
+        Current map, controllers and properties.
     step : int
         Number of control steps since time 0.
     drag : tuple or None
         Number of the dragged robot, and the point to which it is pulled, m.
     panes : list of Pane
-        One for each controller.
+        One pane for each controller.
 
     Raises
     ------
@@ -80,12 +80,14 @@ class Lockstep:
     """
 
     def __init__(self, scenario: SessionScenario) -> None:
+        """Build the panes at time 0, with the robots that work then."""
         positions = scenario.starts
         conditions = scenario.conditions
         is_working = np.ones(len(positions), dtype=bool)
         if conditions is not None:
             check_joins(scenario.environment, conditions)
             is_working = conditions.find_working(0.0, len(positions))
+            # Robots that join or fail later are handled by `advance`, not by the simulations.
             conditions = conditions.drop_team_changes()
         velocities = None
         if scenario.given_starts is not None and scenario.velocities is not None:
@@ -114,7 +116,7 @@ class Lockstep:
         return run
 
     def build_state(self, node: int = 0) -> RunState:
-        """Return the present state.
+        """Return the present state of all panes.
 
         Parameters
         ----------
@@ -134,8 +136,8 @@ class Lockstep:
         return self.step * self.scenario.dt
 
     def advance(self) -> list[AutomaticEvent]:
-        """Simulate one step, and return the robots that have failed or joined by themselves."""
-        # If a controller raises, it does so before any pane has moved.
+        """Simulate one step, and return the failures and joins that the conditions have caused."""
+        # All controllers decide first: if one raises, no pane has moved yet.
         for pane in self.panes:
             pane.simulation.observe_and_decide()
         for pane in self.panes:
@@ -197,7 +199,7 @@ class Lockstep:
             self.drag = None
 
     def _change_panes(self, build_continuation: Callable[[Pane], Continuation]) -> None:
-        """Change all panes, or none if one of them cannot be changed."""
+        """Change all panes; if one of them cannot be changed, raise and change none."""
         continuations = [(pane, build_continuation(pane)) for pane in self.panes]
         changes = []
         for pane, continuation in continuations:
@@ -218,7 +220,7 @@ class Lockstep:
         return compute_spring_forces(pane.simulation, row, target)
 
     def _find_changing_robots(self, change_times: Array) -> list[int]:
-        """Return the numbers of the robots whose change times, (n,) s, lie in the last step."""
+        """Return the numbers of the robots whose change times, (n,) s, lie within the last step."""
         now = self.time + TIME_TOLERANCE_S
         before = self.time - self.scenario.dt + TIME_TOLERANCE_S
         is_changing = (change_times > before) & (change_times <= now)
@@ -226,6 +228,7 @@ class Lockstep:
         return numbers
 
     def _add_joining_robots(self) -> list[AutomaticEvent]:
+        """Add the robots that join in the last step, and return their events."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
             return []
@@ -244,6 +247,7 @@ class Lockstep:
         return events
 
     def _stop_failing_robots(self) -> list[AutomaticEvent]:
+        """Let robots fail whose failure time lies in the last step, and return their events."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
             return []
@@ -257,7 +261,7 @@ class Lockstep:
         return events
 
     def _describe_offset(self, number: int, requested: Point) -> str:
-        """Describe how far from the requested position a robot has joined; empty if it is there."""
+        """Describe how far from the requested position a robot has joined; empty if it is hardly off."""
         pane = self.panes[0]
         row = pane.get_row(number)
         offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))

@@ -1,7 +1,7 @@
 """Files of sessions.
 
 - `session_file`: session files, ``NAME.robocov``
-- `models`, `fields`, `maps`: the content of these files
+- `models`, `fields`, `maps`: the format of these files
 - `workspace`: the file and the drafts of the open session
 - `run_saver`: saves the runs of a session in the background
 """

@@ -1,4 +1,4 @@
-"""Fields of session files: plain types, and fields whose values have another form in files."""
+"""Field types of session files, including fields whose values are represented differently in files."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
@@ -27,16 +27,16 @@ Step: TypeAlias = Annotated[
 def convert_field(
     json_type: Any, load: Callable[[Any, Any], object], dump: Callable[[Any, Any], object]
 ) -> Any:
-    """Build the annotation of a field whose value has another form in files.
+    """Build the annotation of a field whose value is represented differently in files.
 
     Parameters
     ----------
     json_type : type
-        Type of the value in files.
+        Type of the representation in files.
     load : callable
-        Builds the value from the validated content of the file and the context of the file.
+        Called with the validated representation and the file's context; returns the value.
     dump : callable
-        Builds the content of the file from the value and the context of the file.
+        Called with the value and the file's context; returns the representation.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def convert_field(
 
 
 def keep_none(convert: Callable[[Any, Any], object]) -> Callable[[Any, Any], object]:
-    """Return a conversion for `convert_field` that leaves None as it is."""
+    """Wrap a conversion for `convert_field` so that None is left unchanged."""
 
     def convert_unless_none(value: Any, context: Any) -> object:
         if value is None:
@@ -68,5 +68,5 @@ def keep_none(convert: Callable[[Any, Any], object]) -> Callable[[Any, Any], obj
 
 
 def build_refusal(error: object) -> PydanticCustomError:
-    """Build the validation error of a value that cannot be used, with the text of another error."""
+    """Build the validation error for an unusable value, with the message of another error."""
     return PydanticCustomError("refused", "{words}", {"words": str(error)})

@@ -1,4 +1,4 @@
-"""The maps of a session file: bundled ones by name and digest, others in full, each of them once."""
+"""The maps of a session file: bundled maps by name and digest, others in full; each is stored once."""
 
 import hashlib
 import json
@@ -17,7 +17,7 @@ DIGEST_CHARS = 16
 
 
 def refuse_value(where: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
-    """Raise the MapError of a value in a session file.
+    """Raise a MapError about a value in a session file.
 
     Parameters
     ----------
@@ -28,26 +28,26 @@ def refuse_value(where: str, path: tuple[str | int, ...], value: object, expecte
     value : object
         The value.
     expected : str
-        The expected value.
+        Description of what was expected.
     """
     message = f"expected {expected}, got {quote_json(value)}"
     raise MapError.from_mistakes(where, [Mistake.at_path(path, message)])
 
 
 class FileContext:
-    """The context of the fields of a session file: its maps, and the controllers that may be run.
+    """Context in which the fields of a session file are read or written: maps and allowed controllers.
 
     Parameters
     ----------
     where : str
         Name of the file.
     controllers : collection of str
-        Controllers in files of the user's own, as the user has named them.
+        Controllers in users' files that may be loaded, as the user has named them.
 
     Attributes
     ----------
     maps : list
-        The maps as they are in the file.
+        The maps as represented in the file.
     """
 
     def __init__(self, where: str = "", controllers: Collection[str] = ()) -> None:
@@ -57,7 +57,7 @@ class FileContext:
         self._environments: dict[int, Environment] = {}
 
     def get_number(self, environment: Environment) -> int:
-        """Return the number of a map. A new map is added to `maps`."""
+        """Return the number of a map in the file; add it to `maps` if it is new."""
         content = _build_map_content(environment)
         if content not in self.maps:
             self.maps.append(content)
@@ -76,6 +76,7 @@ class FileContext:
         return self._environments[number]
 
     def _load_environment(self, number: int) -> Environment:
+        """Build the map with a number from its representation in the file."""
         if number >= len(self.maps):
             expected = f"the number of a map, 0 to {len(self.maps) - 1}"
             raise PydanticCustomError("wanted", "{words}", {"words": expected})
@@ -101,7 +102,7 @@ class FileContext:
 
 @lru_cache(maxsize=8)
 def _build_map_content(environment: Environment) -> dict[str, Any]:
-    """Return a map as session files contain it."""
+    """Return the representation of a map in session files."""
     content = to_json(environment)
     digest = _compute_digest(content)
     name = _list_bundled_digests().get(digest)
@@ -112,7 +113,7 @@ def _build_map_content(environment: Environment) -> dict[str, Any]:
 
 @cache
 def _list_bundled_digests() -> dict[str, str]:
-    """Return the names of the bundled maps by their digests."""
+    """Return the name of each bundled map, by its digest."""
     return {_compute_digest(to_json(load_map(name))): name for name in list_bundled_maps()}
 
 

@@ -138,7 +138,7 @@ class LessonModel(_Model):
 
 
 def _note_maps(maps: list[BundledMapModel | dict[str, Any]], info: Any) -> list[Any]:
-    """Make the maps available to the fields that refer to them, which are validated later."""
+    """Store the maps in the context, where fields that refer to them and are validated later find them."""
     info.context.maps = maps
     return maps
 

@@ -1,4 +1,4 @@
-"""Saving the runs of a session in the background, by other processes."""
+"""Saving the runs of a session in the background, in other processes."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ from robocov_app.viewer.session.session import Session
 
 MAX_FOLDER_STEM_CHARS = 64
 FIRST_WAIT_S = 0.5
-"""Time to wait for a process without a message to the user."""
+"""Time for which `finish` waits for a process before it tells the user."""
 _ERROR_FILE = "errors.txt"
 
 
@@ -35,7 +35,7 @@ class _Job:
     process : Popen
         The process.
     temporary : TemporaryDirectory
-        Folder with the session, and with the standard error of the process.
+        Folder with the session file and the standard error output of the process.
     """
 
     target: Path
@@ -44,7 +44,7 @@ class _Job:
 
 
 class RunSaver:
-    """Lets other processes save runs. Only `finish` waits for them.
+    """Saves runs in other processes. Only `finish` waits for them.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class RunSaver:
         self._messages: list[tuple[str, bool]] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
-        """Start saving the branch of a session up to its present, in a new folder.
+        """Start to save the branch of a session up to its present, in a new folder.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class RunSaver:
         Returns
         -------
         str
-            A message.
+            A message for the user.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class RunSaver:
         return f"saving the run: {target}/"
 
     def poll(self) -> list[tuple[str, bool]]:
-        """Return messages about runs that have ended since the last call, and whether each is an error."""
+        """Return (message, is_error) for each run whose process has ended since the last call."""
         for job in self._jobs[:]:
             if job.process.poll() is not None:
                 self._end_job(job)
@@ -110,7 +110,7 @@ class RunSaver:
         return messages
 
     def finish(self) -> None:
-        """Wait until all runs are saved. An interruption stops the processes."""
+        """Wait until all runs are saved; if the wait is interrupted, kill the processes."""
         try:
             for index, job in enumerate(self._jobs):
                 with suppress(subprocess.TimeoutExpired):
@@ -128,10 +128,10 @@ class RunSaver:
                 self._end_job(job)
 
     def _end_job(self, job: _Job) -> None:
-        """Clean up after a process, and note the message about its result."""
+        """Clean up after a process, and queue the message about its result."""
         self._jobs.remove(job)
         lines: list[str] = []
-        # A program that cleans up temporary files may have removed the folder.
+        # A program that cleans up temporary files may already have removed the folder.
         with suppress(OSError), job.temporary as folder:
             lines = Path(folder, _ERROR_FILE).read_text("utf-8", "replace").strip().splitlines()
         if job.process.returncode == 0:
@@ -140,14 +140,14 @@ class RunSaver:
         reason = "the process has ended"
         if lines:
             reason = lines[-1].removeprefix("robocov: error: ")
-        # This fails, as it should, if the folder contains something.
+        # Remove the folder only if it is empty.
         with suppress(OSError):
             job.target.rmdir()
         self._messages.append((f"run not saved: {job.target}/: {reason}", True))
 
 
 def _build_folder_stem(session: Session, map_name: str) -> str:
-    """Build the name of a folder from those of the map and the controller."""
+    """Build the name of a run's folder from the names of the map and the controller."""
     file_name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json")
     name = file_name or session.displayed.environment.name
     stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FOLDER_STEM_CHARS] or "map"
@@ -157,7 +157,7 @@ def _build_folder_stem(session: Session, map_name: str) -> str:
 
 
 def _list_user_controllers(document: SessionDocument) -> list[str]:
-    """Return the names of all controllers of a document that are in files of the user's own."""
+    """Return the names of all controllers of a document that are in users' files."""
     restart_names = []
     later_names = []
     for node in document.nodes:
@@ -171,14 +171,14 @@ def _list_user_controllers(document: SessionDocument) -> list[str]:
 
 
 def _make_new_folder(folder: Path, stem: str) -> Path:
-    """Create a folder that did not exist before, or raise an OutputError."""
+    """Create a new folder with an unused name, and return its path; raise an OutputError on failure."""
     while True:
         target = find_free_path(folder, stem, "")
         try:
             target.mkdir(parents=True)
         except FileExistsError:
-            # If another program has created it meanwhile, try the next name. If not, a file is in the place
-            # of a parent.
+            # If another program has just created the folder, try the next name. Otherwise, one of its parents
+            # is a file.
             if not target.exists():
                 raise OutputError(f"{target}: cannot be created") from None
         except OSError as error:

@@ -1,7 +1,7 @@
 """Session files, ``NAME.robocov``: the document of a session as versioned JSON of a few kilobytes.
 
-Bundled maps are stored by name and digest, other maps in full, each of them once. A controller in a file of
-the user's own is stored by its path, and never run just because a session file names it.
+Bundled maps are stored by name and digest, other maps in full; each map is stored once. A controller in a
+user's file is stored by its path, and is never loaded just because a session file names it.
 """
 
 import json
@@ -27,13 +27,14 @@ FORMAT = "robocov-session"
 VERSION = 1
 SUFFIX = ".robocov"
 MAX_FILE_SAMPLES = 30
-"""Maximum number of samples of a curve in a file, for each edit."""
+"""Maximum number of samples of a curve per node in a file."""
 _EDIT_WRITER: TypeAdapter[SessionEdit] = TypeAdapter(SessionEdit)
 # Message of pydantic for an unknown kind of edit or obstacle.
 _UNKNOWN_TAG = re.compile(
     r"Input tag '(?P<found>.*?)' found using '(?P<key>\w+)' .* expected tags: (?P<known>.*)"
 )
-# Steps of the path of a validation error after which pydantic inserts the kind that it has chosen.
+# In the location of a validation error, pydantic inserts the kind that it has chosen after `KEY, index` for
+# each KEY of these.
 _STEPS_BEFORE_KIND = ("changes", "added", "maps", "gains")
 
 
@@ -44,7 +45,7 @@ class SavedSession:
     Attributes
     ----------
     document : SessionDocument
-        The edits.
+        The tree of edits.
     head : Node
         The node whose time span contains the present.
     step : int
@@ -65,7 +66,7 @@ class SavedSession:
 def save_session(
     path: Path, document: SessionDocument, head: Node, step: int, view: Mapping[str, Any]
 ) -> None:
-    """Write a session file, completely or not at all.
+    """Write a session file. If writing fails, an existing file stays unchanged.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def save_session(
 
 
 def format_session(content: Mapping[str, Any]) -> str:
-    """Format the content of a session file, with one line for each edit."""
+    """Format the content of a session file as JSON, with one line for each node."""
     nodes = [json.dumps(node, ensure_ascii=False, allow_nan=False) for node in content["touches"]]
     other_content = {key: value for key, value in content.items() if key != "touches"}
     text = json.dumps(other_content, ensure_ascii=False, allow_nan=False, indent=1)
@@ -120,6 +121,7 @@ def build_session_content(
 
 
 def _build_node_content(node: Node, context: FileContext) -> dict[str, Any]:
+    """Build the content of a node; optional entries are left out if they are empty."""
     content: dict[str, Any] = {
         "parent": None if node.parent is None else node.parent.number,
         "at": node.branch_step,
@@ -140,7 +142,7 @@ def _build_node_content(node: Node, context: FileContext) -> dict[str, Any]:
 
 
 def _build_edits_content(edits: list[SessionEdit], context: FileContext) -> list[dict[str, Any]]:
-    """Build the content of edits, with consecutive points of a drag as one path."""
+    """Build the content of edits; consecutive points of a drag are merged to one path."""
     contents: list[dict[str, Any]] = []
     for edit in edits:
         if not isinstance(edit, DragRobot):
@@ -163,7 +165,7 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
     path : Path
         The file.
     controllers : collection of str
-        Controllers in files of the user's own that may be run, as the user has named them.
+        Controllers in users' files that may be loaded, as the user has named them.
 
     Returns
     -------
@@ -172,7 +174,7 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
     Raises
     ------
     MapError
-        If the file cannot be used; in one line with the file, line and column, and the JSON path.
+        If the file cannot be used. The message names the file, line and column, and the JSON path.
     """
     text = read_bytes(path)
     where = str(path)
@@ -193,7 +195,7 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
     where : str
         Name of the file, for messages.
     controllers : collection of str
-        Controllers in files of the user's own that may be run, as the user has named them.
+        Controllers in users' files that may be loaded, as the user has named them.
 
     Returns
     -------
@@ -224,7 +226,7 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
 
 
 class _NodeReader:
-    """Reads the next node of a session file.
+    """Builds the next node of a session file from its model.
 
     Parameters
     ----------
@@ -288,8 +290,9 @@ class _NodeReader:
 
 
 def _build_mistake(detail: Any) -> Mistake:
-    """Describe an error of pydantic in robocov's words."""
+    """Convert an error of pydantic to a robocov `Mistake` with a path and a plain message."""
     steps = list(detail["loc"])
+    # Remove the kinds that pydantic has inserted, because they are not part of the JSON path.
     kinds = [index for index in range(2, len(steps)) if steps[index - 2] in _STEPS_BEFORE_KIND]
     path = tuple(step for index, step in enumerate(steps) if index not in kinds)
     message = str(detail["msg"])

@@ -1,4 +1,4 @@
-"""The file and the drafts of the open session, so that no work is lost."""
+"""The file and the drafts of the open session, which protect against loss of work."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -19,7 +19,7 @@ from robocov_app.viewer.session.session import Session
 
 DRAFT_KIND = "robocov-session-draft"
 DRAFT_PAUSE_S = 0.9
-"""Time between two drafts of a session that plays."""
+"""Minimum time between two drafts."""
 _NEVER_SAVED = -1
 
 
@@ -31,7 +31,7 @@ class SessionWorkspace:
     session : Session
         The session.
     folder : Path or None
-        Folder for drafts; None to keep none.
+        Folder for drafts; None to save no drafts.
     path : Path or None
         File of the session; None if it never had one.
     resumed : Path or None
@@ -57,18 +57,18 @@ class SessionWorkspace:
 
     @property
     def has_unsaved_edits(self) -> bool:
-        """Whether there are edits that are not in the file."""
+        """Whether there are edits that are not saved in the file."""
         return self.session.timeline.document.revision != self._saved_revision
 
     def save_draft(self, view: Mapping[str, Any], *, at_once: bool = False) -> None:
-        """Save a draft if there are unsaved edits.
+        """Save a draft if there are unsaved edits that the last draft lacks.
 
         Parameters
         ----------
         view : mapping
             Displayed layers and theme.
         at_once : bool
-            Whether to save it even if the last draft is recent.
+            Whether to save the draft even if the last one is recent.
         """
         timeline = self.session.timeline
         head, step = timeline.destination
@@ -89,16 +89,16 @@ class SessionWorkspace:
         Parameters
         ----------
         folder : Path
-            Folder for a session without a file.
+            Folder for a new file, if the session has none.
         view : mapping
             Displayed layers and theme.
         path : Path or None
-            The file; by default its own, or a new one.
+            The file; by default the session's own, or a new one.
 
         Returns
         -------
         Path
-            The file.
+            The file to which the session was saved.
 
         Raises
         ------
@@ -121,17 +121,17 @@ class SessionWorkspace:
         return target
 
     def close(self) -> None:
-        """Stop saving drafts. The last one stays if there are unsaved edits."""
+        """Stop saving drafts. The last draft is kept if there are unsaved edits."""
         self._autosaver.close(discard=not self.has_unsaved_edits)
 
 
 def find_recoverable_drafts(folder: Path | None) -> tuple[autosave.Draft, ...]:
-    """Return the drafts left by programs that have ended, the newest first."""
+    """Return the drafts left behind by processes that have ended, newest first."""
     return autosave.find_drafts(folder, DRAFT_KIND, _check_draft)
 
 
 def _check_draft(draft: autosave.Draft) -> autosave.Draft | None:
-    """Return a draft that can be described; None if all was saved. Raises a KeyError if it is damaged."""
+    """Return a draft; None if it contains no unsaved session. A damaged draft raises a KeyError."""
     if "session" not in draft.content:
         return None
     describe_draft(draft)
@@ -156,11 +156,11 @@ def recover_draft(
     draft : Draft
         The draft.
     controllers : collection of str
-        Controllers in files of the user's own that may be run, as the user has named them.
+        Controllers in users' files that may be loaded, as the user has named them.
     folder : Path or None
         Folder for drafts.
     seconds : float, s
-        Time that the call may take; see `Session.open`.
+        Maximum time for recomputing the session; see `Session.open`.
 
     Returns
     -------
