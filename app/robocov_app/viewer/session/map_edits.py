@@ -1,4 +1,4 @@
-"""Edits of a map: obstacles that are added, moved and removed, and a painted density."""
+"""Edits of a map: adding, moving and removing obstacles, and painting the density."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -14,23 +14,23 @@ from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
 
 MIN_SHAPE_SIZE_M = 0.02
-"""Size below which a drawn shape is taken for a slip of the pointer."""
+"""Drawn shapes that are smaller are considered accidental, and rejected."""
 PAINTED_RASTER_CELLS = 96
-"""Number of cells along the longer side of a map whose density is painted."""
+"""Number of raster cells along the longer side of a map whose density is painted."""
 MIN_PAINTED_DENSITY = 0.05
 MAX_PAINTED_DENSITY = 50.0
 DAB_FACTOR = 1.15
 """Factor by which a dab of the brush changes the density at its center."""
 _DENSITY_DECIMALS = 3
-"""Decimals of a painted density, so that map files stay short."""
+"""Decimals to which a painted density is rounded, so that map files stay short."""
 _COORDINATE_DECIMALS = 4
-"""Decimals of drawn coordinates, m, so that files stay short."""
+"""Decimals to which drawn coordinates, m, are rounded, so that files stay short."""
 
 
 def replace_obstacles(
     environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
 ) -> Environment:
-    """Return a map with some of its obstacles replaced, as if it were read from a file.
+    """Return a map with some of its obstacles replaced, checked like a map that is read from a file.
 
     Starts that are covered by an obstacle are removed.
 
@@ -71,12 +71,12 @@ def replace_obstacles(
 
 
 def add_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return a map with one more obstacle; raises as `replace_obstacles`."""
+    """Return a map with one more obstacle; raise the same errors as `replace_obstacles`."""
     return replace_obstacles(environment, len(environment.obstacles), 0, [obstacle])
 
 
 def move_obstacle(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
-    """Return an obstacle moved by a distance, m."""
+    """Return an obstacle moved by dx and dy, m."""
 
     def move(point: Point) -> Point:
         return round(point[0] + dx, _COORDINATE_DECIMALS), round(point[1] + dy, _COORDINATE_DECIMALS)
@@ -104,7 +104,7 @@ def find_obstacle(environment: Environment, point: Point, reach: float = 0.0) ->
     Returns
     -------
     int or None
-        Index of the nearest obstacle, of the topmost one where several contain the point.
+        Index of the nearest obstacle; if several contain the point, of the topmost one; None without one.
     """
     polygons = [obstacle.polygon for obstacle in environment.obstacles]
     distances = shapely.distance(polygons, shapely.Point(point))
@@ -122,12 +122,12 @@ def describe_obstacle(obstacle: Obstacle) -> str:
 
 
 def build_polygon(points: list[Point]) -> PolygonObstacle:
-    """Build a polygon from the points of its outline, m.
+    """Build a polygon obstacle from the points of its outline, m.
 
     Raises
     ------
     MapError
-        If it encloses nothing, or crosses itself.
+        If the outline encloses almost no area, or crosses itself.
     """
     vertices = _round_points(points)
     if len(vertices) > 2 and vertices[0] == vertices[-1]:
@@ -140,12 +140,12 @@ def build_polygon(points: list[Point]) -> PolygonObstacle:
 
 
 def build_wall(points: list[Point], width: float) -> WallObstacle:
-    """Build a wall of a width, m, along points, m.
+    """Build a wall along a line through points, with a given width; all lengths in m.
 
     Raises
     ------
     MapError
-        If the points are in the same place.
+        If the points are too close together.
     """
     line = _round_points(points)
     if len(line) < 2 or shapely.LineString(line).length < MIN_SHAPE_SIZE_M:
@@ -154,12 +154,12 @@ def build_wall(points: list[Point], width: float) -> WallObstacle:
 
 
 def build_circle(center: Point, rim: Point) -> CircleObstacle:
-    """Build a circle from its center and a point on its rim, m.
+    """Build a circular obstacle from its center and a point on its rim, m.
 
     Raises
     ------
     MapError
-        If the points are in the same place.
+        If the points are too close together.
     """
     radius = float(np.hypot(rim[0] - center[0], rim[1] - center[1]))
     if radius < MIN_SHAPE_SIZE_M:
@@ -168,7 +168,7 @@ def build_circle(center: Point, rim: Point) -> CircleObstacle:
 
 
 def _round_points(points: list[Point]) -> tuple[Point, ...]:
-    """Round points to a tenth of a millimeter, and remove repeated ones."""
+    """Round points to a tenth of a millimeter, and remove consecutive duplicates."""
     rounded = [
         (round(float(x), _COORDINATE_DECIMALS), round(float(y), _COORDINATE_DECIMALS)) for x, y in points
     ]
@@ -185,7 +185,7 @@ def paint_density(environment: Environment, dabs: Sequence[Point], radius: float
     dabs : sequence of tuple
         Points at which the brush is applied, (x, y) m each.
     radius : float, m
-        Radius of the brush, whose effect decreases from its center to its rim.
+        Radius of the brush. Its effect decreases from the center to the rim.
     lowers : bool
         Whether the density is lowered.
 
@@ -199,6 +199,7 @@ def paint_density(environment: Environment, dabs: Sequence[Point], radius: float
     x_min, y_min, x_max, y_max = raster.extent
     x = _compute_cell_centers(x_min, x_max, columns)[None, :]
     y = _compute_cell_centers(y_min, y_max, rows)[:, None]
+    # Each dab multiplies the density by DAB_FACTOR ** (1 - (distance / radius)²)², or divides it.
     exponent = -np.log(DAB_FACTOR) if lowers else np.log(DAB_FACTOR)
     for center_x, center_y in dabs:
         squared_distances = ((x - center_x) ** 2 + (y - center_y) ** 2) / radius**2
@@ -210,13 +211,13 @@ def paint_density(environment: Environment, dabs: Sequence[Point], radius: float
 
 
 def _compute_cell_centers(low: float, high: float, count: int) -> Array:
-    """Return the centers of equal cells between two coordinates, (count,) m."""
+    """Return the center coordinates of `count` equal cells between two coordinates, (count,) m."""
     cell_size = (high - low) / count
     return np.asarray(low + (np.arange(count) + 0.5) * cell_size, dtype=np.float64)
 
 
 def build_paintable_raster(environment: Environment) -> Raster:
-    """Return the density of a map as a raster that can be painted, sampled unless it is one already."""
+    """Return the density of a map as a raster that can be painted; sample it unless it already is one."""
     density = environment.density
     is_paintable = (
         isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1

@@ -1,4 +1,4 @@
-"""Controllers of records that no longer exist, or are not loaded."""
+"""Controllers of records that no longer exist, or that may not be loaded."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 @dataclass(frozen=True)
 class MissingController(ControllerChoice):
-    """A controller that is not loaded, or does not accept its gains; its records can be displayed.
+    """A controller that cannot be built; its records can be displayed, but not continued.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class MissingController(ControllerChoice):
     reason : str
         Why it cannot be built.
     is_placeholder : bool
-        Whether it takes the place of the controller at the end of a record, until a decision is needed.
+        Whether `build` returns this object, which stands in for the controller until a decision is needed.
     """
 
     title: str = ""
@@ -40,7 +40,7 @@ class MissingController(ControllerChoice):
 
     @property
     def available_gains(self) -> Mapping[str, Gain | Option]:
-        """No gains, because they are not known."""
+        """An empty mapping, because the gains are not known."""
         return {}
 
     def build(self) -> Controller:
@@ -50,7 +50,7 @@ class MissingController(ControllerChoice):
         raise ParameterError(f"the run can be displayed, but not resumed: {self.reason}")
 
     def begin(self, region: Region, team: Team) -> None:
-        """Return no memory."""
+        """Do nothing: a placeholder has no memory."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
         """Raise a ParameterError with the reason."""
@@ -66,12 +66,12 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
     record : Record
         The record.
     controllers : sequence of str
-        Controllers in files of the user's own, as the user has named them. No other file is run.
+        Controllers in users' files that may be loaded, as the user has named them. No other file is executed.
 
     Returns
     -------
     ControllerChoice
-        A `MissingController` if it cannot be built.
+        The controller with its gains; a `MissingController` if it cannot be built.
     """
     name = record.controller
     gains = dict(record.gains)
@@ -93,7 +93,7 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
 
 
 def use_placeholder(choice: ControllerChoice) -> ControllerChoice:
-    """Replace a missing controller by a placeholder that can be built."""
+    """Replace a missing controller with a placeholder that can be built; return other choices unchanged."""
     if isinstance(choice, MissingController):
         return replace(choice, is_placeholder=True)
     return choice

@@ -1,4 +1,4 @@
-"""A pane of the window: the team under one controller."""
+"""A pane of the window: a team under one controller."""
 
 from copy import deepcopy
 from typing import Any, NamedTuple
@@ -20,20 +20,20 @@ from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 from robocov_app.viewer.session.past.trails import Trail
 
 STEPS_BETWEEN_SENSED_POINTS = 3
-"""Number of steps between two records of the points that robots sense."""
+"""Interval, in steps, at which sensed points are recorded."""
 _MOVED_M = 1e-3
-"""A robot that is pushed out of an obstacle by more than this comes to rest."""
+"""A robot that is moved out of an obstacle by more than this comes to rest."""
 
 
 class Continuation(NamedTuple):
-    """State from which an edited pane continues.
+    """Setup and state with which a pane continues after an edit.
 
     Attributes
     ----------
     setup : PaneSetup
-        Setup of the pane from now on.
+        New setup of the pane.
     positions, velocities : (n, 2) array or None, m and m/s
-        Of the working robots; by default as they are.
+        Positions and velocities of the working robots; None if they do not change.
     """
 
     setup: PaneSetup
@@ -47,20 +47,20 @@ class Pane:
     Parameters
     ----------
     number : int
-        Number of the pane, which stays the same when others are removed.
+        Number of the pane. It does not change when other panes are removed.
     setup : PaneSetup
         Map, controller and robots.
     simulation : Simulation
-        The simulation at the present step.
+        The simulation at the current step.
 
     Attributes
     ----------
     trail : Trail
-        Trajectories of the working robots, then those of the robots that failed.
+        Trajectories of the working robots, followed by those of failed robots.
     curves : dict of str to Curve
         Cost curves by quantity, ``"distance"`` and ``"time"``.
     distance_curve : Curve
-        Mean distance to the nearest robot.
+        Curve of the mean distance to the nearest robot.
     sensed : SensedPoints
         Points that robots have sensed.
     """
@@ -97,7 +97,7 @@ class Pane:
         return self.simulation.time
 
     def get_row(self, number: int) -> int | None:
-        """Return the row of a robot in arrays; None if it does not work."""
+        """Return the row of a working robot in arrays; None for other robots."""
         if number in self.numbers:
             return self.numbers.index(number)
         return None
@@ -120,18 +120,18 @@ class Pane:
     def build_scene(
         self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any
     ) -> Scene:
-        """Build the scene of a step for drawing.
+        """Build the scene of a step, for drawing.
 
         Parameters
         ----------
         setup : PaneSetup
-            Setup of the pane at the step.
+            Setup of the pane at that step.
         snapshot : Snapshot
             Observations and decision at the step.
         trail : tuple of array
-            Positions and times of the trail up to the step.
+            Positions and times of the trajectories up to the step.
         **more
-            Further fields of `Scene`.
+            Other fields of `Scene`.
 
         Returns
         -------
@@ -157,7 +157,7 @@ class Pane:
         simulation = self.simulation
         memory = None
         if has_memory(simulation.controller):
-            # A user's controller may change its memory in place.
+            # A user's controller may later change its memory in place.
             memory = deepcopy(simulation.memory)
         return PaneState(
             self.setup,
@@ -169,9 +169,9 @@ class Pane:
         )
 
     def build_changed_simulation(self, continuation: Continuation) -> Simulation:
-        """Build the simulation with which the pane continues after an edit; the pane itself stays as it is.
+        """Build the simulation with which the pane continues after an edit; the pane itself is not changed.
 
-        Robots that overlap an obstacle are pushed out of it.
+        Robots that overlap an obstacle are moved to the nearest free position.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class Pane:
         """
         old = self.simulation
         setup = continuation.setup
-        # The same controller keeps its memory. One without memory is built again, as when it is resumed.
+        # An unchanged controller keeps its memory. Without memory, it is built anew, as on resuming.
         keeps_controller = setup.controller == self.controller and has_memory(old.controller)
         controller = None if keeps_controller else setup.controller.build()
         if self._differs_only_in_density(continuation):
@@ -203,7 +203,7 @@ class Pane:
         return changed
 
     def _differs_only_in_density(self, continuation: Continuation) -> bool:
-        """Return whether an edit changes at most the density of the map."""
+        """Return whether an edit changes nothing but the density of the map."""
         old = self.setup
         new = continuation.setup
         return (
@@ -216,12 +216,28 @@ class Pane:
         )
 
     def _find_rows(self, numbers: tuple[int, ...]) -> IntArray:
-        """Return the present rows of robots, (n,); -1 for robots that do not work yet."""
+        """Return the current rows of robots, given by their numbers, (n,); -1 for robots not yet working."""
         row_by_number = {number: row for row, number in enumerate(self.numbers)}
         return np.array([row_by_number.get(number, -1) for number in numbers], dtype=np.intp)
 
     def _build_with_robots(self, continuation: Continuation, controller: Any, rows: IntArray) -> Simulation:
-        """Build the changed simulation; robots without space come to rest at the nearest free position."""
+        """Build the changed simulation.
+
+        If robots overlap obstacles or each other, they are moved to the nearest free positions.
+
+        Parameters
+        ----------
+        continuation : Continuation
+            Setup and state with which the pane continues.
+        controller : Controller or None
+            New controller; None to keep the current one and its memory.
+        rows : (n,) int array
+            Current row of each robot; -1 for robots that have just joined.
+
+        Returns
+        -------
+        Simulation
+        """
         old = self.simulation
         setup = continuation.setup
         environment = setup.sensed_environment
@@ -230,6 +246,7 @@ class Pane:
         velocities = old.velocities if continuation.velocities is None else continuation.velocities
         steering = None
         if old.steering is not None:
+            # Robots that have just joined (row -1) start with heading and turning rate 0.
             steering = np.where(rows[:, None] < 0, 0.0, old.steering[rows])
 
         def build(positions: Array, velocities: Array) -> Simulation:
@@ -250,7 +267,7 @@ class Pane:
             return build(placed, np.where(is_moved[:, None], 0.0, velocities))
 
     def adopt(self, setup: PaneSetup, simulation: Simulation) -> None:
-        """Continue with another setup and simulation."""
+        """Replace the setup and the simulation, and continue the trail with the new team."""
         self.simulation = simulation
         self.setup = setup
         self.trail.change_robots(setup.tracked_numbers)
@@ -271,7 +288,7 @@ def start_simulation(
     dt : float, s
         Control period.
     velocities : (n, 2) array or None, m/s
-        Initial velocities; by default robots are at rest.
+        Initial velocities; by default, robots are at rest.
 
     Returns
     -------
@@ -297,7 +314,7 @@ def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
     dt : float, s
         Control period.
     step : int
-        Step of the state.
+        Step at which the state was recorded.
 
     Returns
     -------
@@ -316,6 +333,7 @@ def _build_scenario(
     velocities: Array | None,
     steering: Array | None = None,
 ) -> Scenario:
+    """Build the scenario of a pane's setup that starts from a given state of the robots."""
     return Scenario(
         setup.sensed_environment,
         setup.controller.build(),

@@ -1,4 +1,4 @@
-"""Effects of an edit of the map on passages: areas that it cuts off, and gaps that are too narrow."""
+"""Effects of a map edit on passages: areas that are cut off, and gaps that become too narrow."""
 
 from collections.abc import Sequence
 
@@ -9,14 +9,14 @@ from robocov.arrays import Array
 from robocov.environment import Environment, Point, find_narrow_gaps
 
 _WIDTH_TOLERANCE = 1e-6
-"""Relative tolerance within which a gap is wide enough."""
+"""Relative amount by which a gap may be narrower than a robot and still count as wide enough."""
 _QUARTER_SEGMENTS = 4
 
 
 def describe_passage_changes(
     before: Environment, after: Environment, radius: float, robots: Array | Sequence[Point] = ()
 ) -> str:
-    """Describe what an edit cuts off from robots, and a gap that it leaves too narrow for them.
+    """Describe the areas that an edit cuts off from robots, and a gap that it makes too narrow for them.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def describe_passage_changes(
     Returns
     -------
     str
-        Empty if there is nothing to say.
+        The descriptions, separated by semicolons; empty if no passage has changed.
     """
     positions = shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
     descriptions = []
@@ -43,7 +43,7 @@ def describe_passage_changes(
             descriptions.append(f"the team is split into {has_robots.sum()} groups")
         is_reachable = has_robots
         if not has_robots.any():
-            # Without robots the largest component counts as the one that is left.
+            # Without robots, the largest component counts as the reachable one.
             areas = shapely.area(components)
             is_reachable = areas == areas.max(initial=0.0)
         lost_centers = shapely.union_all(components[~is_reachable])
@@ -55,7 +55,13 @@ def describe_passage_changes(
 
 
 def _split_components(before: Environment, after: Environment, radius: float) -> list[np.ndarray]:
-    """Return, for each component where a robot's center could be before, the components that are left."""
+    """Return the components into which an edit splits each component of the free positions.
+
+    Returns
+    -------
+    list of arrays of polygons
+        For each component before the edit, the components of it that remain after the edit.
+    """
     components_before = _find_center_components(before, radius)
     components_after = _find_center_components(after, radius)
     tree = shapely.STRtree(components_before)
@@ -68,14 +74,14 @@ def _split_components(before: Environment, after: Environment, radius: float) ->
 
 
 def _find_center_components(environment: Environment, radius: float) -> np.ndarray:
-    """Return the components of the positions at which a robot overlaps no obstacle."""
+    """Return the connected components of all center positions at which a robot overlaps no obstacle."""
     centers = environment.free.buffer(-radius, quad_segs=_QUARTER_SEGMENTS)
     components: np.ndarray = shapely.get_parts(centers)
     return components
 
 
 def _describe_narrow_gap(before: Environment, after: Environment, radius: float) -> list[str]:
-    """Describe the first gap that an edit has made too narrow, if there is one."""
+    """Return the description of the first gap that an edit has made too narrow; empty without one."""
     width = 2 * radius * (1 - _WIDTH_TOLERANCE)
     old_gaps = {gap.between for gap in find_narrow_gaps(before.free, width)}
     for gap in find_narrow_gaps(after.free, width):

@@ -1,4 +1,4 @@
-"""Playback of a session: how time passes while it is displayed."""
+"""Playback of a session: how it advances with real time."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.timeline import Timeline
 
 SEEK_SLICE_S = 0.03
-"""Computing time in each frame for building another state of the session."""
+"""Computing time per frame for a seek to another state of the session."""
 
 
 class Playback:
-    """Plays a timeline: the recorded past first, then by simulating.
+    """Plays a timeline: first the recorded past, then by simulating.
 
     Parameters
     ----------
@@ -21,9 +21,9 @@ class Playback:
     Attributes
     ----------
     clock : Clock
-        Speed, and the computing time for each frame.
+        Speed, and computing time per frame.
     is_playing : bool
-        Whether time passes.
+        Whether the session plays rather than pauses.
     stop_when_settled : bool
         Whether to pause when the team has settled.
     """
@@ -36,18 +36,18 @@ class Playback:
 
     @property
     def seek_seconds(self) -> float:
-        """Time that `Timeline.seek` may take at once, s."""
+        """Maximum computing time of `Timeline.seek` in one frame, s."""
         if np.isinf(self.clock.budget):
             return np.inf
         return SEEK_SLICE_S
 
     def advance(self, seconds: float) -> int:
-        """Let time pass.
+        """Advance by real time: continue a seek, play the recorded past, or simulate.
 
         Parameters
         ----------
         seconds : float, s
-            Time since the previous call.
+            Real time since the previous call.
 
         Returns
         -------
@@ -57,7 +57,7 @@ class Playback:
         Raises
         ------
         RobocovError
-            If a controller raises it; playback pauses.
+            If a controller raises it; playback then pauses.
         """
         if self._timeline.is_seeking:
             self._timeline.continue_seek(SEEK_SLICE_S)
@@ -82,7 +82,7 @@ class Playback:
         if not timeline.is_live:
             timeline.show_next()
             if timeline.is_live and timeline.is_at_record_end:
-                # Users decide whether to continue after the end of a record.
+                # Pause at the end of a record; the user decides whether to continue by simulating.
                 self.is_playing = False
             return self.is_playing
         try:

@@ -3,5 +3,5 @@
 - `states`, `history`: recorded states from which a run can be resumed
 - `decision_replay`: observations and decisions of the past, recomputed from recorded states
 - `trails`: trajectories of the robots
-- `curves`, `ghosts`: cost curves of the displayed branch and of the others
+- `curves`, `ghosts`: cost curves of the displayed branch, and of other branches
 """

@@ -1,4 +1,4 @@
-"""Cost curves of the time line, curves of other branches, and events."""
+"""Cost curves of the chart, curves of other branches, and events."""
 
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from robocov.arrays import Array
 
 MAX_CURVE_SAMPLES = 3000
-"""Number of samples at which every second sample of the older half of a curve is removed."""
+"""When a curve has this many samples, every second one of its older half is removed."""
 _SAME_TIME_S = 1e-9
 _TIME_TOLERANCE_S = 1e-6
 _FILE_TIME_DECIMALS = 3
@@ -22,9 +22,9 @@ class SessionEvent:
     Attributes
     ----------
     time : float, s
-        When it happened.
+        Time at which it happened.
     kind : str
-        ``"obstacle"``, ``"robot"``, ``"failure"``, ``"law"``, ...
+        Kind of event, such as ``"obstacle"``, ``"robot"``, ``"failure"`` or ``"law"``.
     text : str
         Description.
     """
@@ -35,7 +35,7 @@ class SessionEvent:
 
 
 class Curve:
-    """A coverage cost at ascending times: the mean distance to the nearest robot, or the mean time."""
+    """Samples of a coverage cost at ascending times: the mean distance to the nearest robot, or mean time."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
@@ -62,7 +62,7 @@ class Curve:
         return -np.inf
 
     def add(self, time: float, value: float) -> None:
-        """Add a sample, or replace the one at the same time. Samples that are not finite are ignored."""
+        """Add a sample, or replace the one at the same time; ignore samples that are not finite."""
         if not np.isfinite([time, value]).all():
             return
         index = bisect_left(self._times, time - _SAME_TIME_S)
@@ -76,7 +76,7 @@ class Curve:
         self._values.insert(index, value)
 
     def sample(self, maximum: int) -> list[list[float]]:
-        """Return at most a number of evenly spaced samples, rounded for a file.
+        """Return evenly spaced samples, rounded for a file.
 
         Parameters
         ----------
@@ -86,10 +86,10 @@ class Curve:
         Returns
         -------
         list of list of float
-            Times, s, and values. The first and the newest sample are always among them.
+            List of times, s, and list of values. They include the first and the newest sample.
         """
         count = min(maximum, len(self))
-        # A single sample is the newest.
+        # Counted from the end: if only one sample is requested, it is the newest.
         indices = np.unique(np.linspace(len(self) - 1, 0, count).round().astype(int)).tolist()
         times = [self._times[index] for index in indices]
         values = [self._values[index] for index in indices]
@@ -99,7 +99,7 @@ class Curve:
         ]
 
     def extract(self, start: float, end: float) -> "Curve":
-        """Return the part of the curve between two times, s, including both."""
+        """Return the samples between two times, s, inclusive, as a curve."""
         first = bisect_left(self._times, start - _TIME_TOLERANCE_S)
         last = bisect_right(self._times, end + _TIME_TOLERANCE_S)
         part = Curve()
@@ -128,14 +128,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class GhostCurve:
-    """The part of another branch's curve that is not on the present branch.
+    """The part of another branch's curve that it does not share with the present branch.
 
     Attributes
     ----------
     controller : str
         Name of the controller.
     description : str
-        The controller with its gains.
+        Description of the controller with its gains.
     times : (k,) array, s
         Times of the samples.
     values : (k,) array
@@ -155,7 +155,7 @@ class GhostCurve:
 
 
 class PlottedQuantity(NamedTuple):
-    """A quantity that the time line can show.
+    """A quantity that the chart can show.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class PlottedQuantity(NamedTuple):
     title : str
         Title of the plot.
     short_title : str
-        Title where there is little space.
+        Title for places with little space.
     unit : str
         Unit of the values.
     """

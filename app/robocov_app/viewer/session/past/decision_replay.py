@@ -23,25 +23,25 @@ from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 
 RECORD_TOLERANCE = 1e-9
-"""Relative and absolute tolerance of forces that agree with those of a record."""
+"""Relative and absolute tolerance within which recomputed forces agree with those of a record."""
 
 
 def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) -> Snapshot:
-    """Recompute observations and decision of a recorded state.
+    """Recompute the observations and the decision of a recorded state.
 
     Parameters
     ----------
     state : PaneState
         The state.
     time : float, s
-        Its time.
+        Time of the state.
     dt : float, s
         Control period.
 
     Returns
     -------
     Snapshot
-        If the controller raises, there are no forces.
+        Observations and decision; all forces are zero if the controller raises.
     """
     seen = _observe(state, time)
     perception = _build_perception(state.setup, dt)
@@ -55,13 +55,13 @@ def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) ->
     _, seen = _build_radio(state.setup, dt).receive_messages(inbox, round(time / dt), seen)
     decision = _decide(seen, state)
     if state.recorded is not None and not _has_same_forces(decision, state.recorded):
-        # The controller has changed since, or it cannot be loaded.
+        # The controller has changed since the record was made, or it cannot be loaded.
         decision = _complete_recorded_decision(state)
     return Snapshot(seen, decision, true_positions)
 
 
 def _observe(state: PaneState, time: float) -> Observations:
-    """Return the observations of the robots without noise and message loss."""
+    """Return the ideal observations of the robots, without noise and message loss."""
     team = state.setup.team
     environment = state.setup.sensed_environment
     sensor = get_sensor(environment)
@@ -79,7 +79,7 @@ def _has_same_forces(decision: Decision, recorded: Decision) -> bool:
 
 
 def _complete_recorded_decision(state: PaneState) -> Decision:
-    """Return the decision of a record; add cells by travel time, which records do not contain."""
+    """Return the recorded decision, with cells by travel time added, which records do not contain."""
     assert state.recorded is not None
     team = state.setup.team
     if state.setup.controller.gains.get("cells") != "time" or not team.has_mixed_speeds:
@@ -92,13 +92,13 @@ def _complete_recorded_decision(state: PaneState) -> Decision:
 
 
 def _decide(seen: Observations, state: PaneState) -> Decision:
-    """Let the controller decide again; without a usable decision there are no forces."""
+    """Let the controller decide again; if it raises or decides nonsense, all forces are zero."""
     no_forces = Decision(np.zeros_like(seen.positions))
     controller = _build_controller(state.setup)
     if controller is None:
         return no_forces
     try:
-        # The controller may change its memory in place, and is asked again for the same state.
+        # The controller may change its memory in place, but it may be asked about this state again.
         memory = deepcopy(state.memory)
         if memory is None:
             memory = controller.begin(state.setup.sensed_environment.region, state.setup.team)
@@ -111,7 +111,7 @@ def _decide(seen: Observations, state: PaneState) -> Decision:
 
 
 def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:
-    """Return whether a controller has returned finite forces, and goals of the same shape if any."""
+    """Return whether a controller has returned finite forces, and goals of the same shape or none."""
     if not isinstance(decision, Decision):
         return False
     goals = decision.forces if decision.goals is None else decision.goals
@@ -121,10 +121,10 @@ def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:
     return bool(np.isfinite(decision.forces).all())
 
 
-# Each pane has one setup; after an edit, the earlier setups are still used.
+# Each pane has one setup, but after an edit, earlier setups are still displayed.
 @lru_cache(maxsize=8)
 def _build_controller(setup: PaneSetup) -> Controller | None:
-    """Build the controller of a pane; None if the controller of a record no longer exists."""
+    """Build the controller of a pane; None if it cannot be built, for example if it no longer exists."""
     with suppress(ParameterError):
         return inform_controller(setup.controller.build(), setup.sensed_environment.static)
     return None
@@ -144,5 +144,5 @@ def _build_radio(setup: PaneSetup, dt: float) -> Radio:
 
 @lru_cache(maxsize=4)
 def get_sensor(environment: Environment) -> RangeSensor:
-    """Return the range sensor on a map, which is kept for the next call."""
+    """Return the range sensor on a map, which is cached."""
     return RangeSensor(build_solid_pieces(environment), build_movers(environment))

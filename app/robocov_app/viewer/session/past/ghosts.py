@@ -13,7 +13,7 @@ QUANTITIES = ("distance", "time")
 def build_ghost_curves(
     document: SessionDocument, head: Node, step: int, dt: float, panes: int
 ) -> list[GhostCurve]:
-    """Build the curves of the newest other branches of the same run.
+    """Build the curves of the newest branches of the same run, apart from the present branch.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def build_ghost_curves(
     dt : float, s
         Control period.
     panes : int
-        Number of panes that are displayed.
+        Number of displayed panes.
 
     Returns
     -------
@@ -46,7 +46,19 @@ def build_ghost_curves(
 def _build_branch_curves(
     document: SessionDocument, branch: Branch, last_steps: dict[int, int], dt: float
 ) -> list[GhostCurve]:
-    """Build the curves of a branch, without the parts up to the given last steps of common nodes."""
+    """Build the curves of a branch for all panes and quantities, without the parts on the present path.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The document.
+    branch : Branch
+        The branch.
+    last_steps : dict of int to int
+        Last step on the path to the present for each node of that path, by the node's number.
+    dt : float, s
+        Control period.
+    """
     branch_last_steps = document.get_last_steps(branch.node, branch.last_step)
     path = document.get_path(branch.node)
     ghosts = []

@@ -1,4 +1,4 @@
-"""The recorded past of a run: states from which it can be resumed, in bounded memory."""
+"""The recorded past of a run: states from which it can be resumed, within a memory limit."""
 
 from bisect import bisect_right
 from collections.abc import Collection, Iterable, Mapping
@@ -12,17 +12,17 @@ import numpy as np
 from robocov_app.viewer.session.past.states import RunState
 
 MAX_HISTORY_BYTES = 24_000_000
-"""Memory for the recorded past of a window."""
+"""Approximate maximum memory for the recorded past of a window."""
 MIN_STATES = 300
-"""States that are kept however large they are."""
+"""Number of states below which none is removed, however large they are."""
 MAX_KEPT_FRACTION = 0.75
-"""Maximum fraction of the states that are kept when the past is thinned."""
+"""Maximum fraction of the states that remain when the past is thinned."""
 _PANE_OVERHEAD_BYTES = 700
 """Approximate memory for the state of one pane without its arrays."""
 _OBJECT_OVERHEAD_BYTES = 50
 """Approximate memory for an object in the memory of a controller."""
 _MAX_SIZE_DEPTH = 4
-"""Nesting up to which objects in the memory of a controller are counted."""
+"""Nesting depth up to which the size of a controller's memory is estimated."""
 _STEP_TOLERANCE = 1e-6
 _Selection: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 """Whether each state is kept, (k,)."""
@@ -31,16 +31,16 @@ _Selection: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 class RunHistory:
     """States of a run in ascending order of their steps.
 
-    When the states need more than `max_bytes`, older ones are thinned: of those beyond a certain age every
-    second step is kept, of those twice as old every fourth, and so on. The newest states are all kept. So
-    are, unless they are too many, those right after an edit.
+    When the states need more than `max_bytes`, older ones are thinned: beyond a certain age, only every
+    second step is kept; beyond twice that age, every fourth; and so on. The newest states are all kept, and
+    so are those right after an edit, unless there are too many of them.
 
     Parameters
     ----------
     dt : float, s
         Control period.
     max_bytes : int
-        Approximate limit of the memory.
+        Approximate memory limit.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class RunHistory:
         return self.states[index].step * self.dt
 
     def append(self, state: RunState) -> None:
-        """Append a newer state, and thin the older ones if they need too much memory."""
+        """Append a newer state; thin the older ones if the memory limit is exceeded."""
         size = _estimate_state_bytes(state)
         self.states.append(state)
         self._sizes.append(size)
@@ -90,25 +90,25 @@ class RunHistory:
             self._thin()
 
     def amend(self, state: RunState) -> None:
-        """Append a state, or replace the newest one if it is of the same step."""
+        """Append a state; if the newest one has the same step, replace it."""
         if self.states and self.last.step == state.step:
             self._remove_last()
         self.append(state)
 
     def rewind(self, last: RunState) -> None:
-        """Make a state the newest again, and remove those after it."""
+        """Remove the states after a given one, which thereby becomes the newest again."""
         while self.states and self.last is not last and self.last.step >= last.step:
             self._remove_last()
         if not self.states or self.last is not last:
             self.append(last)
 
     def find_index(self, time: float) -> int:
-        """Return the index of the last state at or before a time, or that of the first state."""
+        """Return the index of the last state at or before a time, s; 0 if there is none."""
         step = time / self.dt + _STEP_TOLERANCE
         return max(bisect_right(self.states, step, key=lambda state: state.step) - 1, 0)
 
     def copy_until(self, index: int) -> Self:
-        """Return a copy that ends with the state of an index."""
+        """Return a copy of the history up to and including the state with an index."""
         duplicate = copy(self)
         duplicate.states = self.states[: index + 1]
         duplicate._sizes = self._sizes[: index + 1]
@@ -120,7 +120,7 @@ class RunHistory:
         self._bytes -= self._sizes.pop()
 
     def _thin(self) -> None:
-        """Remove states until at most the fraction `MAX_KEPT_FRACTION` is left, preferring old ones."""
+        """Remove states, preferably old ones, until at most the fraction `MAX_KEPT_FRACTION` is left."""
         count = len(self)
         is_kept = self._select_states()
         self.states = list(compress(self.states, is_kept))
@@ -129,9 +129,9 @@ class RunHistory:
         self._bytes = sum(self._sizes)
 
     def _select_states(self) -> _Selection:
-        """Select the states that are kept when the past is thinned.
+        """Select the states to keep when the past is thinned.
 
-        States after an edit are kept, too, unless too many would be left.
+        States right after an edit are kept as well, unless too many states would be left.
         """
         is_edited = np.array([True, *map(_has_new_setup, self.states, self.states[1:])])
         is_kept = self._select_by_age(is_edited)
@@ -141,10 +141,11 @@ class RunHistory:
         return is_kept
 
     def _select_by_age(self, is_required: _Selection) -> _Selection:
-        """Select required states, and fewer and fewer of the others until few enough are left.
+        """Select the required states, and as many of the others as `MAX_KEPT_FRACTION` allows.
 
-        The newest states are all kept. Of those that are up to twice as old as the oldest of these, every
-        second step is kept, up to four times as old every fourth, and so on.
+        A number of newest states are all kept. Of those that are up to twice as old as the oldest of these,
+        every second step is kept; up to four times as old, every fourth; and so on. That number is halved
+        until few enough states are left.
         """
         count = len(self)
         steps = np.array(self.steps)
@@ -181,7 +182,7 @@ def _estimate_state_bytes(state: RunState) -> int:
 
 
 def _estimate_bytes(value: Any, depth: int = _MAX_SIZE_DEPTH) -> int:
-    """Estimate the memory of any value that a controller remembers."""
+    """Estimate the memory, in bytes, of a value of any type that a controller remembers."""
     if isinstance(value, np.ndarray):
         return value.nbytes
     if value is None or depth == 0:

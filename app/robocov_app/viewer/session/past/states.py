@@ -1,4 +1,4 @@
-"""Recorded states of a run: enough to resume it from there, bit for bit."""
+"""Recorded states of a run, from which it can be resumed bit for bit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from robocov_app.viewer.session.scenario import SessionScenario
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """Map, controller and robots of a pane, which stay the same from one edit to the next.
+    """Map, controller and robots of a pane, which change only by edits.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class PaneSetup:
 
     @property
     def sensed_environment(self) -> Environment:
-        """The map with failed robots as obstacles, as the working robots sense it."""
+        """The map as the working robots sense it, with failed robots as obstacles."""
         if not self.failed:
             return self.environment
         radii = tuple(map(self.properties.get_radius, self.failed))
@@ -58,7 +58,7 @@ class PaneSetup:
 
     @property
     def tracked_numbers(self) -> tuple[int, ...]:
-        """Numbers of the robots that have a trail: the working ones, then those that failed."""
+        """Numbers of the robots that have a trail: the working ones, followed by the failed ones."""
         return (*self.numbers, *sorted(self.failed))
 
     @property
@@ -68,13 +68,13 @@ class PaneSetup:
 
     @property
     def speed_limits(self) -> Array | None:
-        """Speed limits of the working robots, (n,) m/s; None if those of all robots are equal."""
+        """Maximum speeds of the working robots, (n,) m/s; None if all robots have the same."""
         if "max_speed" not in self.properties.different:
             return None
         return self.team.max_speed
 
 
-# A session has many setups, and the data computed from a map are large. Therefore only few maps are kept.
+# A session has many setups, and the data computed from a map are large, so only a few maps are cached.
 @lru_cache(maxsize=8)
 def _add_failed_robots(
     environment: Environment, positions: tuple[Point, ...], radii: tuple[float, ...]
@@ -91,13 +91,13 @@ class PaneState(NamedTuple):
     setup : PaneSetup
         Map, controller and robots.
     positions, velocities : (n, 2) array, m and m/s
-        Of the working robots.
+        Positions and velocities of the working robots.
     memory : object
         Memory of the controller; None for a controller without memory.
     recorded : Decision or None
-        The decision in the record, if the state comes from one.
+        The recorded decision, if the state comes from a record.
     inbox : Inbox or None
-        Messages that the robots have, that are in flight or that wait; None if there are none.
+        Messages that robots have received, and those in flight or waiting; None if there are none.
     steering : (n, 2) array or None, rad and rad/s
         Headings and turning rates of unicycles.
     """
@@ -119,9 +119,9 @@ class RunState(NamedTuple):
     step : int
         Number of control steps since time 0.
     states : mapping of int to PaneState
-        By the number of the pane.
+        State of each pane, by its number.
     scenario : SessionScenario
-        Map, controllers and properties as they are at this step.
+        Map, controllers and properties at this step.
     drag : tuple or None
         Number of the dragged robot, and the point to which it is pulled, m.
     node : int

@@ -1,4 +1,4 @@
-"""Trajectories of the robots of a pane up to the present, in bounded memory."""
+"""Trajectories of the robots of a pane up to the present, within a memory limit."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup
 
 MAX_TRAIL_RATE_HZ = 30.0
-"""Maximum number of rows for each simulated second."""
+"""Maximum number of rows per simulated second."""
 MAX_TRAIL_ROWS = 4096
-"""Number of rows at which those are removed that matter least to the shape of the trajectories."""
+"""When a trail has this many rows, those that matter least to the shape of the trajectories are removed."""
 _MIN_ROW_INTERVAL_S = 1.0 / MAX_TRAIL_RATE_HZ - 1e-6
 _SAME_TIME_S = 1e-9
 _TIME_TOLERANCE_S = 1e-6
@@ -30,11 +30,11 @@ class TrailSection:
     Attributes
     ----------
     numbers : tuple of int
-        Robots of the columns.
+        Number of the robot in each column.
     starts : mapping of int to tuple
         First positions of these robots, (x, y) m.
     positions : (k, n, 2) array, m
-        nan for robots that do not work.
+        Positions; nan where a robot does not work.
     times : (k,) array, s
         Ascending times of the rows.
     """
@@ -45,7 +45,7 @@ class TrailSection:
     times: Array
 
     def cut(self, start: float, end: float) -> "TrailSection":
-        """Return a copy of the rows from a time on and before another one, s."""
+        """Return a copy of the rows with start <= time < end, s."""
         first, last = np.searchsorted(self.times, [start - _SAME_TIME_S, end - _SAME_TIME_S])
         positions = self.positions[first:last].copy()
         return TrailSection(self.numbers, self.starts, positions, self.times[first:last].copy())
@@ -54,8 +54,8 @@ class TrailSection:
 class Trail:
     """Positions of robots at ascending times.
 
-    Each robot has a column. When the team changes, the columns are those of the new team from then on: robots
-    that were removed are left out, and those that have joined are nan before that.
+    Each robot has a column. When the team changes, the columns become those of the new team: removed robots
+    are left out, and robots that have just joined are nan in earlier rows.
 
     Parameters
     ----------
@@ -65,12 +65,13 @@ class Trail:
     Attributes
     ----------
     numbers : tuple of int
-        Numbers of the present robots.
+        Numbers of the current robots.
     """
 
     def __init__(self, numbers: Sequence[int]) -> None:
+        """Build an empty trail."""
         self.numbers: Numbers = tuple(numbers)
-        # The operating system provides the memory only as it is written to.
+        # The operating system allocates this memory only when it is written to.
         self._positions = np.empty((MAX_TRAIL_ROWS, len(numbers), 2))
         self._times = np.empty(MAX_TRAIL_ROWS)
         self._count = 0
@@ -85,7 +86,7 @@ class Trail:
 
     @property
     def positions(self) -> Array:
-        """Positions of the present robots, (k, n, 2) m, the oldest first; nan where they do not work."""
+        """Positions of the current robots, (k, n, 2) m, oldest first; nan where they do not work."""
         return self._positions[: self._count]
 
     @property
@@ -108,9 +109,9 @@ class Trail:
         time : float, s
             Time of the positions.
         positions : (m, 2) array, m
-            Positions of the first m robots. The others do not work.
+            Positions of the robots in the first m columns. The others do not work.
         always : bool
-            Whether to append the positions in any case. They replace a row of the same time.
+            Whether to append the positions even if the last row is recent; one of the same time is replaced.
         """
         elapsed = time - self.last_time
         if elapsed < _SAME_TIME_S and always:
@@ -128,7 +129,7 @@ class Trail:
         self._note_starts(positions)
 
     def change_robots(self, numbers: Sequence[int]) -> None:
-        """Continue with the columns of other robots; the rows so far stay known to `get_until`."""
+        """Continue with the columns of another team; `get_until` still knows the earlier columns."""
         numbers = tuple(numbers)
         if numbers == self.numbers:
             return
@@ -160,7 +161,7 @@ class Trail:
         Returns
         -------
         (n, 2) array, m
-            The same array as before, as long as the starts are the same.
+            The same array object as in the last call, unless starts have changed.
         """
         trail = self._find_trail(time)
         key = tuple(numbers)
@@ -171,7 +172,7 @@ class Trail:
         return trail._start_arrays[key]
 
     def extract(self, start: float, end: float) -> list[TrailSection]:
-        """Return the rows from a time on and before another one, s, with the robots that each row has."""
+        """Return the rows with start <= time < end, s, in sections with the same team."""
         open_rows = slice(self._section_start, self._count)
         open_section = TrailSection(
             self.numbers, dict(self._starts), self._positions[open_rows], self._times[open_rows]
@@ -208,7 +209,7 @@ class Trail:
         self._count += len(times)
 
     def _note_starts(self, positions: Array) -> None:
-        """Note the positions of robots that have joined."""
+        """Store the positions of robots that have just joined as their starts."""
         for row, number in enumerate(self.numbers[: len(positions)]):
             if number not in self._starts:
                 x, y = positions[row].tolist()
@@ -216,7 +217,7 @@ class Trail:
                 self._start_arrays = {}
 
     def _find_trail(self, time: float) -> "Trail":
-        """Return the trail whose robots are those of the team at a time."""
+        """Return the trail with the team at a time, s: this one, or one built from earlier sections."""
         index = len(self._closed_sections)
         starts = [section.times[0] for section in self._closed_sections]
         if self._section_start < self._count:
@@ -231,7 +232,10 @@ class Trail:
         return self._earlier_trail[1]
 
     def _simplify(self) -> None:
-        """Remove a quarter of the rows: those without which the trajectories change least."""
+        """Remove a quarter of the rows: those whose removal changes the trajectories least.
+
+        Only every second row is a candidate, so that no two neighbors are removed.
+        """
         candidates = np.arange(1, self._count - 1, 2)
         deviations = _compute_deviations(self.positions, candidates)
         order = np.argsort(deviations, kind="stable")
@@ -246,14 +250,14 @@ class Trail:
 
 
 def build_trail(sections: Sequence[TrailSection]) -> Trail:
-    """Build the trail of sections in the order of time, of which there is at least one."""
+    """Build a trail from one or more sections in chronological order."""
     trail = Trail(sections[0].numbers)
     trail.extend(sections)
     return trail
 
 
 def merge_sections(sections: list[TrailSection], later: Iterable[TrailSection]) -> list[TrailSection]:
-    """Return sections, followed by the rows of others that are later than all of theirs."""
+    """Return sections, followed by those rows of `later` that come after their last row."""
     merged = [section for section in sections if len(section.times)]
     last_time = -np.inf
     if merged:
@@ -263,7 +267,7 @@ def merge_sections(sections: list[TrailSection], later: Iterable[TrailSection]) 
 
 
 def _compute_deviations(positions: Array, rows: IntArray) -> Array:
-    """Return how far the trajectories move if single rows are removed, (r,) m.
+    """Return how much the trajectories change if single rows are removed, (r,) m.
 
     A row at which a robot joins or fails has an infinite deviation.
 
@@ -272,14 +276,14 @@ def _compute_deviations(positions: Array, rows: IntArray) -> Array:
     positions : (k, n, 2) array, m
         All rows; nan for robots that do not work.
     rows : (r,) int array
-        Rows that have a neighbor on either side.
+        Rows to consider; each has a neighbor on both sides.
     """
     before = positions[rows - 1]
     point = positions[rows] - before
     chord = positions[rows + 1] - before
     with np.errstate(invalid="ignore", divide="ignore"):
         fraction = (point * chord).sum(axis=2) / (chord * chord).sum(axis=2)
-    # Without a chord, the nearest point is its start.
+    # If both neighbors are at the same point, the fraction is nan, and that point is the nearest.
     fraction = np.clip(np.nan_to_num(fraction), 0.0, 1.0)
     offset = point - fraction[..., None] * chord
     distances = np.hypot(offset[..., 0], offset[..., 1])
@@ -291,14 +295,14 @@ def _compute_deviations(positions: Array, rows: IntArray) -> Array:
 
 
 def select_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
-    """Return the positions of other robots.
+    """Rearrange the columns of positions for another team.
 
     Parameters
     ----------
     positions : (..., n, 2) array, m
         Positions of the robots `before`.
     before, after : sequence of int
-        Numbers of robots.
+        Numbers of the robots in the columns before and after.
 
     Returns
     -------
@@ -311,7 +315,7 @@ def select_robots(positions: Array, before: Sequence[int], after: Sequence[int])
 
 
 def rebuild_trail(history: RunHistory, pane: int) -> Trail:
-    """Build the trail from recorded states, for a run whose trail is not known.
+    """Build a trail from recorded states, for a run without a trail.
 
     Parameters
     ----------
@@ -331,7 +335,7 @@ def rebuild_trail(history: RunHistory, pane: int) -> Trail:
         is_edited = state.setup is not previous_setup
         is_last = index == len(history) - 1
         trail.change_robots(state.setup.tracked_numbers)
-        # The last state is always added, because it contains robots that have just joined.
+        # The last state is always added, because it may contain robots that have just joined.
         trail.add(history.get_time(index), state.positions, always=is_edited or is_last)
         previous_setup = state.setup
     return trail
