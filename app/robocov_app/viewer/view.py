@@ -1,8 +1,8 @@
-"""Appearance of the window: layers, theme, panel, options of the picture."""
+"""Appearance of the window: layers, theme, panel, and other display options."""
 
 from dataclasses import dataclass
 
-FADE_S = 12.0  # period that fading trajectories show
+FADE_S = 12.0  # duration for which fading trajectories are visible
 
 
 @dataclass
@@ -41,7 +41,7 @@ class ViewState:
         self.theme = "dark" if self.theme == "light" else "light"
 
     def toggle_fading(self) -> str:
-        """Switch between whole trajectories and their last seconds; return a message."""
+        """Switch between complete trajectories and their last seconds; return a message."""
         self.fades_trajectories = not self.fades_trajectories
         if self.fades_trajectories:
             return f"trajectories show the last {FADE_S:g} s"

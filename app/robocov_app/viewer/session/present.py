@@ -1,4 +1,4 @@
-"""The present of a timeline, and how it is built for any step of a document."""
+"""The present of a timeline, and building it for any step of a document."""
 
 import math
 from collections import defaultdict
@@ -19,12 +19,12 @@ from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.past.trails import TrailSection, build_trail, merge_sections
 
 MAX_SENSED_STATES = 300
-"""Maximum number of states from which the sensed points of another branch are recomputed."""
+"""Maximum number of states from which sensed points are recomputed after a move to another branch."""
 
 
 @dataclass(eq=False)
 class Present:
-    """Everything that is replaced as a whole when a timeline moves to another state.
+    """The present of a timeline, which is replaced as a whole when the timeline moves to another state.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Present:
 
     @classmethod
     def start(cls, root: Node) -> Self:
-        """Build the state at time 0 of a run.
+        """Build the present at time 0 of a run.
 
         Parameters
         ----------
@@ -66,7 +66,7 @@ class Present:
         return cls(root, run, history)
 
     def has_settled(self) -> bool:
-        """Return whether no robot has moved noticeably during the last seconds."""
+        """Return whether no robot has moved noticeably during the last `SETTLED_WINDOW_S` seconds."""
         run = self.run
         if run.drag is not None or run.time < SETTLED_WINDOW_S:
             return False
@@ -87,25 +87,25 @@ def build_present(
     step: int,
     edit: Callable[[Lockstep], None] | None = None,
 ) -> Generator[float, None, Present]:
-    """Build the state at a step of a node. The old present stays as it is.
+    """Build the present at a step of a node, in small pieces. The old present is not changed.
 
     Parameters
     ----------
     document : SessionDocument
         The document.
     old : Present
-        The present so far. Its recorded states are reused as far as they are on the path to the node.
+        The previous present. Its recorded states are reused if they are on the path to the node.
     node : Node
         A node of the document, or a new one.
     step : int
         A step of the node.
     edit : callable or None
-        Changes the run at that step.
+        Called with the run at that step, to change it.
 
     Yields
     ------
     float
-        Fraction of the steps that are done, after each of them, so that a caller can pause.
+        Fraction of the steps done so far, after each step, so that the caller can pause.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def build_present(
 def cache_present(document: SessionDocument, present: Present) -> None:
     """Store the states, trails and curves of the present in the nodes on the path to it.
 
-    They are used when the timeline returns to this branch from another one.
+    They are reused when the timeline returns to this branch from another one.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def cache_present(document: SessionDocument, present: Present) -> None:
 
 
 def _select_cached_states(recorded: list[RunState], cached: list[RunState]) -> list[RunState]:
-    """Return the recorded states and the later ones of the cached states, evenly thinned to the maximum."""
+    """Return the recorded states and later cached states, evenly thinned to `MAX_CACHED_STATES`."""
     last_recorded_step = recorded[-1].step if recorded else -1
     states = [*recorded, *(state for state in cached if state.step > last_recorded_step)]
     stride = max(math.ceil(len(states) / MAX_CACHED_STATES), 1)
@@ -181,12 +181,24 @@ def _select_cached_states(recorded: list[RunState], cached: list[RunState]) -> l
 
 
 def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, dt: float) -> None:
-    """Put the known trail of a path before that of the steps that were simulated again."""
+    """Prepend the trail stored in the nodes of a path to that of the steps that were simulated again.
+
+    Parameters
+    ----------
+    path : list of Node
+        Nodes from the root of the run to the present.
+    last_steps : mapping of int to int
+        Last step of each node on the path, by its number.
+    pane : Pane
+        Pane whose trail is extended.
+    dt : float, s
+        Control period.
+    """
     sections: list[TrailSection] = []
     for node, following in zip(path, [*path[1:], None], strict=True):
         end = last_steps[node.number] * dt
         if following is None:
-            # The edit of the following node replaces the row of its step; without one, the row belongs here.
+            # The first row of a following node replaces the row of its step; the last node keeps that row.
             end += 0.5 * dt
         sections += [section.cut(-np.inf, end) for section in node.trails.get(pane.number, [])]
     simulated = pane.trail.extract(-np.inf, np.inf)
@@ -194,7 +206,7 @@ def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, 
 
 
 def _copy_common_past(document: SessionDocument, old: Present, node: Node, step: int) -> RunHistory:
-    """Return the recorded states on the path to a step of a node; none if they are not known."""
+    """Return the known states on the path to a step of a node; an empty history if there are none."""
     path = document.get_path(node)
     last_steps = document.get_last_steps(node, step)
     path_numbers = [ancestor.number for ancestor in path]
@@ -205,11 +217,11 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
         if state.node in common_numbers and state.step <= last_steps[state.node]:
             common_count += 1
     if common_count:
-        # Two paths have their first nodes in common. Therefore the common states are the first ones, too.
+        # Paths share their first nodes, so the common states are the first ones of the history.
         history = old.history.copy_until(common_count - 1)
     else:
         history = RunHistory(path[0].require_scenario().dt)
-    # Other states may be known from another visit to the branch.
+    # Other states may be cached from an earlier visit to the branch.
     first_missing = path_numbers.index(history.last.node) if common_count else 0
     for ancestor in path[first_missing:]:
         for state in ancestor.cached_states:
@@ -220,7 +232,7 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
 
 
 def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Iterator[None]:
-    """Rebuild the trails, curves and sensed points of the panes of a new present, a piece at a time."""
+    """Restore trails, curves and sensed points of the panes of a new present; yield after each piece."""
     path = document.get_path(new.head)
     last_steps = document.get_last_steps(new.head, new.run.step)
     old_last_step = document.get_last_steps(old.head, old.run.step).get(new.head.number, -1)
@@ -240,7 +252,7 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Ite
 
 
 def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Iterator[None]:
-    """Sense again at some of the recorded states, one at a time."""
+    """Recompute the sensed points of a pane from some of the recorded states; yield after each state."""
     sensed = SensedPoints()
     stride = max(1, len(history) // MAX_SENSED_STATES)
     for index in range(0, len(history), stride):

@@ -29,7 +29,7 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECORD_BYTES = 400_000_000
-"""Memory for the states of records, without their arrays; in longer records, older states are thinned."""
+"""Maximum memory for states of records, without their arrays; of longer records, older states are thinned."""
 STATE_BYTES = 1500
 """Approximate memory for the state of one pane, without the arrays of the record."""
 _PERIOD_TOLERANCE = 1e-6
@@ -39,15 +39,15 @@ _FORCE_TOLERANCE = 1e-9
 def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] = ()) -> Session:
     """Build a session whose past is a saved run, or the runs of a comparison side by side.
 
-    It displays time 0, and plays.
+    It displays time 0 and is playing.
 
     Parameters
     ----------
     saved : sequence of SavedRun
         The runs, one for each pane.
     controllers : sequence of str
-        Controllers in files of the user's own that may be run, so that their runs can be continued. They
-        are names that the user has typed, never names in the runs themselves.
+        Controllers in users' files that may be loaded, so that their runs can be continued. These are names
+        that the user has typed, never names found in the runs themselves.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] =
 
 
 def get_control_period(record: Record) -> float:
-    """Return the control period of a record, s; its states may be farther apart."""
+    """Return the control period of a record, s; the interval of its states may be a multiple of that."""
     dt = float(record.session.get("control_dt_s", record.dt))
     steps = record.dt / dt
     is_multiple = abs(steps - round(steps)) < _PERIOD_TOLERANCE
@@ -93,7 +93,7 @@ def get_control_period(record: Record) -> float:
 
 
 def _detect_period(record: Record) -> Record:
-    """Return a thinned record with the time between its states as `dt`, if that is always the same."""
+    """Return a record with `dt` replaced by the interval of its states, if it was thinned evenly."""
     interval = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
     steps = round(interval / record.dt)
     if steps <= 1 or abs(interval / record.dt - steps) > _PERIOD_TOLERANCE:
@@ -122,7 +122,7 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
 
 
 def _describe_run(record: Record) -> Mapping[str, object]:
-    """Return the properties that must be the same for runs side by side."""
+    """Return the properties that runs must share to be displayed side by side."""
     return {
         "dt_s": record.dt,
         "moments": len(record),
@@ -133,7 +133,7 @@ def _describe_run(record: Record) -> Mapping[str, object]:
 
 
 def _build_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
-    """Build the scenario of several runs from the record of the first."""
+    """Build the scenario of several runs from the record of the first run."""
     roster = build_roster(record)
     return SessionScenario(
         roster.environment,
@@ -150,7 +150,7 @@ def _build_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -
 
 
 def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunHistory:
-    """Build the past of a session from records."""
+    """Build the recorded past of a session from records, one for each pane."""
     first = records[0]
     dt = scenario.dt
     pane_states = []
@@ -168,7 +168,7 @@ def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunH
 
 
 def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
-    """Return the events of robots that were dragged while a record was made."""
+    """Return an event for each drag of robots while the record was made."""
     events = []
     for drag in record.session.get("touched", ()):
         numbers = ", ".join(map(str, drag["robots"]))
@@ -177,8 +177,8 @@ def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
 
 
 def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
-    """Build the states of a pane from a record."""
-    # Broadcast arrays are views that cannot be written to.
+    """Build the state of a pane at each time of a record."""
+    # broadcast_to returns read-only views, so that the record cannot be changed by accident.
     positions = np.broadcast_to(record.positions, record.positions.shape)
     velocities = np.broadcast_to(record.velocities, record.velocities.shape)
     forces = np.broadcast_to(record.forces, record.forces.shape)
@@ -187,7 +187,7 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
     setups = _build_setups(record, setup)
     states = []
     for index in range(len(record)):
-        rows: Any = slice(None)
+        rows: Any = slice(None)  # all robots, unless some do not work in this state
         if setups[index] is not setup:
             rows = np.flatnonzero(record.working[index])
         has_goals = not np.isnan(record.goals[index]).all()
@@ -207,7 +207,7 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
 
 
 def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
-    """Return the setup of each state, in which robots may have failed or joined."""
+    """Return the setup of each state; states with the same working and failed robots share one."""
     if record.conditions is None:
         return [setup] * len(record)
     setup_by_robots: dict[bytes, PaneSetup] = {}
@@ -226,13 +226,13 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
 
 
 def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
-    """Return the memory of the controller at each state, by letting it decide again.
+    """Recompute the memory of the controller at each state by letting it decide again.
 
-    It is None if the controller is missing or has no memory, and after the first decision that differs from
-    the record.
+    The memory is None if the controller is missing or has no memory, and at all states after the first
+    decision that differs from the record.
     """
     memories: list[Any] = []
-    # A user's controller may raise anything, and a missing one cannot be built.
+    # A user's controller may raise any exception, and a missing one cannot be built.
     with suppress(BaseException):
         controller = choice.build()
         if not has_memory(controller):
@@ -252,7 +252,7 @@ def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
 
 
 def _resume_end(last: RunState) -> Lockstep:
-    """Resume the end of a record; missing controllers have placeholders until a decision is needed."""
+    """Resume the last state of a record; placeholders stand in for missing controllers."""
     states = {}
     for number, state in last.states.items():
         setup = replace(state.setup, controller=use_placeholder(state.setup.controller))

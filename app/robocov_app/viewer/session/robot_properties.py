@@ -1,4 +1,4 @@
-"""Properties of the robots of a session, whose number may change."""
+"""Properties of the robots of a session, independent of how many robots there are."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ PropertyValue: TypeAlias = Annotated[float, _VALUE]
 
 @dataclass(frozen=True)
 class RobotProperties:
-    """Properties of each robot, from which the team of any number of robots is built.
+    """Properties of robots, from which a team of any size is built.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class RobotProperties:
 turning_rate : float
         As in `Team`, in SI units; infinite for no limit.
     different : mapping
-        Values of single robots, by property and robot number.
+        Values of single robots that differ, by property and robot number.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -67,13 +67,13 @@ turning_rate : float
         team : Team
             The robots.
         numbers : sequence of int or None
-            Their numbers; by default from 1.
+            Numbers of the robots; by default 1, 2, ...
 
         Returns
         -------
         RobotProperties
-            Properties that are not the same for all robots have the value of the first one, and differ for
-            single robots.
+            If a property is not the same for all robots, the common value is that of the first robot, and
+            `different` lists the values of all robots.
         """
         if numbers is None:
             numbers = range(1, len(team) + 1)
@@ -86,7 +86,7 @@ turning_rate : float
         return cls(**first_values, different=different)
 
     def build_team(self, numbers: Sequence[int]) -> Team:
-        """Build the team of the robots with these numbers.
+        """Build the team of the robots with the given numbers.
 
         Raises
         ------
@@ -108,7 +108,7 @@ turning_rate : float
 
 
 def _drop_defaults(properties: RobotProperties, serialize: Any) -> dict[str, Any]:
-    """Write properties, without the optional keys that have their default values."""
+    """Serialize properties, but omit optional keys with default values."""
     optional: dict[str, object] = {
         "different": {},
         "communication_range": None,

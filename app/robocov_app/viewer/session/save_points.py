@@ -1,4 +1,4 @@
-"""States to which a session returns after an unexpected error."""
+"""Save points, to which a session returns after an unexpected error."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ from robocov_app.viewer.session.timeline import Timeline
 
 @dataclass(frozen=True)
 class SavePoint:
-    """State of a timeline to which it can return.
+    """State of a timeline, to which the timeline can return.
 
     Attributes
     ----------
     head : Node
-        The head.
+        Head of the timeline.
     head_edits : tuple of SessionEdit
-        Its edits.
+        Edits of the head.
     head_kind, head_description : str
-        Its kind and description.
+        Kind and description of the head.
     node_count : int
         Number of nodes of the document.
     revision : int
@@ -36,17 +36,17 @@ class SavePoint:
     run : Lockstep
         The run.
     run_key : tuple
-        Values that are different after an edit or a step.
+        Values at least one of which changes with each edit or step.
     panes : tuple of Pane
         The panes.
     history : RunHistory
         The recorded past.
     last : RunState
-        Its newest state.
+        Newest state of the history.
     shown_index : int or None
-        The displayed state.
+        Index of the displayed state; None for the present.
     record_end_time : float or None, s
-        The end of the record.
+        End of the record from which the session started; None if there is none.
     """
 
     head: Node
@@ -84,7 +84,7 @@ def build_save_point(timeline: Timeline) -> SavePoint:
 
 
 def is_at_save_point(timeline: Timeline, point: SavePoint) -> bool:
-    """Return whether a timeline is unchanged since a save point, apart from the displayed state."""
+    """Return whether a timeline is the same as at a save point, apart from the displayed state."""
     return (
         timeline.run is point.run
         and _build_run_key(timeline.run) == point.run_key
@@ -102,14 +102,14 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
     Parameters
     ----------
     timeline : Timeline
-        The timeline, which an unexpected error may have left in any state.
+        The timeline, which an unexpected error may have left in an inconsistent state.
     point : SavePoint
         The state to return to.
     """
     _restore_document(timeline, point)
     point.history.rewind(point.last)
     run = point.run
-    # A record whose controller no longer exists cannot be resumed, but it was not changed either.
+    # If the controller of a record no longer exists, its run cannot be resumed, but has not changed either.
     with suppress(RobocovError):
         run = Lockstep.resume(point.last)
     old_panes = {pane.number: pane for pane in point.panes}
@@ -142,6 +142,6 @@ def _restore_document(timeline: Timeline, point: SavePoint) -> None:
 
 
 def _build_run_key(run: Lockstep) -> tuple[object, ...]:
-    """Return values of a run that are different after an edit or a step."""
+    """Return values of a run, at least one of which changes with each edit or step."""
     panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
     return run.step, run.drag, id(run.scenario), *panes

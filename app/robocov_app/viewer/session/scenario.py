@@ -19,7 +19,7 @@ from robocov_app.viewer.session.robot_properties import FileProperties, RobotPro
 MAX_ROBOTS = 1000
 """Maximum number of robots in the window."""
 MAX_COMMUNICATING_ROBOTS = 100
-"""Maximum number of robots if each of them stores the messages of every other robot."""
+"""Maximum number of robots if every robot stores the messages of all others."""
 MAX_PANES = 4
 """Maximum number of controllers that are compared side by side."""
 DEFAULT_PROPERTIES = RobotProperties()
@@ -45,7 +45,7 @@ _CONDITIONS = convert_field(
 
 @dataclass(frozen=True, eq=False)
 class SessionScenario:
-    """Everything that the panes of a session start from: one `robocov.Scenario` for each controller.
+    """What the panes of a session start from: one `robocov.Scenario` for each controller.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class SessionScenario:
     robots : int
         Number of robots.
     start : str or None
-        Name of the start of the map; by default its first.
+        Name of a start of the map; None for its first one.
     seed : int
         Seed of the starting positions.
     properties : RobotProperties
@@ -64,11 +64,11 @@ class SessionScenario:
     dt : float, s
         Control period.
     given_starts : (n, 2) array or None, m
-        Starting positions, unless they are sampled.
+        Starting positions; None to sample them.
     velocities : (n, 2) array or None, m/s
         Initial velocities of robots with given starts.
     conditions : Conditions or None
-        Noise, message loss, and robots that fail or join by themselves.
+        Noise, message loss, and robots that fail or join at given times.
 
     Raises
     ------
@@ -103,7 +103,7 @@ class SessionScenario:
 
     @property
     def start_name(self) -> str:
-        """Name of the start, even if the map no longer contains it."""
+        """Name of the start, even if an edit has removed it from the map."""
         if self.start is not None and self.start not in self.environment.starts:
             return self.start
         return self.environment.start(self.start).name
@@ -120,7 +120,7 @@ class SessionScenario:
         return self.build_scenario().starts
 
     def build_scenario(self, pane: int = 0) -> Scenario:
-        """Build the scenario of one of the controllers.
+        """Build the scenario for one of the controllers.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A seek in progress: the way of a timeline to another state, in pieces that fit between frames."""
+"""A seek: the move of a timeline to another state, computed in pieces that fit between frames."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.present import Present
 
 MIN_NOTICED_SEEK_S = 0.3
-"""Time after which the progress of a seek is shown."""
+"""Duration of a seek after which its progress is shown."""
 
 
 @dataclass(eq=False)
@@ -18,13 +18,13 @@ class Seek:
     Attributes
     ----------
     pieces : generator
-        Computes the next piece, yields the fraction that is done, and returns the new present at the end.
+        Generator that yields the fraction done after each piece, and returns the new present.
     node : Node
-        Node to which it leads.
+        Node to which the seek leads.
     step : int
         Step of that node.
     fraction : float
-        Fraction that is done.
+        Fraction done so far.
     """
 
     pieces: Generator[float, None, Present]
@@ -34,7 +34,7 @@ class Seek:
     _start_s: float = field(default_factory=perf_counter)
 
     def advance(self, seconds: float) -> Present | None:
-        """Compute for some time, s.
+        """Continue the computation for about the given time, s.
 
         Returns
         -------
@@ -53,7 +53,7 @@ class Seek:
 
     @property
     def progress(self) -> float | None:
-        """Fraction that is done, if the seek has been in progress for a noticeable time."""
+        """Fraction done so far; None while the seek is too short to be noticed."""
         if perf_counter() - self._start_s < MIN_NOTICED_SEEK_S:
             return None
         return self.fraction

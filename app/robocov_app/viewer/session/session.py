@@ -1,4 +1,4 @@
-"""The session of the window: every edit that users can make."""
+"""The session of the window, with all edits that users can make."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -43,9 +43,9 @@ from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 MIN_PUSH_M = 5e-3
-"""A robot counts as pushed if an obstacle moves it by more; robots in contact always move a little."""
+"""A robot counts as pushed if an obstacle moves it by more than this; contacts always move it a little."""
 GESTURE_WINDOW_S = 1.0
-"""Simulated time within which changes of the same value, for example by a slider, count as one edit."""
+"""Changes of the same value within this simulated time, such as by a slider, count as one edit."""
 _DRAG_DECIMALS = 4
 _FIELDS_OF_STARTS = {"environment", "robots", "start", "seed"}
 """Fields of a scenario that determine the starting positions, unless these are given."""
@@ -58,7 +58,7 @@ class _Gesture:
     Attributes
     ----------
     key : object
-        Robot, gain or stroke that is edited.
+        Identifies the robot, gain or stroke that is edited.
     time : float, s
         Time of the last edit.
     past_version : int
@@ -70,10 +70,10 @@ class _Gesture:
     past_version: int
 
     def continues(self, key: object, kind: str, timeline: Timeline) -> bool:
-        """Return whether an edit with a key, of a kind, belongs to the gesture."""
+        """Return whether an edit with this key and of this kind continues the gesture."""
         if key != self.key or timeline.past_version != self.past_version:
             return False
-        # A robot may be dragged for any time.
+        # A drag of a robot may last for any time.
         return kind == "hand" or timeline.end_time - self.time < GESTURE_WINDOW_S
 
 
@@ -88,7 +88,7 @@ class Session:
     scenario : SessionScenario or None
         Map, robots and controllers at time 0.
     timeline : Timeline or None
-        The timeline of a session that exists already, instead of a scenario.
+        Timeline of an existing session, instead of a scenario.
 
     Attributes
     ----------
@@ -118,14 +118,14 @@ class Session:
 
     @classmethod
     def open(cls, saved: SavedSession, seconds: float = np.inf) -> Self:
-        """Recompute the session of a file up to its present. It is paused.
+        """Open a session from the content of a file, recomputed up to its present. It is paused.
 
         Parameters
         ----------
         saved : SavedSession
             Content of the file.
         seconds : float, s
-            Time that the call may take. If it is not enough, playback does the rest.
+            Maximum time for the call. If it is not enough, the next frames do the rest.
 
         Returns
         -------
@@ -149,12 +149,12 @@ class Session:
         description : str
             Description of the edit.
         gesture : object
-            Consecutive edits with an equal gesture, other than None, count as one.
+            Consecutive edits with the same gesture count as one; None for an edit of its own.
 
         Raises
         ------
         StartError, ParameterError, MapError
-            If the edit is not possible. Nothing changes then.
+            If the edit is not possible. Then nothing has changed.
         """
         timeline = self.timeline
         timeline.finish_seek()
@@ -232,9 +232,9 @@ class Session:
         timeline.document.revision += 1
 
     def branch(self) -> bool:
-        """Make the displayed state the present, and return whether it was in the past.
+        """Make the displayed state the present; return False if it already is.
 
-        The later states stay as a branch.
+        The later states are kept as another branch.
         """
         timeline = self.timeline
         if timeline.is_live:
@@ -244,7 +244,7 @@ class Session:
         return True
 
     def seek(self, node: Node, step: int | None = None) -> None:
-        """Go to a step of a node; see `Timeline.seek`. Long simulations continue with each frame."""
+        """Go to a step of a node; see `Timeline.seek`. Long computations continue in the next frames."""
         self.timeline.seek(node, step, seconds=self.playback.seek_seconds)
 
     def undo(self) -> str | None:
@@ -277,28 +277,29 @@ class Session:
         return node.description
 
     def show_time(self, time: float) -> None:
-        """Display the recorded state at a time, s. A dragged robot is released."""
+        """Release a dragged robot, and display the recorded state at a time, s."""
         self.release()
         self.timeline.show(self.timeline.history.find_index(time))
 
     def show_offset(self, offset: int) -> None:
-        """Display a later or earlier recorded state. A dragged robot is released."""
+        """Release a dragged robot, and display the state that is `offset` states later (or earlier)."""
         self.release()
         self.timeline.show(max(self.timeline.displayed_index + offset, 0))
 
     def build_save_point(self) -> SavePoint:
-        """Note the present state, for `restore`."""
+        """Return the present state as an argument for `restore`."""
         return build_save_point(self.timeline)
 
     def restore(self, point: SavePoint, *, in_step: bool) -> None:
-        """Return to an earlier state after an unexpected error, and pause; do nothing if it is the same.
+        """Return to a save point after an unexpected error, and pause; do nothing if nothing has changed.
 
         Parameters
         ----------
         point : SavePoint
             State to return to.
         in_step : bool
-            Whether a step of the simulation may have been interrupted, which leaves no other trace.
+            Whether the error may have interrupted a simulation step, which a comparison with the save point
+            cannot detect.
         """
         is_step_interrupted = in_step and self.playback.is_playing
         if is_at_save_point(self.timeline, point) and not is_step_interrupted:
@@ -324,7 +325,7 @@ class Session:
             self.apply(SetRobotProperties(properties), "limits", "limits changed", "limits")
 
     def add_pane(self, controller: ControllerChoice) -> None:
-        """Restart with another controller alongside the others."""
+        """Restart with an additional controller side by side with the others."""
         if len(self.timeline.panes) >= MAX_PANES:
             raise ParameterError(f"expected at most {MAX_PANES} controllers side by side")
         self.restart(controllers=(*self.timeline.scenario.controllers, controller))
@@ -334,7 +335,7 @@ class Session:
         self.apply(RemovePane(pane.number), "pane", f"{pane.controller.label} removed")
 
     def edit_map(self, environment: Environment, description: str) -> int:
-        """Replace the obstacles of the map by those of another one.
+        """Replace the obstacles of the map with those of another map.
 
         Parameters
         ----------
@@ -346,14 +347,14 @@ class Session:
         Returns
         -------
         int
-            Number of robots that an obstacle has pushed, in the pane with most of them.
+            Number of robots that were pushed by obstacles, in the pane with the most of them.
 
         Raises
         ------
         StartError
             If there is no space for a robot.
         MapError
-            If the map breaks a rule.
+            If the map is invalid.
         """
         edit = compare_obstacles(self.displayed.environment, environment)
         before = {pane.number: self.displayed.get_positions(pane) for pane in self.timeline.panes}
@@ -378,13 +379,13 @@ class Session:
         lowers : bool
             Whether the density is lowered.
         stroke : object
-            The stroke of the brush to which the dabs belong; it counts as one edit.
+            Identifies the brush stroke to which the dabs belong. A stroke counts as one edit.
         """
         description = "density lowered" if lowers else "density raised"
         self.apply(PaintDensity(dabs, radius, lowers), "density", description, ("stroke", stroke))
 
     def drag_robot(self, number: int, point: Point) -> None:
-        """Drag a robot to a point by a spring; place it there if it has failed or the session is paused."""
+        """Pull a robot to a point by a spring; if it has failed or the session is paused, place it there."""
         if self.playback.is_playing and number in self.displayed.numbers:
             to = round(float(point[0]), _DRAG_DECIMALS), round(float(point[1]), _DRAG_DECIMALS)
             self.apply(DragRobot(number, to), "hand", f"robot {number} was dragged", ("hand", number))
@@ -392,19 +393,19 @@ class Session:
             self.place_robot(number, point)
 
     def release(self) -> None:
-        """Release the robot that is dragged, if there is one."""
+        """Release the dragged robot, if there is one, and end the current gesture."""
         if self.timeline.run.drag is not None and self.timeline.is_live:
             number, _ = self.timeline.run.drag
             self.apply(ReleaseRobot(), "hand", f"robot {number} was dragged", ("hand", number))
         self._gesture = None
 
     def place_robot(self, number: int, point: Point) -> None:
-        """Put a robot at a point, or the nearest free one. Calls until `release` count as one edit."""
+        """Put a robot at the free point nearest to a given one; calls until `release` count as one edit."""
         at = float(point[0]), float(point[1])
         self.apply(PlaceRobot(number, at), "hand", f"robot {number} was moved", ("place", number))
 
     def add_robot(self, point: Point) -> int:
-        """Add a robot at a point, or the nearest free one, and return its number."""
+        """Add a robot at the free point nearest to a given one, and return its number."""
         number = self.displayed.get_setup(self.timeline.panes[0]).all_numbers[-1] + 1
         at = float(point[0]), float(point[1])
         self.apply(AddRobot(number, at), "robot", f"robot {number} joined")
@@ -429,7 +430,7 @@ def _apply_in_past(timeline: Timeline, edit: RunEdit) -> bool:
     Returns
     -------
     bool
-        Whether a robot was released that was dragged at that step.
+        Whether a robot that was being dragged at that step has been released.
     """
     shown = timeline.history[timeline.displayed_index]
     releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
@@ -444,7 +445,7 @@ def _apply_in_past(timeline: Timeline, edit: RunEdit) -> bool:
 
 
 def toggle_failure(session: Session, number: int) -> str:
-    """Let a robot fail, or work again if it has failed; return the description of the edit."""
+    """Let a robot fail, or if it has failed, work again; return the description of the edit."""
     if number in session.displayed.get_setup(session.timeline.panes[0]).failed:
         session.revive_robot(number)
     else:
@@ -453,10 +454,10 @@ def toggle_failure(session: Session, number: int) -> str:
 
 
 def _extend_node(node: Node, edit: RunEdit, kind: str, description: str) -> None:
-    """Add an edit to the node of its gesture."""
+    """Add an edit to the node of the gesture that it continues."""
     last = node.edits[-1]
     is_same_drag = isinstance(edit, DragRobot) and isinstance(last, DragRobot) and last.step == edit.step
-    # Only the last point of a drag matters within a step; other edits add up.
+    # Of several drag points within a step, only the last one matters; other edits accumulate.
     if is_same_drag and len(node.edits) > 1:
         node.edits.pop()
     node.edits.append(edit)
@@ -465,11 +466,11 @@ def _extend_node(node: Node, edit: RunEdit, kind: str, description: str) -> None
 
 
 def _change_scenario(old: SessionScenario, changes: Mapping[str, Any]) -> SessionScenario:
-    """Return a scenario with changes, and with starting positions that fit them."""
+    """Return a scenario with changes; drop starting positions and a start that no longer fit it."""
     changed = dict(changes)
     if changed.keys() & _FIELDS_OF_STARTS:
         changed["given_starts"] = None
-    # An edit may have covered the start.
+    # An edit may have covered the start with an obstacle, which removes it from the map.
     is_start_available = old.start in {None, "uniform", *old.environment.starts}
     if "environment" in changed or not is_start_available:
         changed.setdefault("start", None)
@@ -477,7 +478,7 @@ def _change_scenario(old: SessionScenario, changes: Mapping[str, Any]) -> Sessio
 
 
 def _describe_restart(old: SessionScenario, new: SessionScenario) -> str:
-    """Describe the differences between the scenarios before and after a restart."""
+    """Describe what has changed from the scenario before a restart to the new one."""
     parts = [f"{controller.label} compared" for controller in new.controllers[len(old.controllers) :]]
     if new.environment is not old.environment:
         parts.append(f"map {new.environment.name}")

@@ -1,4 +1,4 @@
-"""The timeline of a session: the present, the recorded past, and the branches of the document."""
+"""The timeline of a session: its present, its recorded past, and the branches of the document."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ _TIME_TOLERANCE_S = 1e-9
 
 
 class Timeline:
-    """The present of a session, the past that led to it, and the branches to which it can move.
+    """The present of a session, the past that led to it, and moves to other branches.
 
     `advance` simulates one step. `seek` is the only way to any other state: it builds that state completely
     before it replaces the present, so that an error changes nothing. `show` only selects which recorded
@@ -33,9 +33,9 @@ class Timeline:
     present : Present or None
         The present; by default time 0 of the first node.
     record_end_time : float or None, s
-        Time up to which the present was recorded by another run.
+        End of the record from which the session started; None if it did not start from a record.
     is_record_reproducible : bool
-        Whether the document leads to the end of that record.
+        Whether replaying the document reproduces that record.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Timeline:
     is_settled : bool
         Whether no robot has moved noticeably for some time.
     past_version : int
-        Number that grows when the past is replaced.
+        Number that increases when the past is replaced.
     pending_seek : Seek or None
         The seek in progress.
     """
@@ -71,6 +71,7 @@ class Timeline:
         *,
         is_record_reproducible: bool = True,
     ) -> None:
+        """Start at a given present, or at time 0 of the first node."""
         self.document = document
         self.record_end_time = record_end_time
         self.is_record_reproducible = is_record_reproducible
@@ -81,12 +82,12 @@ class Timeline:
 
     @property
     def scenario(self) -> SessionScenario:
-        """Map, controllers and properties of the robots at present."""
+        """Current map, controllers and properties of the robots."""
         return self.run.scenario
 
     @property
     def panes(self) -> list[Pane]:
-        """The panes, at the present step."""
+        """The panes at the present step."""
         return self.run.panes
 
     @property
@@ -113,7 +114,7 @@ class Timeline:
 
     @property
     def is_reproducible(self) -> bool:
-        """Whether the document leads to the present."""
+        """Whether replaying the document reproduces the present."""
         return self.record_end_time is None or self.is_record_reproducible
 
     @property
@@ -148,21 +149,21 @@ class Timeline:
         return self._ghosts
 
     def require_reproducible(self) -> None:
-        """Raise a ParameterError unless the document leads to the present, with controllers that exist."""
+        """Raise a ParameterError unless the document reproduces the present, with controllers that exist."""
         if not self.is_reproducible:
             raise ParameterError("the session started from a record that cannot be recomputed")
         for pane in self.panes:
             pane.controller.build()
 
     def show(self, index: int) -> None:
-        """Display a recorded state, or the present if the index is that of the last state or greater."""
+        """Display the recorded state with an index; from the last state on, this is the present."""
         self.shown_index = index if index < len(self.history) - 1 else None
         self._calls_at_shown_state = 0
 
     def show_next(self) -> None:
-        """Display the next recorded state, after as many calls as there are steps between the two.
+        """Play one step of the past; display the next recorded state once its step is reached.
 
-        Thus the past plays at the same speed even where it was thinned.
+        Where the past was thinned, several calls pass before that, so that it plays at the same speed.
         """
         assert self.shown_index is not None
         shown = self.history[self.shown_index]
@@ -183,11 +184,11 @@ class Timeline:
             self.is_settled = Present(self.head, self.run, self.history).has_settled()
 
     def follow(self, node: Node | None) -> None:
-        """Repeat the edits on the path to a node when their time comes; stop repeating them if it is None."""
+        """Repeat the edits on the path to a node when their step is reached; None to stop this."""
         self._followed_path = [] if node is None else self.document.get_path(node)
 
     def _repeat_followed_edits(self) -> None:
-        """Enter the next nodes of the path that is followed if they start at the present step."""
+        """Enter the next nodes of the followed path if they start at the present step."""
         if self.head not in self._followed_path:
             self._followed_path = []
             return
@@ -220,7 +221,7 @@ class Timeline:
         edit: Callable[[Lockstep], None] | None = None,
         seconds: float = np.inf,
     ) -> None:
-        """Make a step of a node the present. If an error is raised, nothing changes.
+        """Make a step of a node the present; if an error is raised, nothing changes.
 
         A seek that is still in progress is abandoned.
 
@@ -229,11 +230,11 @@ class Timeline:
         node : Node
             A node of the document, or a new one that starts a run, which is then added to the document.
         step : int or None
-            A step of the node; by default its last.
+            A step of the node; by default its last one.
         edit : callable or None
-            Changes the run at that step before it becomes the present.
+            Called with the run at that step, to change it before it becomes the present.
         seconds : float, s
-            Time that the call may take. If it is not enough, `continue_seek` does the rest.
+            Maximum time for the call. If it is not enough, `continue_seek` must do the rest.
 
         Raises
         ------
@@ -247,15 +248,15 @@ class Timeline:
         self.continue_seek(seconds)
 
     def finish_seek(self) -> None:
-        """Complete the seek that is in progress, if there is one."""
+        """Complete the seek in progress, if there is one."""
         self.continue_seek(np.inf)
 
     def continue_seek(self, seconds: float) -> None:
-        """Continue the seek that is in progress, if there is one, for some time, s."""
+        """Continue the seek in progress, if there is one, for about the given time, s."""
         pending = self.pending_seek
         if pending is None:
             return
-        # Any exception ends the seek.
+        # If an exception is raised, the seek is no longer pending.
         self.pending_seek = None
         present = pending.advance(seconds)
         if present is None:
@@ -264,7 +265,7 @@ class Timeline:
             self.replace_present(present)
 
     def replace_present(self, present: Present) -> None:
-        """Replace the present, and display the new one, as the last step of `seek`."""
+        """Replace the present, and display the new one; this is the last step of a seek."""
         if present.head.number == len(self.document.nodes):
             self.document.nodes.append(present.head)
         self.pending_seek = None
@@ -278,5 +279,5 @@ class Timeline:
         self._ghosts = None
 
     def cache_present(self) -> None:
-        """Keep the curves of the present in the document, together with those of other branches."""
+        """Store the states, trails and curves of the present in the nodes of the document."""
         cache_present(self.document, Present(self.head, self.run, self.history))

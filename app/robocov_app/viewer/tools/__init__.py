@@ -1,4 +1,4 @@
-"""Tools of the viewer: actions of the mouse on the canvas.
+"""Tools of the viewer, which are used with the mouse on the canvas.
 
 ``tool``      base class of the tools, and their previews
 ``hand``      drag robots and obstacles
@@ -6,6 +6,6 @@
 ``segments``  the ruler, and circles from their center
 ``brush``     paint the density
 ``clicks``    delete, add a robot, let a robot fail
-``snapping``  corners and walls attract new points
-``toolbox``   all of them, by name
+``snapping``  snapping of new points to corners and walls
+``toolbox``   all tools, by name
 """

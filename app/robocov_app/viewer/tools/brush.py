@@ -1,4 +1,4 @@
-"""The brush: paints the density while the simulation runs."""
+"""The brush, which paints the density while the simulation runs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, V
 DEFAULT_RADIUS_FRACTION = 0.1  # of the map's diameter
 MIN_RADIUS_FRACTION = 1 / 200
 MAX_RADIUS_FRACTION = 1 / 2
-DAB_SPACING_FRACTION = 0.25  # of the radius, from one dab to the next
-APPLY_INTERVAL_S = 0.08  # between two updates of the density during a stroke
-_RING_POINTS = 48  # of the circle that shows the brush
+DAB_SPACING_FRACTION = 0.25  # distance between dabs as a fraction of the radius
+APPLY_INTERVAL_S = 0.08  # minimum time between updates of the density during a stroke
+_RING_POINTS = 48  # number of points of the circle that shows the brush
 
 
 @dataclass
@@ -26,13 +26,13 @@ class BrushTool(ViewerTool):
     Attributes
     ----------
     radius : float or None
-        Radius, m; None until it is first needed, when it becomes a tenth of the map's diameter.
+        Radius, m. It is None until it is first needed; then it is chosen by the size of the map.
     lowers : bool
-        Whether a stroke lowers the density.
+        Whether the current stroke lowers the density.
     clock : callable
-        Clock, s.
+        Returns the time, s; replaced in tests.
     is_painting : bool
-        Whether a stroke has started and not ended.
+        Whether a stroke is in progress.
     """
 
     name = "brush"
@@ -48,20 +48,20 @@ class BrushTool(ViewerTool):
     clock: Callable[[], float] = field(default=perf_counter, repr=False)
     is_painting: bool = False
     _dabs: list[Point] = field(default_factory=list, repr=False)  # not applied to the map yet
-    _stroke: int = 0  # number of the stroke: its dabs are one change
+    _stroke: int = 0  # number of the stroke, whose dabs count as one edit
     _boundary: Ring = ()  # of the map when the stroke started
     _cursor: Point | None = None
     _applied_at: float = -1e9
 
     def get_radius(self, session: Session) -> float:
-        """Return the radius, m; choose one that suits the map if there is none yet."""
+        """Return the radius, m; if there is none yet, choose one that suits the map."""
         if self.radius is None:
             diameter = session.displayed.environment.region.diameter
             self.radius = float(f"{DEFAULT_RADIUS_FRACTION * diameter:.2g}")
         return self.radius
 
     def resize(self, session: Session, factor: float) -> str:
-        """Multiply the radius by a factor."""
+        """Multiply the radius by a factor, and return a message."""
         diameter = session.displayed.environment.region.diameter
         min_radius = MIN_RADIUS_FRACTION * diameter
         max_radius = MAX_RADIUS_FRACTION * diameter
@@ -70,7 +70,7 @@ class BrushTool(ViewerTool):
         return f"the brush has a radius of {self.radius:g} m"
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Start a stroke, which lowers the density with the right button."""
+        """Start a stroke; with the right button, it lowers the density."""
         self.lowers = event.is_right
         self.is_painting = True
         self._cursor = event.raw
@@ -81,7 +81,7 @@ class BrushTool(ViewerTool):
         return None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Continue the stroke in dabs of equal distance; show the brush at the cursor."""
+        """Continue the stroke with equally spaced dabs; without a stroke, only move the brush."""
         if not self.is_painting or self._cursor is None:
             self._cursor = event.raw
             return
@@ -115,7 +115,7 @@ class BrushTool(ViewerTool):
         return "density raised"
 
     def cancel(self, session: Session) -> bool:
-        """Undo the stroke that is being painted."""
+        """Undo the stroke in progress; return whether there was one."""
         was_painting = self.is_painting
         self.is_painting = False
         self._cursor = None
@@ -124,7 +124,7 @@ class BrushTool(ViewerTool):
         return was_painting
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
-        """Return the outline of the brush, with the density at the cursor."""
+        """Return the outline of the brush, labeled with the density at the cursor."""
         if self._cursor is None:
             return ViewerDrawState()
         angles = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS + 1)
@@ -137,7 +137,7 @@ class BrushTool(ViewerTool):
         return ViewerDrawState(ring, label=f"φ {value:.2g}", has_marks=False)
 
     def _apply(self, session: Session) -> None:
-        """Paint the dabs that were not applied yet."""
+        """Apply the dabs that have not been applied yet."""
         dabs = tuple(self._dabs)
         self._dabs = []
         session.paint(dabs, self.get_radius(session), lowers=self.lowers, stroke=self._stroke)

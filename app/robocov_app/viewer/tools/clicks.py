@@ -1,10 +1,10 @@
-"""Tools that act on a click: delete, add a robot, let a robot fail."""
+"""Tools that act on a single click: deleting, adding a robot, letting a robot fail."""
 
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session, toggle_failure
 from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, change_map
 
-ERASE_REACH_FRACTION = 0.5  # of a finger's width: obstacles this close to the cursor are deleted
+ERASE_REACH_FRACTION = 0.5  # fraction of the reach within which a click deletes an obstacle
 
 
 class EraserTool(ViewerTool):
@@ -40,7 +40,7 @@ class AddRobotTool(ViewerTool):
     hint = "click where a robot should join"
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Add a robot at the cursor, or as close to it as there is space."""
+        """Add a robot at the free position nearest to the cursor."""
         return f"robot {session.add_robot(event.raw)} joined"
 
 

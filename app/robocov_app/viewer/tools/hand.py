@@ -1,4 +1,4 @@
-"""The hand: drags and throws robots, moves obstacles, selects robots to inspect."""
+"""The hand, which drags and throws robots, moves obstacles, and selects robots to inspect."""
 
 from dataclasses import dataclass
 from math import dist
@@ -12,8 +12,8 @@ from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, change_map
 
-MIN_DRAG_M = 0.02  # a shorter move is part of a click
-_MIN_SHIFT_M = 1e-3  # an obstacle that moves less stays where it is
+MIN_DRAG_M = 0.02  # a shorter move counts as part of a click
+_MIN_SHIFT_M = 1e-3  # an obstacle that is moved by less stays where it is
 
 
 @dataclass
@@ -23,7 +23,7 @@ class HandTool(ViewerTool):
     Attributes
     ----------
     inspection : Inspection
-        The selection: a press on a robot selects it.
+        The selection; a press on a robot selects that robot.
     robot : int or None
         Number of the robot that is held.
     obstacle : int or None
@@ -45,7 +45,7 @@ class HandTool(ViewerTool):
     _drags: bool = False
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Take hold of the robot or the obstacle under the cursor."""
+        """Grab the robot or the obstacle under the cursor."""
         self._pressed_at = event.raw
         self._cursor = event.raw
         self._drags = False
@@ -64,18 +64,18 @@ class HandTool(ViewerTool):
         return self.robot is not None or self.obstacle is not None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Drag the robot that is held; obstacles follow when the button is released."""
+        """Drag the held robot; a held obstacle is moved only when the button is released."""
         self._cursor = event.raw
         if dist(self._pressed_at, event.raw) > MIN_DRAG_M:
             self._drags = True
         if self.robot is None or not self._drags:
             return
-        # The robot may have been removed since it was pressed.
+        # The robot may have been removed while it was held.
         if self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers:
             session.drag_robot(self.robot, event.raw)
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Let go of the robot or the obstacle."""
+        """Let go of the held robot, or move the held obstacle to its new position."""
         self._cursor = event.raw
         index = self.obstacle
         moved = self._move_obstacle(session)
@@ -89,7 +89,7 @@ class HandTool(ViewerTool):
         return change_map(session, environment, f"{map_edits.describe_obstacle(moved)} moved")
 
     def cancel(self, session: Session) -> bool:
-        """Let go of the robot or the obstacle; if none is held, clear the selection."""
+        """Let go of what is held, or else clear the selection; return whether there was either."""
         if not self.is_holding:
             had_selection = self.inspection.selected is not None
             self.inspection.selected = None
@@ -100,7 +100,7 @@ class HandTool(ViewerTool):
         return True
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
-        """Return the obstacle that is held, at its new position."""
+        """Return a preview of the held obstacle at its new position."""
         moved = self._move_obstacle(session)
         if moved is None:
             return ViewerDrawState()
@@ -113,12 +113,12 @@ class HandTool(ViewerTool):
         return "arrow"
 
     def _move_obstacle(self, session: Session) -> Obstacle | None:
-        """Return the obstacle that is held, moved with the cursor; None if it stays where it is."""
+        """Return the held obstacle, moved with the cursor; None if none is held or it stays where it is."""
         index = self.obstacle
         if index is None:
             return None
         present = session.displayed.environment.obstacles
-        # The map may have been changed since the press.
+        # The map may have been changed while the obstacle was held.
         if present[index : index + 1] != self._obstacles[index : index + 1]:
             return None
         dx = self._cursor[0] - self._pressed_at[0]

@@ -17,7 +17,7 @@ from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, V
 DEFAULT_WALL_WIDTH_M = 0.1
 MIN_WALL_WIDTH_M = 0.02
 MAX_WALL_WIDTH_M = 5.0
-WALL_END_FRACTION = 0.3  # of a finger's width: a press this close to the last point ends a wall
+WALL_END_FRACTION = 0.3  # fraction of the reach: a press this close to the last point ends a wall
 
 
 @dataclass
@@ -27,7 +27,7 @@ class OutlineTool(ViewerTool, ABC):
     Attributes
     ----------
     end_fraction : float
-        Fraction of a finger's width from the last point within which a press completes the outline.
+        Fraction of the pointer's reach: a press this close to the last point completes the outline.
     outline : DrawnOutline
         The points so far.
     """
@@ -39,7 +39,7 @@ class OutlineTool(ViewerTool, ABC):
 
     @abstractmethod
     def build_obstacle(self, points: list[Point]) -> Obstacle:
-        """Build the obstacle with these points, m; raise RobocovError if they do not form one."""
+        """Build the obstacle with these points, m; raise RobocovError if they do not define one."""
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a point, or complete the obstacle."""
@@ -50,7 +50,7 @@ class OutlineTool(ViewerTool, ABC):
         return None
 
     def double_click(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Complete the obstacle; the first of the two clicks has added its point already."""
+        """Complete the obstacle; the first of the two clicks has already added the last point."""
         return self.finish(session)
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
@@ -58,7 +58,7 @@ class OutlineTool(ViewerTool, ABC):
         self.outline.cursor = event.point
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Complete a drag."""
+        """Complete the obstacle if it was drawn with a single drag."""
         is_complete = self.outline.release(event.point, event.raw, event.reach, clicked=clicked)
         if not is_complete:
             return None
@@ -66,14 +66,14 @@ class OutlineTool(ViewerTool, ABC):
         return self.finish(session)
 
     def finish(self, session: Session) -> str | None:
-        """Add the obstacle to the map."""
+        """Add the obstacle to the map, and return a message."""
         points = self.outline.take_points()
         if not points:
             return None
         return add_obstacle(session, self.build_obstacle(points), self.name)
 
     def cancel(self, session: Session) -> bool:
-        """Drop the points."""
+        """Discard the points; return whether there were any."""
         return self.outline.cancel()
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
@@ -126,19 +126,19 @@ class AddWallTool(OutlineTool):
         return map_edits.build_wall(points, self.width)
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
-        """Return the wall so far."""
+        """Return a preview of the wall up to the cursor."""
         state = super().build_draw_state(session)
         if not state.line:
             return state
         wall: Obstacle | None = None
-        # Two points in the same position are no wall yet.
+        # Two points at the same position do not define a wall yet.
         with suppress(RobocovError):
             wall = self.build_obstacle(list(state.line))
         label = f"{state.label}, {self.width:g} m wide"
         return ViewerDrawState(state.line, obstacle=wall, label=label)
 
     def resize(self, session: Session, factor: float) -> str:
-        """Multiply the width of new walls by a factor."""
+        """Multiply the width of new walls by a factor, and return a message."""
         width = round(self.width * factor, 3)
         self.width = float(np.clip(width, MIN_WALL_WIDTH_M, MAX_WALL_WIDTH_M))
         return f"new walls are {self.width:g} m wide"

@@ -1,4 +1,4 @@
-"""Tools that drag from one point to another: the ruler, and circles from their center."""
+"""Tools for drags from one point to another: the ruler, and circles that are drawn from their center."""
 
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ class DraggedSegment:
     start : Point or None
         Where the button was pressed, m; None before that.
     end : Point
-        Where the cursor was last while the button was held, m.
+        Last position of the cursor while the button was held, m.
     is_pressed : bool
         Whether the button is held down.
     """
@@ -38,7 +38,7 @@ class DraggedSegment:
         self.is_pressed = True
 
     def move(self, point: Point) -> None:
-        """Drag its end while the button is held down."""
+        """Move the end of the segment while the button is held down."""
         if self.is_pressed:
             self.end = point
 
@@ -47,7 +47,7 @@ class DraggedSegment:
         self.is_pressed = False
 
     def clear(self) -> bool:
-        """Drop the segment; return whether there was one."""
+        """Discard the segment; return whether there was one."""
         was_drawn = self.start is not None
         self.start = None
         return was_drawn
@@ -55,7 +55,7 @@ class DraggedSegment:
 
 @dataclass
 class SegmentTool(ViewerTool):
-    """Base class of tools that drag from one point to another.
+    """Base class of tools for drags from one point to another.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class SegmentTool(ViewerTool):
         self.segment.move(event.raw)
 
     def cancel(self, session: Session) -> bool:
-        """Drop the segment."""
+        """Discard the segment; return whether there was one."""
         return self.segment.clear()
 
 
@@ -88,7 +88,7 @@ class RulerTool(SegmentTool):
     hint = "drag from one point to another"
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Keep the measurement."""
+        """Keep the measurement visible until the next press."""
         self.segment.release()
         return None
 
@@ -105,7 +105,7 @@ class RulerTool(SegmentTool):
 
 @dataclass
 class AddCircleTool(SegmentTool):
-    """Draws a round pillar from its center."""
+    """Draws a circular obstacle from its center."""
 
     name = "circle"
     title = "Circle"
@@ -121,13 +121,13 @@ class AddCircleTool(SegmentTool):
         return add_obstacle(session, map_edits.build_circle(center, event.raw), self.name)
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
-        """Return the circle so far."""
+        """Return a preview of the circle up to the cursor."""
         center = self.segment.start
         if center is None:
             return ViewerDrawState()
         rim = self.segment.end
         circle: CircleObstacle | None = None
-        # A circle without a radius is no obstacle yet.
+        # A circle whose radius is almost zero is not an obstacle yet.
         with suppress(RobocovError):
             circle = map_edits.build_circle(center, rim)
         return ViewerDrawState((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")

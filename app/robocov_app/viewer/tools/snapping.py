@@ -1,4 +1,4 @@
-"""Snapping: corners and walls of the map attract points that are drawn near them."""
+"""Snapping of drawn points to nearby corners and walls of the map."""
 
 import numpy as np
 import shapely
@@ -7,12 +7,12 @@ from robocov.environment import Environment, Point
 from robocov_app.toolkit.tools.snap_targets import SnapTargets, list_outline_edges
 from robocov_app.toolkit.tools.snapping import SnapKind, SnapSettings, snap_point
 
-SNAP_REACH_FRACTION = 0.6  # of the width of a finger
+SNAP_REACH_FRACTION = 0.6  # fraction of the pointer's reach within which points snap
 _KINDS: frozenset[SnapKind] = frozenset({"vertex", "edge"})
 
 
 class MapSnapper:
-    """Snaps points to corners of the map, or to its walls; keeps the targets of the latest map."""
+    """Snaps points to corners or walls of the map; caches the snap targets of the latest map."""
 
     def __init__(self) -> None:
         self._environment: Environment | None = None
@@ -28,7 +28,7 @@ class MapSnapper:
         point : Point
             Position, m.
         reach : float
-            Width of a finger on the map, m; points snap within a fraction of it.
+            Reach of the pointer on the map, m; points snap within a fraction of it.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Base class of the viewer's tools, events and draw states, and changes of the map; lengths in meters."""
+"""Base class of the viewer's tools, their events and overlays, and changes of the map; lengths in meters."""
 
 from dataclasses import dataclass
 
@@ -36,9 +36,9 @@ class ViewerDrawState(DrawState):
     line, is_closed, label
         See `DrawState`.
     obstacle : Obstacle or None
-        Obstacle that would be drawn or moved.
+        Preview of the obstacle that is being drawn or moved.
     has_marks : bool
-        Whether each point of the line has a mark.
+        Whether the points of the line are marked.
     """
 
     obstacle: Obstacle | None = None
@@ -46,7 +46,7 @@ class ViewerDrawState(DrawState):
 
 
 class ViewerTool(Tool[Session, ViewerPointerEvent]):
-    """A tool of the viewer that does nothing: base class of the others.
+    """Base class of the viewer's tools, which does nothing itself.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
     uses_wheel : bool
         Whether the wheel changes its size, instead of zooming.
     is_resizable : bool
-        Whether `resize` has a meaning.
+        Whether the tool has a size that `resize` changes.
     is_painting : bool
-        Whether the density is being changed right now.
+        Whether the tool is painting the density right now.
     """
 
     takes_robots = False
@@ -92,12 +92,14 @@ def change_map(session: Session, environment: Environment, description: str) -> 
     Returns
     -------
     str
-        Message: the description, robots that were pushed aside, starts that are covered, blocked passages.
+        Message with the description, the number of pushed robots, covered starts and blocked passages.
 
     Raises
     ------
     StartError
         If there is no space left for a robot.
+    MapError
+        If the new map is invalid.
     """
     before = session.displayed.environment
     setup = session.displayed.get_setup(session.timeline.panes[0])
@@ -118,7 +120,7 @@ def change_map(session: Session, environment: Environment, description: str) -> 
 
 
 def add_obstacle(session: Session, obstacle: Obstacle, name: str) -> str:
-    """Add an obstacle that was drawn with a tool; return the message."""
+    """Add an obstacle that was drawn with the tool `name` to the map; return the message."""
     environment = map_edits.add_obstacle(session.displayed.environment, obstacle)
     return change_map(session, environment, f"{name} drawn")
 

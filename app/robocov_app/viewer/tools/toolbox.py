@@ -23,9 +23,9 @@ class ViewerToolbox(Toolbox[ViewerTool]):
     by_name, current
         See `Toolbox`.
     hand : HandTool
-        The tool to which Escape returns.
+        The hand, to which Escape returns.
     wall : AddWallTool
-        The tool whose width can be changed at any time.
+        The wall tool, whose width can be changed while other tools are in use.
     """
 
     def __init__(self, inspection: Inspection) -> None:
@@ -46,7 +46,7 @@ class ViewerToolbox(Toolbox[ViewerTool]):
 
     @property
     def resizable(self) -> ViewerTool:
-        """The tool whose size the keys [ and ] change: the one in use, or the wall if that has no size."""
+        """The tool whose size the keys [ and ] change: the one in use if it has a size, else the wall."""
         if self.current.is_resizable:
             return self.current
         return self.wall

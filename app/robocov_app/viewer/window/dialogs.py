@@ -1,4 +1,4 @@
-"""Dialogs of the window: files, branches, and the offers when it is opened."""
+"""Dialogs of the window: files, branches, and offers when the window is opened."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -31,7 +31,7 @@ def build_file_dialog(files: FileActions) -> Choice:
 def build_branch_dialog(viewer: Presenter) -> Choice:
     """Return the dialog that enters a branch."""
     timeline = viewer.session.timeline
-    # The present curve is stored with those of the other branches.
+    # The list shows the costs of all branches, so store those of the present branch in the document, too.
     timeline.cache_present()
 
     def list_options() -> Iterator[Option]:
@@ -48,7 +48,7 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
 
 
 def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:
-    """Return the dialog that offers the lesson to a new user; the session pauses until there is an answer."""
+    """Return the dialog that offers the lesson to a new user, and pause the session until the answer."""
     play = _pause(viewer)
 
     def play_lesson() -> None:
@@ -66,16 +66,16 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
 def build_recovery_offer(
     viewer: Presenter, drafts: Sequence[Draft], offer_others: Callable[[Sequence[Draft]], None]
 ) -> Question:
-    """Return the dialog that offers to recover unsaved work; the session pauses until there is an answer.
+    """Return the dialog that offers to recover unsaved work, and pause the session until the answer.
 
     Parameters
     ----------
     viewer : Presenter
         The viewer.
     drafts : sequence of Draft
-        Unsaved work, the newest first.
+        Drafts of unsaved work, newest first.
     offer_others : callable
-        Offers the other drafts once the newest is discarded.
+        Offers the other drafts after the newest one was discarded.
     """
     newest = drafts[0]
     others = drafts[1:]

@@ -1,4 +1,4 @@
-"""The mouse over the viewer's canvas and plot: tools, panning, the time line."""
+"""The mouse over the viewer's canvas and chart: tools, panning, the time slider."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ _NO_ROBOT = (-1, -1)
 
 
 class ViewerPointer(Pointer):
-    """Turns mouse events into actions of canvas, plot and tools.
+    """Turns mouse events into actions on the canvas, the chart and the tools.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class ViewerPointer(Pointer):
     canvas : ViewerCanvas
         The panes.
     chart : Chart
-        Plot and time line.
+        The chart and the time slider.
     panel : ViewerPanel
         The panel, which gets events first.
     leave_lesson : callable
@@ -45,6 +45,7 @@ class ViewerPointer(Pointer):
         panel: ViewerPanel,
         leave_lesson: Callable[[], None],
     ) -> None:
+        """Connect the mouse to the parts of the window."""
         super().__init__(panel)
         self._viewer = viewer
         self._canvas = canvas
@@ -58,14 +59,14 @@ class ViewerPointer(Pointer):
         return self._canvas.layout.scale
 
     def show_action(self, cursor: MouseCursor) -> None:
-        """Show the effect of a press: by the cursor's shape, and a ring around the robot under it."""
+        """Show what a press would do, by the cursor shape and a ring around the robot under the cursor."""
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas
         pane = canvas.find_pane(self.at) if inspection.cursor is not None else None
         number: int | None = None
         if pane is not None:
-            # The camera may have moved although the mouse has not.
+            # The camera may have moved even if the mouse has not.
             inspection.cursor = canvas.to_world(self.at, pane)
             inspection.cursor_pane = pane
             if viewer.tool.takes_robots:
@@ -76,6 +77,7 @@ class ViewerPointer(Pointer):
         cursor.show(self._choose_cursor(pane, number))
 
     def _choose_cursor(self, pane: int | None, number: int | None) -> CursorShape:
+        """Return the cursor shape over a robot, a pane, or the chart."""
         viewer = self._viewer
         if number is not None:
             return "hand"
@@ -92,12 +94,12 @@ class ViewerPointer(Pointer):
         return is_inside(layout.track, self.at) or is_inside(layout.chart, self.at)
 
     def leave(self) -> None:
-        """Handle that the mouse has left the panes."""
+        """React when the mouse leaves the panes."""
         self._viewer.inspection.cursor = None
         self._chart.hover = None
 
     def turn_wheel(self, event: pygame.event.Event) -> None:
-        """Zoom, or change the size of the tool."""
+        """Zoom the map, or change the size of the tool."""
         if self._canvas.find_pane(self.at) is None:
             return
         factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
@@ -107,7 +109,7 @@ class ViewerPointer(Pointer):
             self._canvas.zoom(factor, self.at)
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        """Use the plot or the tool, or pan."""
+        """Start a gesture on the chart, with the tool, or for panning."""
         if self._is_over_time():
             if event.button == LEFT_BUTTON:
                 return self._press_chart(event.pos)
@@ -121,6 +123,7 @@ class ViewerPointer(Pointer):
         return PanGesture(self._canvas.pan, self._click_without_tool)
 
     def _press_chart(self, pixel: Pixel) -> Gesture | None:
+        """Handle a press on the chart: switch the quantity, open a branch, or show the time at the mouse."""
         viewer = self._viewer
         chart = self._chart
         if chart.is_on_switch(pixel):
@@ -135,12 +138,12 @@ class ViewerPointer(Pointer):
         return TimeGesture(viewer, chart)
 
     def _press_tool(self, event: pygame.event.Event, pane: int, now: float) -> Gesture:
-        """Use the tool in a pane; the floor under the hand is dragged."""
+        """Pass a press to the tool in a pane; with the hand on the bare floor, pan the map instead."""
         viewer = self._viewer
         canvas = self._canvas
         hand = viewer.toolbox.hand
         self._leave_lesson()
-        # The session from before a lesson may have fewer panes.
+        # Leaving a lesson may have brought back a session with fewer panes.
         pane = min(pane, len(viewer.session.timeline.panes) - 1)
         if viewer.active_pane != pane:
             viewer.inspection.active_pane = pane
@@ -159,7 +162,7 @@ class ViewerPointer(Pointer):
         return PanGesture(canvas.pan, self._click_without_tool)
 
     def build_event(self, pixel: Pixel, pane: int, *, is_right: bool = False) -> ViewerPointerEvent:
-        """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
+        """Build the tool event for a pixel of a pane; the point is snapped to the map if the tool snaps.
 
         Parameters
         ----------
@@ -182,19 +185,19 @@ class ViewerPointer(Pointer):
         return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
 
     def move_tool(self, event: pygame.event.Event, pane: int) -> None:
-        """Drag the tool to the mouse, in a pane."""
+        """Pass a move of the mouse in a pane to the tool."""
         viewer = self._viewer
         pointer = self.build_event(event.pos, pane)
         viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
 
     def release_tool(self, event: pygame.event.Event, pane: int, *, is_click: bool) -> None:
-        """Release the tool at the mouse, in a pane."""
+        """Pass the release of the button in a pane to the tool."""
         viewer = self._viewer
         pointer = self.build_event(event.pos, pane)
         viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
-        """Handle a click that did not pan: complete a drawing (right), or clear the selection (left)."""
+        """Handle a click that did not pan: the right button completes a drawing, the left one deselects."""
         viewer = self._viewer
         if event.button == RIGHT_BUTTON:
             viewer.attempt(viewer.finish_drawing)
@@ -203,7 +206,7 @@ class ViewerPointer(Pointer):
             viewer.revision += 1
 
     def hover(self, event: pygame.event.Event) -> None:
-        """Follow the mouse with the cursor, and with the tool while no button is held down."""
+        """Update the inspected point, and while no button is held down, the tool and the chart's tag."""
         viewer = self._viewer
         inspection = viewer.inspection
         pane = self._canvas.find_pane(event.pos)
@@ -218,7 +221,7 @@ class ViewerPointer(Pointer):
 
 
 class ViewerToolGesture(Gesture):
-    """Passes a drag on to the tool, in the pane in which the button was pressed.
+    """Passes a drag to the tool, in the pane in which the button was pressed.
 
     Parameters
     ----------
@@ -233,9 +236,9 @@ class ViewerToolGesture(Gesture):
         self._pane = pane
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Move the tool."""
+        """Pass a move to the tool."""
         self._pointer.move_tool(event, self._pane)
 
     def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Release the tool."""
+        """Pass the release of the button to the tool."""
         self._pointer.release_tool(event, self._pane, is_click=is_click)

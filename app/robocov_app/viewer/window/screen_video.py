@@ -1,4 +1,4 @@
-"""A video of the window while it is used: encoded in another process, and readable even after a crash."""
+"""A video of the window in use, which is encoded in another process and readable even after a crash."""
 
 import queue
 import threading
@@ -12,7 +12,7 @@ from robocov.errors import OutputError
 from robocov_app.runs.encoding import Frame, build_encoder_command
 
 VIDEO_FPS = 30
-MAX_WAITING_FRAMES = 45  # while more wait for the encoder, new frames are left out
+MAX_WAITING_FRAMES = 45  # if so many frames wait for the encoder, new ones are dropped
 
 
 class ScreenVideo:
@@ -23,20 +23,20 @@ class ScreenVideo:
     Parameters
     ----------
     path : Path
-        The video; it must not exist.
+        File of the video, which must not exist yet.
     size : tuple of int
-        Width and height of the window, px. Frames of other sizes are fitted in.
+        Width and height of the window, px. Frames of other sizes are scaled to fit.
     waits : bool
-        Whether to wait for the encoder instead of leaving frames out.
+        Whether to wait for the encoder instead of dropping frames.
 
     Attributes
     ----------
     path : Path
-        The video.
+        File of the video.
     frame_count : int
         Number of frames written.
     skipped_count : int
-        Number of frames left out.
+        Number of dropped frames.
 
     Raises
     ------
@@ -45,6 +45,7 @@ class ScreenVideo:
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, waits: bool = False) -> None:
+        """Create the file, and start the encoder."""
         self.path = path
         self.frame_count = 0
         self.skipped_count = 0
@@ -54,7 +55,7 @@ class ScreenVideo:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             command = build_encoder_command(path, self._size, VIDEO_FPS, streamed=True)
-            # Create a new file, so that nothing is written through a link.
+            # Opening with "x" fails if the file exists, so that nothing is written through a symbolic link.
             path.open("xb").close()
             self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
         except OSError as error:
@@ -69,7 +70,7 @@ class ScreenVideo:
         return self.frame_count / VIDEO_FPS
 
     def add(self, screen: pygame.Surface, seconds: float) -> None:
-        """Add a picture that the window has shown for some time, s."""
+        """Add the frame that the window has shown for a time, s, as often as the frame rate requires."""
         self._due_frames += seconds * VIDEO_FPS
         count = int(self._due_frames + 1e-6)
         self._due_frames -= count
@@ -97,7 +98,7 @@ class ScreenVideo:
             raise OutputError(f"{self.path}: the video encoder failed")
 
     def _fit(self, screen: pygame.Surface) -> bytes:
-        """Return the pixels of a window, scaled to the size of the video if it has been resized."""
+        """Return the RGB bytes of a window, scaled to the size of the video if the window was resized."""
         width, height = screen.get_size()
         if (_make_even(width), _make_even(height)) == self._size:
             screen = screen.subsurface(pygame.Rect(0, 0, *self._size))
@@ -121,12 +122,12 @@ class ScreenVideo:
 
 
 def _make_even(length: int) -> int:
-    """Return a length that encoders accept."""
+    """Return the largest even number up to a length, because video encoders require even sizes."""
     return length // 2 * 2
 
 
 def copy_pixels(screen: pygame.Surface) -> Frame:
-    """Return the pixels of a surface, (height, width, 3)."""
+    """Return the RGB values of a surface, (height, width, 3) array of uint8."""
     width, height = screen.get_size()
     data = pygame.image.tobytes(screen, "RGB")
     return np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)

@@ -3,7 +3,7 @@
 from robocov.errors import RobocovError
 from robocov_app.viewer.model import ViewerModel, simplify_message
 
-STEP_RATE_WEIGHT = 0.1  # of the newest frame in the displayed number of steps per second
+STEP_RATE_WEIGHT = 0.1  # weight of the newest frame in the moving average of the step rate
 
 
 class SessionRunner:
@@ -17,7 +17,7 @@ class SessionRunner:
     Attributes
     ----------
     step_rate : float
-        Smoothed number of steps per second.
+        Moving average of the number of steps per second.
     """
 
     def __init__(self, viewer: ViewerModel) -> None:
@@ -25,14 +25,14 @@ class SessionRunner:
         self._viewer = viewer
 
     def advance(self, seconds: float, slices: int) -> None:
-        """Let real time pass.
+        """Advance the session by real time.
 
         Parameters
         ----------
         seconds : float
-            Time since the last call, s.
+            Real time since the last call, s.
         slices : int
-            Number of frames that would have been shown in this time.
+            Number of equal parts in which the time is simulated, normally 1.
         """
         viewer = self._viewer
         session = viewer.session
@@ -48,11 +48,11 @@ class SessionRunner:
         viewer.update_cost_map()
 
     def _simulate(self, seconds: float, slices: int) -> int:
-        """Simulate, and show errors of the controllers; return the number of steps."""
+        """Simulate; show errors that controllers raise. Return the number of steps."""
         session = self._viewer.session
         try:
             steps = sum(session.playback.advance(seconds / slices) for _ in range(slices))
-            # Controllers decide as part of the simulation, not of drawing.
+            # Let controllers decide here rather than while drawing, so that their errors are caught.
             for pane in session.timeline.panes:
                 session.displayed.get_snapshot(pane)
         except RobocovError as error:
@@ -61,7 +61,7 @@ class SessionRunner:
         return steps
 
     def _report_end(self) -> None:
-        """Show why the simulation has stopped."""
+        """Show why playback has stopped."""
         viewer = self._viewer
         timeline = viewer.session.timeline
         if timeline.is_settled:

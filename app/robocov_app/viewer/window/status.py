@@ -1,4 +1,4 @@
-"""The status line: time, cost, speed, the point under the cursor; and suggestions what to try next."""
+"""The status line (time, cost, speed, point under the cursor), and suggestions on what to try next."""
 
 import shapely
 
@@ -11,10 +11,10 @@ from robocov_app.viewer.session.pane import Pane
 HINT = "Space pause · F1 keys"
 
 MAX_SUGGESTIONS = 3
-_MAX_COST_LAG_S = 0.05  # an older cost is shown with its time
+_MAX_COST_LAG_S = 0.05  # if the displayed cost is older than this, its time is shown, too
 MIN_UNCOVERED_AREA_M2 = 0.05
 """Area above which a part of the map counts as cut off: the smallest that is not displayed as 0.0 m²."""
-_MAX_SITE_DISTANCE = 1.5  # spacings of the lattice: farther points are not free
+_MAX_SITE_DISTANCE = 1.5  # in lattice spacings: a point farther than this from all sites is not free
 
 _SUGGESTIONS = {
     "obstacle": "draw a wall in a doorway (W)",
@@ -25,13 +25,13 @@ _SUGGESTIONS = {
     "density": "paint where it matters (G)",
     "robot": "let one more join (A)",
 }
-"""Suggestions to the user, by the kind of edit that follows them."""
+"""Suggestions to the user, by the kind of edit that they lead to."""
 
 
 def list_facts(
     viewer: ViewerModel, frame_rate: float, step_rate: float, video_duration: float | None
 ) -> list[str]:
-    """Return the facts in the status line, the most important first.
+    """Return the texts of the status line, most important first.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def list_facts(
     frame_rate, step_rate : float
         Frames and simulated steps per second.
     video_duration : float or None
-        Duration of the video that is being recorded, s.
+        Duration of the video being recorded, s; None if none is recorded.
     """
     session = viewer.session
     time = session.displayed.time
@@ -76,7 +76,7 @@ def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
 
 
 def describe_cursor(viewer: ViewerModel) -> str:
-    """Return the point under the cursor, and its distance to the nearest robot; empty without a cursor."""
+    """Describe the point under the cursor and its distance to the nearest robot; empty without a cursor."""
     cursor = viewer.inspection.cursor
     if cursor is None:
         return ""
@@ -90,7 +90,7 @@ def describe_cursor(viewer: ViewerModel) -> str:
 
 
 def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Point) -> str:
-    """Return the distance of a point to the robot that covers it, or why there is none."""
+    """Describe the distance of a point to the robot that covers it, or why no robot does."""
     result = known.result
     squares = (result.points[:, 0] - point[0]) ** 2 + (result.points[:, 1] - point[1]) ** 2
     site = int(squares.argmin())
@@ -110,7 +110,7 @@ def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Po
 
 
 def suggest_actions(viewer: ViewerModel) -> str:
-    """Suggest what to try once the team has settled; empty while it moves, or if everything was tried."""
+    """Suggest what to try once the team has settled; empty before that, or if everything has been tried."""
     timeline = viewer.session.timeline
     has_settled = timeline.is_settled or viewer.settled_change is timeline.head
     if not viewer.view.has_suggestions or not has_settled:

@@ -1,4 +1,4 @@
-"""The viewer's window: handles events, advances time, draws frames."""
+"""The viewer's window, which handles events, advances time and draws frames."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -42,44 +42,44 @@ _LESSON_HINT = "F2 back to the lesson · Esc ends it"
 
 
 class ViewerWindow(CommandWindow):
-    """Shows a session, and lets the user change it.
+    """The window that shows a session and lets the user change it.
 
     Parameters
     ----------
     viewer : Presenter
-        State and actions.
+        State of the window, and actions on it.
     size : tuple of int
         Width and height, px.
     scale : float
         Size of texts and widgets.
     is_unattended : bool
-        Whether there is no user: videos wait for their encoder instead of leaving frames out, lessons answer
-        themselves.
+        Whether there is no user. Then videos wait for their encoder instead of dropping frames, and lessons
+        answer their own questions.
     screen : Surface, optional
-        Window that exists already.
+        Surface of an existing window to draw on; by default a new window is opened.
 
     Attributes
     ----------
     viewer : Presenter
-        State and actions.
+        State of the window, and actions on it.
     canvas : ViewerCanvas
         The panes.
     chart : Chart
-        Plot and time line.
+        The chart and the time slider.
     panel : ViewerPanel
         The panel.
     dialogs : Dialogs
-        Open dialogs.
+        Shows the open dialog.
     commands : CommandTable
         All commands.
     lesson : LessonGuide
         The lesson, if there is one.
     video : ScreenVideo or None
-        The video that is being recorded.
+        The video being recorded.
     run_saver : RunSaver
         Saves runs in other processes.
     is_help_open : bool
-        Whether the keys are shown.
+        Whether the help page is shown.
     """
 
     groups = GROUPS
@@ -99,6 +99,7 @@ class ViewerWindow(CommandWindow):
         is_unattended: bool = False,
         screen: pygame.Surface | None = None,
     ) -> None:
+        """Build all parts of the window, and draw the first frame."""
         super().__init__(viewer, Dialogs(), size, scale, screen)
         pygame.display.set_caption("robocov")
         self.viewer = viewer
@@ -117,13 +118,13 @@ class ViewerWindow(CommandWindow):
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
         self._inspector = RobotInspector(viewer, self.panel)
-        self._arranged: tuple[object, ...] | None = None  # key of the layout
+        self._arranged: tuple[object, ...] | None = None  # everything on which the current layout depends
         self._unrecorded_s = 0.0  # time since the last frame of the video
         self._arrange()
         self.draw()
 
     def _build_actions(self) -> ViewerWindowActions:
-        """Return the actions of the window that commands run."""
+        """Return the functions of this window that commands call."""
         return ViewerWindowActions(
             zoom=self.zoom,
             show_next_tab=lambda: self.panel.show_next_tab(),
@@ -140,12 +141,12 @@ class ViewerWindow(CommandWindow):
         )
 
     def show_result(self, message: str) -> None:
-        """Show the message of a command of the palette, which may change the explanation of the robot."""
+        """Show the message of a command of the palette, and update the report on the robot."""
         super().show_result(message)
         self.panel.report = None
 
     def offer_recovery(self, drafts: Sequence[Draft]) -> None:
-        """Offer to recover unsaved work, the newest first."""
+        """Offer to recover unsaved work, starting with the newest draft."""
         self.dialogs.ask(build_recovery_offer(self.viewer, drafts, self.offer_recovery))
 
     def create_save_point(self) -> Callable[[], None]:
@@ -163,23 +164,23 @@ class ViewerWindow(CommandWindow):
         return roll_back
 
     def restore_view(self) -> None:
-        """Close everything that may be the cause of an exception in drawing."""
+        """Close everything that may have caused an exception while drawing."""
         super().restore_view()
         self.lesson.end()
         self.canvas.fit()
 
     def close(self) -> None:
-        """Keep a draft of unsaved work, and end lesson, video and the computation of costs."""
+        """Save a draft of unsaved work, and end the lesson, the video and the cost computation."""
         files = self.viewer.files
         files.workspace.save_draft(files.view, at_once=True)
-        # This restores the session and the layers from before the lesson, which are the ones to keep.
+        # This restores the session and the layers from before the lesson, which are those to be saved.
         self.lesson.end()
         if self.video is not None:
             self.viewer.attempt(self.toggle_recording)
         self.viewer.costs.close()
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Adopt the scale and theme of the page that shows the window; None leaves the panel as it is."""
+        """Adopt the appearance that suits the browser page that shows the window; see `BaseWindow`."""
         self.scale = scale
         view = self.viewer.view
         view.theme = theme
@@ -188,7 +189,7 @@ class ViewerWindow(CommandWindow):
         self.viewer.revision += 1
 
     def update(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance everything by a time, s."""
         self._unrecorded_s += seconds
         self._pass_time(seconds)
         self._cost_curves.update()
@@ -199,7 +200,7 @@ class ViewerWindow(CommandWindow):
         self.pointer.show_action(self.cursor)
 
     def get_visible_state(self) -> object:
-        """Return a key of the picture; None while something moves."""
+        """Return all values that the frame depends on, to detect changes; None while something moves."""
         viewer = self.viewer
         session = viewer.session
         is_at_rest = (
@@ -231,12 +232,13 @@ class ViewerWindow(CommandWindow):
         for message, is_error in self.run_saver.poll():
             viewer.show_message(message, is_error=is_error)
         self.lesson.advance(seconds)
-        # A window that has waited for events makes up for many frames at once.
+        # After a wait for events, the elapsed time is simulated in slices of one frame each, because the
+        # clock limits the time of a single frame.
         slices = max(round(seconds * FPS), 1) if self.is_resting else 1
         self._runner.advance(seconds, slices)
 
     def _arrange(self) -> None:
-        """Lay the window out if its size, or the number or shape of the panes, has changed."""
+        """Lay out the window if its size, the number or shape of panes, or the legend has changed."""
         view = self.viewer.view
         session = self.viewer.session
         size = self.screen.get_size()
@@ -262,7 +264,7 @@ class ViewerWindow(CommandWindow):
             self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
+        """Draw all parts of the window, show the frame, and add it to the video."""
         layout = self.layout
         if len(layout.panes) > 1:
             self.screen.fill(self.theme.background, pygame.Rect(layout.arena))
@@ -270,7 +272,7 @@ class ViewerWindow(CommandWindow):
         self.chart.draw(self.screen)
         self._draw_status()
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
-        if not has_lesson and layout.panel[2]:
+        if not has_lesson and layout.panel[2]:  # the width of the panel; 0 while it is hidden
             self.panel.draw(self.screen)
         self._draw_message(can_suggest=not has_lesson)
         self.draw_above_map()
@@ -295,6 +297,7 @@ class ViewerWindow(CommandWindow):
         return pending.progress
 
     def _draw_message(self, *, can_suggest: bool) -> None:
+        """Draw the progress of a seek, the status message, or a suggestion."""
         viewer = self.viewer
         message = viewer.message
         is_error = bool(message) and viewer.has_error_message
@@ -307,7 +310,7 @@ class ViewerWindow(CommandWindow):
         draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
 
     def do(self, name: str) -> None:
-        """Run a command by its name; lesson and help take some of them."""
+        """Run the command with this name, unless the lesson or the help page handles it."""
         closes_help = name == "cancel" and self.is_help_open
         if not closes_help and self.lesson.handle_command(name):
             return
@@ -317,7 +320,7 @@ class ViewerWindow(CommandWindow):
             self.panel.show_tab("robot")
 
     def zoom(self, factor: float) -> None:
-        """Zoom at the mouse if it is over a pane, otherwise at the center of the first pane."""
+        """Zoom by a factor about the mouse if it is over a pane, else about the center of the first pane."""
         left, top, width, height = self.layout.panes[0]
         center: tuple[float, float] = (left + width / 2, top + height / 2)
         if self.canvas.find_pane(self.pointer.at) is not None:
@@ -353,11 +356,11 @@ class ViewerWindow(CommandWindow):
         self.viewer.files.open_file(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Use a key as the answer to the lesson's question, or in a text field of the panel."""
+        """Offer a key to the lesson as an answer, and then to the panel; return whether it was used."""
         return self.lesson.handle_key(event.unicode) or super().use_key(event)
 
     def handle_mouse(self, event: pygame.event.Event) -> None:
-        """Handle an event of the mouse: by the page of the lesson, else by panel, plot or panes."""
+        """Pass a mouse event to the page of the lesson, or else to the panel, the chart or the panes."""
         is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
         if not (is_left_press and self.lesson.click(event.pos)):
             super().handle_mouse(event)
