@@ -1,1 +1,1 @@
-"""Mouse tools of the editor. Knows no pygame."""
+"""Mouse tools of the editor. Independent of pygame."""

@@ -1,4 +1,4 @@
-"""The part of the editor that its tools know: the open map, its selection and the snap settings."""
+"""The part of the editor that tools can access: the open map, its selection and the snap settings."""
 
 from collections.abc import Hashable
 
@@ -13,11 +13,11 @@ from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.tools.snapping import Snap, SnapSettings, snap_point
 from robocov_app.toolkit.window.window_model import WindowModel
 
-SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a distant line must not win over the grid
+SNAP_REACH_FRACTION = 0.6  # of the pointer's reach; smaller, so that distant lines do not win over the grid
 
 
 class EditorContext(WindowModel):
-    """The open map, its selection and the snap settings: the part of the editor that tools know.
+    """The part of the editor that tools can access: the open map, its selection and the snap settings.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class EditorContext(WindowModel):
     wall_width : float
         Width of new walls, m.
     pixel : float
-        Side of a pixel at scale 1, m.
+        Side length of a pixel at scale 1, m.
     """
 
     def __init__(self, document: Document) -> None:
@@ -51,7 +51,7 @@ class EditorContext(WindowModel):
 
     @property
     def sketch(self) -> Sketch:
-        """The map as it is now."""
+        """The current state of the map."""
         return self.document.history.sketch
 
     @property
@@ -73,32 +73,32 @@ class EditorContext(WindowModel):
         return self._handles.get(sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel))
 
     def build_snap_settings(self, reach: float) -> SnapSettings:
-        """Return the snap settings for a pointer with a reach, m."""
+        """Build the snap settings for a pointer with a given reach, m."""
         kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name].kinds)
         return SnapSettings(SNAP_REACH_FRACTION * reach, self.grid, self.snap_angle, kinds)
 
     def snap(
         self, raw: Point, reach: float, origin: Point | None = None, more: Ring = (), without: Dragged = ()
     ) -> Snap:
-        """Snap a point.
+        """Snap a position of the pointer to the map.
 
         Parameters
         ----------
         raw : Point
             Position of the pointer, m.
         reach : float
-            Reach of the pointer, m.
+            Distance within which the pointer picks things, m.
         origin : Point, optional
-            Point from which angles count, m.
+            Point at which angles are measured, m.
         more : sequence of Point
-            Further points to snap to, m.
+            Additional points to snap to, m.
         without : iterable of Owner or Vertex
-            Objects and vertices not to snap to, because they are dragged.
+            Objects and vertices to ignore, because they are being dragged.
 
         Returns
         -------
         Snap
-            The snapped point; the raw point while the targets of a large map are being computed.
+            The snapped point. While the targets of a large map are being computed, this is the raw point.
         """
         targets = self.snapper.find_targets(self.sketch, without, more)
         if targets is None:
@@ -106,7 +106,7 @@ class EditorContext(WindowModel):
         return snap_point(raw, targets, self.build_snap_settings(reach), origin)
 
     def apply(self, change: Change, *, drag: Hashable | None = None) -> None:
-        """Apply a change; successive changes of the same `drag` are undone together."""
+        """Apply a change; consecutive changes of the same `drag` are undone together."""
         if self.document.history.apply(change, drag=drag):
             self.show_message(change.description)
         self._handle_change()

@@ -1,4 +1,4 @@
-"""The tool for the density: hot spots and areas are dragged, their weights are typed."""
+"""The density tool, by which hot spots and areas are dragged and their weights are typed."""
 
 import math
 from typing import NamedTuple
@@ -16,28 +16,28 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.tool import CursorShape
 
-DEFAULT_WEIGHT = 4.0  # of a new feature, until another weight is typed
+DEFAULT_WEIGHT = 4.0  # of new features, until another weight is typed
 MIN_SIGMA_M = 0.02
-RIM_REACH_FRACTION = 0.6  # of the pointer's reach, within which a rim or a corner is picked
+RIM_REACH_FRACTION = 0.6  # of the pointer's reach: rims and corners are picked within this distance
 _OUTLINE_POINTS = 64
 
 
 class _Hit(NamedTuple):
-    """The feature under the pointer, and its corner or rim if the pointer is on one."""
+    """The feature at the pointer, and its corner or rim if the pointer is on one; None if there is none."""
 
     feature: int | None = None
-    corner: int | None = None  # of an area; 0 for the rim of a hot spot
+    corner: int | None = None  # index of a corner of an area; 0 for the rim of a hot spot
 
 
 class DensityTool(EditorTool):
-    """Adds, moves, resizes, weights and removes hot spots, and areas where a map has areas.
+    """Adds, moves, resizes, weights and removes hot spots or, if the density consists of areas, areas.
 
     Attributes
     ----------
     weight : float
         Weight of the next feature.
     chosen : int or None
-        Index of the chosen feature.
+        Index of the chosen feature, to which a typed weight applies.
     """
 
     name = "density"
@@ -69,7 +69,7 @@ class DensityTool(EditorTool):
             self.change = self._build_change(context, self.pressed.point, event.point)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Apply the drag; a click chooses a feature."""
+        """Apply the drag, or choose the feature that was clicked; a new or dragged feature is chosen, too."""
         pressed = self.pressed
         change = self.change
         self.pressed = None
@@ -89,11 +89,11 @@ class DensityTool(EditorTool):
             context.show_message("type its weight, then Enter; Backspace removes it")
 
     def finish(self, context: EditorContext) -> None:
-        """Choose nothing."""
+        """Drop the choice of a feature."""
         self.chosen = None
 
     def remove_last(self, context: EditorContext) -> bool:
-        """Remove the chosen feature."""
+        """Remove the chosen feature; return whether there was one."""
         chosen = self.chosen
         self.chosen = None
         if chosen is None or chosen >= len(density.list_features(context.sketch)):
@@ -102,13 +102,13 @@ class DensityTool(EditorTool):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop the drag, and choose nothing."""
+        """Cancel the drag, and drop the choice of a feature."""
         was_busy = super().cancel(context)
         self.chosen = None
         return was_busy
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """Set the weight of the chosen and of new features."""
+        """Set the weight of the chosen feature and of new ones."""
         weight = density.parse_weight(text)
         if self.chosen is not None:
             context.apply(density.set_weight(context.sketch, self.chosen, weight))
@@ -131,6 +131,7 @@ class DensityTool(EditorTool):
         )
 
     def _build_label(self, features: tuple[density.Feature, ...]) -> str:
+        """Return a label with the weight of the dragged or chosen feature; empty if there is none."""
         number = self.chosen
         if self.pressed is not None and self.change is not None:
             number = self._hit.feature
@@ -151,7 +152,7 @@ class DensityTool(EditorTool):
         return "cross"
 
     def _build_change(self, context: EditorContext, start: Point, end: Point) -> Change | None:
-        """Return the change of a drag between two points, m."""
+        """Return the change that a drag between two points, m, makes: it adds, moves or resizes a feature."""
         sketch = context.sketch
         number, corner = self._hit
         if number is None:
@@ -173,7 +174,7 @@ class DensityTool(EditorTool):
 
 
 def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEvent) -> _Hit:
-    """Return the feature under the pointer: centers before rims and corners, then the inside of areas."""
+    """Find the feature at the pointer: first by centers, then by rims and corners, then inside areas."""
     centers = [(distance(_find_center(feature), event.raw), k) for k, feature in enumerate(features)]
     if centers and min(centers)[0] < event.reach:
         return _Hit(min(centers)[1])
@@ -189,6 +190,7 @@ def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEve
         if gap < RIM_REACH_FRACTION * event.reach:
             return _Hit(number, corner)
     pointer = shapely.Point(event.raw)
+    # Later areas are on top.
     for number in reversed(range(len(features))):
         feature = features[number]
         if isinstance(feature, WeightedArea) and feature.polygon.contains(pointer):
@@ -205,10 +207,11 @@ def _find_center(feature: density.Feature) -> Point:
 
 
 def _build_outline(feature: density.Feature) -> Ring:
-    """Return the outline of an area, or of a hot spot at one standard deviation from its center."""
+    """Return the outline of an area, or the ellipse of one standard deviation around a hot spot."""
     if isinstance(feature, WeightedArea):
         return feature.vertices
     angles = np.linspace(0.0, math.tau, _OUTLINE_POINTS, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    # The Cholesky factor of the covariance maps the unit circle to this ellipse.
     points = circle @ np.linalg.cholesky(feature.matrix).T + feature.center
     return tuple((x, y) for x, y in points.tolist())

@@ -1,4 +1,4 @@
-"""The tool that opens doors in walls."""
+"""The tool that cuts doors into walls."""
 
 from robocov_app.editor.edits import create
 from robocov_app.editor.model import require
@@ -9,12 +9,12 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
 DEFAULT_DOOR_WIDTH_M = 0.9
-WALL_REACH_FRACTION = 0.6  # of the pointer's reach, within which a wall is picked
-MIN_DRAG_FRACTION = 0.1  # of a door's width; longer drags set the width of the opening
+WALL_REACH_FRACTION = 0.6  # of the pointer's reach: walls are picked within this distance
+MIN_DRAG_FRACTION = 0.1  # of a door's width: only longer drags set the width of the opening
 
 
 class DoorTool(EditorTool):
-    """Opens a door in a wall; the pieces stay walls.
+    """Cuts a door into a wall, which leaves two walls.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class DoorTool(EditorTool):
     def __init__(self) -> None:
         super().__init__()
         self.width = DEFAULT_DOOR_WIDTH_M
-        self._wall: int | None = None  # key of the wall under the cursor, or that was pressed
+        self._wall: int | None = None  # key of the wall that was pressed or is under the cursor
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Choose the wall under the pointer."""
@@ -47,7 +47,7 @@ class DoorTool(EditorTool):
             self._wall = create.find_wall(context.sketch, event.raw, WALL_REACH_FRACTION * event.reach)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Open the wall: around a click, or between both ends of a drag."""
+        """Cut an opening into the wall: a door at a click, or everything between both ends of a drag."""
         pressed = self.pressed
         wall = self._wall
         self.pressed = None
@@ -66,7 +66,7 @@ class DoorTool(EditorTool):
         context.show_message(f"doors are {format_length(self.width)} wide")
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return the opening with its width."""
+        """Return the preview of the opening, with its width."""
         sketch = context.sketch
         wall = self._wall
         if wall is None or wall not in sketch.index_by_key:

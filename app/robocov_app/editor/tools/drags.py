@@ -1,4 +1,4 @@
-"""Drags of the selection tool: each move of the pointer gives the change that a release would make."""
+"""Drags of the selection tool. Each move of the pointer computes the change that a release would make."""
 
 import math
 
@@ -19,15 +19,15 @@ from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_mov
 from robocov_app.toolkit.tools.tool import CursorShape
 
 MANY_POINTS = 1000  # if more vertices are dragged, an image of the obstacles is moved instead
-MAX_SNAPPING_POINTS = 60  # approximate number of the dragged vertices that can snap
-NO_MOVE_M = 1e-9  # shorter moves do not count
-MIN_SIZE_M = 1e-3  # of the selection after scaling
+MAX_SNAPPING_POINTS = 60  # approximate number of dragged vertices that are tried for snapping
+NO_MOVE_M = 1e-9  # shorter distances count as zero
+MIN_SIZE_M = 1e-3  # minimum size of the selection after scaling
 _FACTOR_TOLERANCE = 1e-9
 _UNIT_TOLERANCE = 1e-12
 
 
 class Drag:
-    """Base class of the drags.
+    """Base class of drags.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ class Drag:
     Attributes
     ----------
     change : Change or None
-        Change that ending the drag would make.
+        Change that would be made if the drag ended now.
     guides : tuple of Guide
         Guides of the latest snap.
     label : str
         Text next to the cursor.
     cursor_shape : str or None
-        Shape of the cursor; None for that of the handle.
+        Shape of the cursor; None for the one of the handle.
     """
 
     cursor_shape: CursorShape | None = None
@@ -63,27 +63,27 @@ class Drag:
 
     @property
     def carried(self) -> CarriedItems | None:
-        """Obstacles that are dragged as an image."""
+        """Objects that are dragged as an image; None if they are dragged one by one."""
         return None
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
 
     def enter_text(self, text: str) -> None:
-        """Drag by a typed value; raise MapError if it means nothing."""
+        """Set the drag to a value that the user typed; raise MapError if the value is invalid."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def build_draw_state(self) -> EditorDrawState:
-        """Return the marks of the drag on the sheet."""
+        """Return what the drag shows on the sheet."""
         return EditorDrawState(label=self.label, carried=self.carried, shows_handles=True)
 
     def end(self) -> None:
-        """Apply the change."""
+        """Apply the change, if there is one."""
         if self.change is not None:
             self.context.apply(self.change)
 
     def _snap(self, event: EditorPointerEvent, position: Point, origin: Point | None = None) -> Point:
-        """Snap a position to anything that is not dragged, unless Ctrl is held down."""
+        """Snap a position to anything that is not being dragged; with Ctrl, do not snap."""
         snap = Snap(position)
         if not event.ctrl:
             dragged = self.selection.vertices or self.selection.owners
@@ -93,7 +93,7 @@ class Drag:
 
 
 class MoveDrag(Drag):
-    """Moves objects: with Alt copies, with Shift at round angles, with Ctrl without snapping."""
+    """Moves objects. Alt makes copies, Shift constrains the angle, Ctrl disables snapping."""
 
     cursor_shape: CursorShape | None = "move"
 
@@ -109,13 +109,13 @@ class MoveDrag(Drag):
 
     @property
     def carried(self) -> CarriedItems | None:
-        """Obstacles that are dragged as an image, if they are many."""
+        """Objects that are dragged as an image, because they have many vertices; otherwise None."""
         if not self._is_carried:
             return None
         return CarriedItems(self.selection, self._offset, self._copies)
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
         self._copies = event.alt
         self.guides = ()
         end = event.raw
@@ -148,13 +148,13 @@ class MoveDrag(Drag):
         return transform.move(self.context.sketch, self.selection, dx, dy)
 
     def end(self) -> None:
-        """Apply the change."""
+        """Apply the change, if there is one."""
         if self._is_carried:
             self.change = self._build_change(*self._offset)
         super().end()
 
     def enter_text(self, text: str) -> None:
-        """Move by a length towards the cursor, or by a typed displacement: ``0.5 -2`` or ``2<45``."""
+        """Move by a typed length towards the cursor, or by a displacement such as ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         has_two_values = len(text.split()) > 1 or "<" in text or ";" in text
         if has_two_values and text[0] not in "@+":
@@ -164,7 +164,7 @@ class MoveDrag(Drag):
 
 
 class VertexDrag(Drag):
-    """Moves a vertex with the selected ones; with Shift at a round angle from the vertex before it."""
+    """Moves a vertex together with the selected ones. Shift constrains the angle of the edge before it."""
 
     def __init__(self, context: EditorContext, vertex: Vertex, selection: Selection) -> None:
         dragged = Selection(vertices=selection.vertices | {vertex})
@@ -172,7 +172,10 @@ class VertexDrag(Drag):
         self._origin = self._find_origin(vertex)
 
     def _find_origin(self, vertex: Vertex) -> Point | None:
-        """Return the previous vertex on the ring, after a wall's first; None for circles and starts."""
+        """Return the previous vertex of the ring, m; for the first vertex of a wall, the next one.
+
+        None for circles and starts, which have no edges.
+        """
         rings = self.context.sketch.list_rings(vertex.owner)
         if vertex.ring >= len(rings):
             return None
@@ -182,7 +185,7 @@ class VertexDrag(Drag):
         return points[vertex.index - 1]
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
         if event.shift and self._origin is not None:
             self.guides = ()
             self._place(geometry.constrain_angle(self._origin, event.raw))
@@ -201,12 +204,12 @@ class VertexDrag(Drag):
             self.label += f"   {geometry.format_bearing(self._origin, position)}"
 
     def enter_text(self, text: str) -> None:
-        """Move to a typed position, or by a length towards the cursor."""
+        """Move the vertex to a typed position, or by a length towards the cursor."""
         self._place(parse_next_point(text, self._origin or self._start, self._end))
 
 
 class TurnDrag(Drag):
-    """Turns objects about the center of their box; with Shift in steps, with Ctrl without snapping."""
+    """Rotates objects about the center of their bounding box, with Shift in steps, with Ctrl freely."""
 
     def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
@@ -215,8 +218,9 @@ class TurnDrag(Drag):
         self._start_angle = compute_bearing(self._center, start)
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
         bearing = compute_bearing(self._center, event.raw)
+        # Between -180 and 180 degrees.
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)
@@ -231,12 +235,12 @@ class TurnDrag(Drag):
             self.change = transform.rotate(self.context.sketch, self.selection, degrees, self._center)
 
     def enter_text(self, text: str) -> None:
-        """Turn by a typed angle."""
+        """Rotate by a typed angle."""
         self._turn(parse_angle(text))
 
 
 class ScaleDrag(Drag):
-    """Scales objects by a handle of their frame; with Shift in proportion, with Alt about its center."""
+    """Scales objects by a handle of their frame. Shift keeps the proportions, Alt scales about the center."""
 
     def __init__(self, context: EditorContext, selection: Selection, handle: Handle) -> None:
         super().__init__(context, selection, handle.at)
@@ -244,14 +248,14 @@ class ScaleDrag(Drag):
         self._bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
         self._grip = compute_side_position(self._bounds, self._side)
         self._fixed = compute_side_position(self._bounds, (-self._side[0], -self._side[1]))
-        # The handle is outside the box, by the margin of the frame.
+        # The handle is on the frame, which is outside the bounding box.
         self._margin = (handle.at[0] - self._grip[0], handle.at[1] - self._grip[1])
-        # A stretched circle would no longer be one.
+        # Circles and starts must be scaled equally in both directions, because ellipses are not supported.
         shapes = {type(item.shape) for item in selection.list_items(context.sketch)}
         self._keeps_proportion = bool(selection.starts) or shapes == {CircleObstacle}
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
         pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
         position = self._snap(event, pointer)
         center = self._fixed
@@ -267,6 +271,7 @@ class ScaleDrag(Drag):
         self._scale(factors[0], factors[1], center)
 
     def _scale(self, factor_x: float, factor_y: float, center: Point) -> None:
+        """Scale by factors along x and y about a point, m, and show the new size next to the cursor."""
         width = self._bounds[2] - self._bounds[0]
         height = self._bounds[3] - self._bounds[1]
         factor_x = _limit_factor(factor_x, width)
@@ -284,6 +289,7 @@ class ScaleDrag(Drag):
 
     def enter_text(self, text: str) -> None:
         """Scale to a typed width or height."""
+        # The text is the width, unless only the height changes with this handle.
         axis = 0 if self._side[0] else 1
         length = self._bounds[2 + axis] - self._bounds[axis]
         factor = parse_length(text, now=length) / length
@@ -296,7 +302,7 @@ class ScaleDrag(Drag):
 
 
 def _limit_factor(factor: float, length: float) -> float:
-    """Return a factor that does not shrink a length, m, below the minimum."""
+    """Limit a factor so that it does not shrink a length, m, below the minimum size."""
     min_factor = MIN_SIZE_M / max(length, MIN_SIZE_M)
     if abs(factor) < min_factor:
         return min_factor
@@ -304,7 +310,7 @@ def _limit_factor(factor: float, length: float) -> float:
 
 
 class BoxDrag(Drag):
-    """Selects the objects in a box; drawn to the left, also those that the box touches."""
+    """Selects the objects in a box; if it is dragged to the left, also those that are only partly inside."""
 
     def __init__(self, context: EditorContext, start: Point, *, adds: bool) -> None:
         super().__init__(context, Selection(), start)
@@ -318,11 +324,11 @@ class BoxDrag(Drag):
         return self._end[0] < self._start[0]
 
     def follow(self, event: EditorPointerEvent) -> None:
-        """Follow the pointer."""
+        """Update the drag after a move of the pointer."""
         self._end = event.raw
 
     def find_selection(self) -> Selection:
-        """Return the selection in the box: objects, or vertices if it contains some of those shown."""
+        """Return what the box selects: objects or, if it contains only some of the shown vertices, these."""
         sketch = self.context.sketch
         owners = self.context.vertex_owners
         inside = find_in_box(sketch, self._start, self._end, touched=self._selects_touched)
@@ -341,6 +347,6 @@ class BoxDrag(Drag):
             self.context.select(self._previous.union(self.find_selection()))
 
     def build_draw_state(self) -> EditorDrawState:
-        """Return the box."""
+        """Return the box for drawing."""
         box = (self._start, self._end)
         return EditorDrawState(box=box, box_selects_touched=self._selects_touched, shows_handles=True)

@@ -1,4 +1,4 @@
-"""Tools that draw obstacles, the boundary and starts, and the measuring tape."""
+"""Tools that draw obstacles, the boundary and starts, and the tool that measures lengths."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -18,20 +18,20 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.drawn_outline import SAME_POINT_M, DrawnOutline
 
-CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
+CLOSING_FRACTION = 0.7  # of the pointer's reach: a click this close to the first point closes the outline
 
 
 class LineTool(EditorTool, ABC):
-    """Draws point by point, or with a single drag; subclasses define what becomes of the points.
+    """Draws point by point or with a single drag; subclasses define what the points become.
 
     Attributes
     ----------
     min_points, max_points : int
-        Number of points that are needed, and that complete the drawing.
+        Minimum number of points, and number at which the drawing is complete.
     closes : bool
         Whether a click on the first point completes the drawing.
     drags : bool
-        Whether it can be drawn with a single drag, too.
+        Whether the tool can also draw with a single drag.
     outline : DrawnOutline
         The points drawn so far.
     """
@@ -51,7 +51,7 @@ class LineTool(EditorTool, ABC):
         """Complete the drawing with the points drawn so far."""
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
-        """Return the unfinished drawing; the last of the points, m, is the cursor."""
+        """Return the preview of an unfinished drawing; the last of the points, m, is the cursor."""
         is_closed = self.closes and len(points) > 2
         label = format_bearing(points[-2], points[-1])
         if is_closed:
@@ -59,11 +59,11 @@ class LineTool(EditorTool, ABC):
         return EditorDrawState(line=points, is_closed=is_closed, shows_lengths=True, label=label)
 
     def choose_point(self, event: EditorPointerEvent) -> Point:
-        """Return the position of the next point, m."""
+        """Return the position of the next point, m; with Shift, the angle is constrained."""
         return event.constrain(self.origin)
 
     def find_drag_end(self, text: str) -> Point | None:
-        """Return the end of a drag that has a typed size; None where sizes cannot be typed."""
+        """Return the end point of a drag with a typed size, m; None if the text is not a size."""
         return None
 
     @property
@@ -85,7 +85,7 @@ class LineTool(EditorTool, ABC):
 
     @property
     def snap_points(self) -> tuple[Point, ...]:
-        """Points drawn so far to which the pointer snaps, m."""
+        """Points drawn so far to which the pointer snaps, m; not the last one of a line."""
         if self.max_points == 2:
             return tuple(self.points)
         return tuple(self.points[:-1])
@@ -104,27 +104,27 @@ class LineTool(EditorTool, ABC):
             self.finish(context)
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Move the end of the drawing to the pointer."""
+        """Move the preview of the next point to the pointer."""
         self.outline.cursor = self.choose_point(event)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Complete a drag."""
+        """Complete the drawing if it was drawn with a drag."""
         if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
             self._finish_drag(context, self.outline.cursor)
 
     def remove_last(self, context: EditorContext) -> bool:
-        """Remove the last point."""
+        """Remove the last point; return whether there was one."""
         if not self.points:
             return False
         self.points.pop()
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Remove all points."""
+        """Remove all points; return whether there were any."""
         return self.outline.cancel()
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """Add a point by typed coordinates or a length, or complete a drag by a typed size."""
+        """Add a point given by typed coordinates or a length, or complete the drawing with a typed size."""
         if len(self.points) == 1:
             end = self.find_drag_end(text)
             if end is not None:
@@ -138,7 +138,7 @@ class LineTool(EditorTool, ABC):
         self.outline.is_dragging = False
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return the unfinished drawing."""
+        """Return the preview of the unfinished drawing, up to the cursor."""
         if not self.points:
             return EditorDrawState()
         return self.build_preview(context, (*self.points, self.outline.cursor))
@@ -152,7 +152,10 @@ class LineTool(EditorTool, ABC):
         self.finish(context)
 
     def _find_far_corner(self, text: str) -> Point:
-        """Return the corner opposite to the first of a rectangle with a typed size, towards the cursor."""
+        """Return the corner of a rectangle with a typed size that is opposite to the first one.
+
+        The rectangle extends from the first corner in the direction of the cursor.
+        """
         x, y = self.points[0]
         cursor_x, cursor_y = self.outline.cursor
         width, height = parse_size(text)
@@ -164,10 +167,10 @@ class DrawTool(LineTool, ABC):
 
     @abstractmethod
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
-        """Return the change that adds the object with these points, m."""
+        """Return the change that adds the object defined by the points, m."""
 
     def finish(self, context: EditorContext) -> None:
-        """Add the drawn points to the map as an object."""
+        """Add the object to the map; raise MapError if too few points were drawn."""
         points = self.outline.take_points()
         if not points:
             return
@@ -206,7 +209,7 @@ class WallTool(DrawTool):
         return create.add_wall(context.sketch, points, context.wall_width)
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
-        """Return the line, with the wall as thick as it will be."""
+        """Return the line, and the wall with its width."""
         line = points
         if distance(points[-2], points[-1]) <= SAME_POINT_M:
             line = points[:-1]
@@ -216,7 +219,7 @@ class WallTool(DrawTool):
 
 
 class MeasureTool(LineTool):
-    """Measures along a line; the measured line stays until another is drawn."""
+    """Measures lengths along a line, which remains visible until another line is drawn."""
 
     name = "measure"
     title = "Measure"
@@ -226,28 +229,28 @@ class MeasureTool(LineTool):
 
     @property
     def measured(self) -> tuple[Point, ...]:
-        """Points of the line that is being measured or was measured last, m."""
+        """Points of the line that is being drawn or was drawn last, m."""
         return tuple(self.points or self.clicked)
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Add a point."""
+        """Add a point; the first one removes the previous line."""
         self.clicked = []
         super().press(context, event)
 
     def finish(self, context: EditorContext) -> None:
-        """Keep the line."""
+        """Complete the line, which remains visible."""
         points = self.outline.take_points()
         if points:
             self.clicked = points
 
     def cancel(self, context: EditorContext) -> bool:
-        """Remove the line."""
+        """Remove the line; return whether there was one."""
         had_line = bool(self.clicked)
         self.clicked = []
         return super().cancel(context) or had_line
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return the line with its length, and the area that it encloses."""
+        """Return the line with its length and, from three points on, the area that it encloses."""
         points = self.clicked
         if self.points:
             points = [*self.points, self.outline.cursor]
@@ -283,7 +286,7 @@ class PlacesTool(DrawTool):
 
 
 class BoundaryTool(DrawTool):
-    """Draws the boundary: a rectangle by dragging, other outlines corner by corner."""
+    """Draws the boundary: a rectangle with a drag, or any outline corner by corner."""
 
     name = "boundary"
     title = "Boundary"
@@ -298,20 +301,20 @@ class BoundaryTool(DrawTool):
         return create.set_boundary(context.sketch, points)
 
     def choose_point(self, event: EditorPointerEvent) -> Point:
-        """Return the position of the next point, m; angles count only between clicked corners."""
+        """Return the position of the next point, m; Shift has no effect while a rectangle is dragged."""
         if self.outline.is_dragging:
             return event.point
         return super().choose_point(event)
 
     def find_drag_end(self, text: str) -> Point | None:
-        """Return the corner opposite to the first, if a size such as 10 x 8 was typed."""
+        """Return the corner opposite to the first one if the text is a size such as 10 x 8; else None."""
         is_size = any(sign in text for sign in "x×*")
         if not is_size:
             return None
         return self._find_far_corner(text)
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
-        """Return the outline; in a drag, the rectangle."""
+        """Return the outline or, during a drag, the rectangle."""
         if not self.outline.is_dragging:
             return super().build_preview(context, points)
         (ax, ay), (bx, by) = points
@@ -320,7 +323,7 @@ class BoundaryTool(DrawTool):
 
 
 class RectangleTool(DrawTool):
-    """Draws a rectangle from corner to corner, with Shift a square."""
+    """Draws a rectangle between two opposite corners; with Shift, a square."""
 
     name = "rectangle"
     title = "Rectangle"
@@ -334,11 +337,11 @@ class RectangleTool(DrawTool):
         return create.add_rectangle(context.sketch, points)
 
     def find_drag_end(self, text: str) -> Point | None:
-        """Return the corner opposite to the first for a typed size."""
+        """Return the corner opposite to the first one for a typed size."""
         return self._find_far_corner(text)
 
     def choose_point(self, event: EditorPointerEvent) -> Point:
-        """Return the corner at the pointer, with Shift that of a square."""
+        """Return the corner at the pointer; with Shift, the corner of a square."""
         if not event.shift or not self.points:
             return event.point
         x, y = self.points[0]
@@ -358,7 +361,7 @@ class RectangleTool(DrawTool):
 
 
 class CircleTool(DrawTool):
-    """Draws a circle from its center."""
+    """Draws a circle, given by its center and a point on its rim."""
 
     name = "circle"
     title = "Circle"
@@ -372,7 +375,7 @@ class CircleTool(DrawTool):
         return create.add_circle(context.sketch, points[0], distance(*points))
 
     def find_drag_end(self, text: str) -> Point:
-        """Return the point on the rim to the right of the center for a typed radius."""
+        """Return the rightmost point of a circle with a typed radius."""
         return self.points[0][0] + parse_length(text), self.points[0][1]
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
@@ -383,7 +386,7 @@ class CircleTool(DrawTool):
 
 
 class DiscTool(CircleTool):
-    """Draws a start that is a disc."""
+    """Draws a disc-shaped start."""
 
     name = "disc"
     title = "Start disc"

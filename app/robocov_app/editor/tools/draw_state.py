@@ -1,4 +1,4 @@
-"""Draw states of the editor's tools: their marks on the sheet; all lengths in meters."""
+"""What the tools of the editor show on the sheet. All lengths are in meters."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from robocov_app.toolkit.tools.tool import DrawState
 
 @dataclass(frozen=True)
 class CarriedItems:
-    """Obstacles that are dragged as an image, because there are too many to move one by one.
+    """Objects that are dragged as an image, because there are too many to move one by one.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class CarriedItems:
     offset : tuple of float
         Displacement, (x, y) m.
     are_copies : bool
-        Whether the originals stay where they are.
+        Whether copies are dragged and the originals stay in place.
     """
 
     selection: Selection
@@ -38,35 +38,35 @@ class EditorDrawState(DrawState):
     line, is_closed, label
         See `DrawState`. The label is next to the cursor.
     shows_lengths : bool
-        Whether each edge of the line has its length written next to it.
+        Whether the length of each edge is written next to the line.
     shapes : tuple of Obstacle
-        Obstacles that would be drawn.
+        Preview of obstacles.
     start : StartSpec or None
-        Start that would be drawn.
+        Preview of a start.
     box : tuple of Point or None
         Opposite corners of a selection box, m.
     box_selects_touched : bool
-        Whether the box selects objects that it touches, not only those inside.
+        Whether the box also selects objects that are only partly inside.
     rings : tuple of Ring
-        Outlines, m.
+        Outlines to draw, m.
     dots : tuple of Point
-        Marks, m.
+        Positions to mark with a square, m.
     chosen : int or None
         Index of the ring or dot that is highlighted.
     pending : Sketch or None
-        The map with a density or paths that are being changed.
+        The map with the density or paths as the current drag changes them.
     background : Background or None
-        The reference image at the position to which it is dragged.
+        The reference image at the position to which it is being dragged.
     carried : CarriedItems or None
-        Obstacles that are dragged as an image.
+        Objects that are dragged as an image.
     hovered : Owner or None
         Object under the cursor.
     hovered_handle : Handle or None
         Handle under the cursor.
     shows_handles : bool
-        Whether the selection has its handles.
+        Whether the handles of the selection are shown.
     labels_cursor : bool
-        Whether the tool may write next to the cursor.
+        Whether the tool may have a label at the cursor, which other labels avoid.
     """
 
     shows_lengths: bool = False

@@ -1,4 +1,4 @@
-"""Handles of the selection: vertices, the sides of its frame, and the knob that turns it."""
+"""Handles of the selection: its vertices, the sides and corners of its frame, and the rotation knob."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -14,11 +14,11 @@ HandleKind: TypeAlias = Literal["vertex", "scale", "turn"]
 
 # Lengths in pixels at scale 1.
 FRAME_MARGIN_PX = 11.0  # between the selection and the frame around it
-KNOB_HEIGHT_PX = 24.0  # of the rotation knob above the frame
+KNOB_HEIGHT_PX = 24.0  # between the frame and the rotation knob above it
 MIN_SIDE_WITH_MIDDLE_PX = 34.0  # shorter sides of the frame have no handle in their middle
-MIN_SIZE_WITH_VERTICES_PX = 26.0  # of smaller objects no vertices are shown, so that they can be dragged
+MIN_SIZE_WITH_VERTICES_PX = 26.0  # smaller objects do not show vertices, so that there is space to drag them
 
-MAX_VERTEX_HANDLES = 4000  # more could not be told apart
+MAX_VERTEX_HANDLES = 4000  # more handles could not be distinguished
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,13 @@ class Handle:
     Attributes
     ----------
     kind : {"vertex", "scale", "turn"}
-        Effect of dragging it.
+        What dragging the handle does.
     at : Point
-        Its position, m.
+        Position, m.
     vertex : Vertex or None
-        The vertex that it moves.
+        Vertex that the handle moves.
     side : tuple of int
-        Side of the frame that it moves, (x, y): -1, 0 or 1 along each axis.
+        Side or corner of the frame that the handle moves, (x, y): -1, 0 or 1 along each axis.
     """
 
     kind: HandleKind
@@ -44,7 +44,7 @@ class Handle:
 
 
 def list_vertex_owners(selection: Selection) -> tuple[Owner, ...]:
-    """Return the objects whose vertices are shown: a single selected object, or owners of vertices."""
+    """Return the objects whose vertices are shown: a single selected one, or owners of selected vertices."""
     owners = selection.owners | {vertex.owner for vertex in selection.vertices}
     if selection.vertices or len(owners) == 1:
         return tuple(sorted(owners, key=str))
@@ -59,14 +59,14 @@ def compute_frame(sketch: Sketch, selection: Selection, pixel: float) -> Box | N
     sketch : Sketch
         The map.
     selection : Selection
-        Selected objects; vertices have no frame.
+        The selection. There is no frame if it contains vertices.
     pixel : float
-        Side of a pixel at scale 1, m.
+        Side length of a pixel at scale 1, m.
 
     Returns
     -------
     Box or None
-        Frame, m; None where there is none.
+        Frame, m; None if there is none.
     """
     if selection.vertices:
         return None
@@ -78,7 +78,7 @@ def compute_frame(sketch: Sketch, selection: Selection, pixel: float) -> Box | N
 
 
 def list_handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
-    """Return the handles of a selection; `pixel` is the side of a pixel at scale 1, m."""
+    """Return the handles of a selection; `pixel` is the side length of a pixel at scale 1, m."""
     handles: list[Handle] = []
     frame = compute_frame(sketch, selection, pixel)
     if frame is not None:
@@ -91,6 +91,7 @@ def list_handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Ha
 
 
 def _list_frame_handles(frame: Box, pixel: float) -> list[Handle]:
+    """Return the handles at the corners and sides of a frame, and the rotation knob above it."""
     low_x, low_y, high_x, high_y = frame
     min_side = MIN_SIDE_WITH_MIDDLE_PX * pixel
     columns = [-1, 1]
@@ -116,13 +117,13 @@ def _shows_vertices(sketch: Sketch, selection: Selection, owner: Owner, pixel: f
 
 
 def compute_side_position(box: Box, side: tuple[int, int]) -> Point:
-    """Return a corner of a box or the middle of a side: -1, 0 or 1 along each axis."""
+    """Return a corner or the middle of a side of a box; `side` is -1, 0 or 1 along each axis."""
     low_x, low_y, high_x, high_y = box
     x, y = side
     return (low_x + high_x + x * (high_x - low_x)) / 2, (low_y + high_y + y * (high_y - low_y)) / 2
 
 
 def find_handle(handles: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
-    """Return the handle within `reach` meters of a point: the nearest, vertices before others."""
+    """Return the nearest handle within `reach` meters of a point; vertices take precedence over others."""
     nearby = [handle for handle in handles if distance(handle.at, point) <= reach]
     return min(nearby, key=lambda handle: (handle.kind != "vertex", distance(handle.at, point)), default=None)

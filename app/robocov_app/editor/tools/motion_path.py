@@ -1,4 +1,4 @@
-"""The tool for paths of moving obstacles: waypoints are clicked and dragged, speeds are typed."""
+"""The tool for paths of moving obstacles, by which waypoints are clicked or dragged and speeds are typed."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.tool import CursorShape
 
-WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is picked
-LEG_REACH_FRACTION = 0.5  # of the pointer's reach, within which a click inserts into a leg
-HOVER_REACH_PX = 8.0  # at scale 1, within which the cursor shows that a waypoint can be dragged
+WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach: waypoints are picked within this distance
+LEG_REACH_FRACTION = 0.5  # of the pointer's reach: a click this close to a leg inserts a waypoint
+HOVER_REACH_PX = 8.0  # at scale 1: this close to a waypoint, the cursor shows that it can be dragged
 
 
 class _Subject(NamedTuple):
-    """The selected obstacle and its path."""
+    """The single selected obstacle and its path; None if there is none."""
 
     key: int | None = None
     path: ObstaclePath | None = None
@@ -32,7 +32,7 @@ class MotionPathTool(EditorTool):
     speed : float
         Speed along new paths, m/s.
     chosen : int or None
-        Index of the chosen waypoint.
+        Index of the chosen waypoint, which Backspace removes.
     """
 
     name = "path"
@@ -44,8 +44,8 @@ class MotionPathTool(EditorTool):
         super().__init__()
         self.speed = paths.DEFAULT_SPEED_M_S
         self.chosen: int | None = None
-        self._dragged: int | None = None  # index of a waypoint
-        self._subject = _Subject()  # at the latest event
+        self._dragged: int | None = None  # index of the dragged waypoint
+        self._subject = _Subject()  # as of the latest event
 
     @property
     def is_busy(self) -> bool:
@@ -61,7 +61,7 @@ class MotionPathTool(EditorTool):
         return path.points[-1]
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Take a waypoint, select an obstacle, or add a waypoint."""
+        """Start to drag a waypoint, select an obstacle, or add a waypoint to the selected one."""
         subject, path = _find_subject(context)
         self.change = None
         self._dragged = None
@@ -86,9 +86,9 @@ class MotionPathTool(EditorTool):
     def _add_waypoint(
         self, context: EditorContext, event: EditorPointerEvent, subject: int, path: ObstaclePath | None
     ) -> None:
-        """Insert a waypoint into the leg under the pointer, or append it."""
+        """Insert a waypoint into the leg under the pointer, or else append it; choose and drag it."""
         index = None
-        last = 1  # of a new path, which starts at the obstacle
+        last = 1  # index of the waypoint in a new path, whose first waypoint is the obstacle
         if path is not None:
             index = paths.find_leg(path, event.raw, LEG_REACH_FRACTION * event.reach)
             last = len(path.points)
@@ -130,13 +130,13 @@ class MotionPathTool(EditorTool):
         self._subject = _find_subject(context)
 
     def finish(self, context: EditorContext) -> None:
-        """Select nothing."""
+        """Clear the selection, so that another obstacle can be chosen."""
         if _find_subject(context).key is not None:
             context.select(Selection())
         self.cancel(context)
 
     def remove_last(self, context: EditorContext) -> bool:
-        """Remove the chosen waypoint, or the last one."""
+        """Remove the chosen waypoint, or else the last one; return whether there was one."""
         subject, path = _find_subject(context)
         if subject is None or path is None:
             return False
@@ -152,7 +152,7 @@ class MotionPathTool(EditorTool):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop the drag."""
+        """Cancel the drag; return whether there was one."""
         was_dragging = self._dragged is not None
         self._subject = _Subject()
         self._dragged = None
@@ -161,7 +161,7 @@ class MotionPathTool(EditorTool):
         return was_dragging
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """Set the speed of the path and of new paths."""
+        """Set the speed of the selected path and of new paths."""
         speed = paths.parse_speed(text)
         subject, path = _find_subject(context)
         if subject is not None and path is not None:
@@ -195,7 +195,7 @@ class MotionPathTool(EditorTool):
 
 
 def _find_subject(context: EditorContext) -> _Subject:
-    """Return the single selected obstacle with its path."""
+    """Return the selected obstacle with its path, if exactly one obstacle is selected and nothing else."""
     selection = context.selection.restrict_to(context.sketch)
     if len(selection.items) != 1 or selection.starts or selection.boundary:
         return _Subject()

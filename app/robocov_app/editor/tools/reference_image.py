@@ -1,4 +1,4 @@
-"""The tool for the picture under the map: two points scale or level it, dragging moves it."""
+"""The tool for the picture under the map: two clicked points scale or level it, and a drag moves it."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
-CORNER_DECIMALS = 4  # of the position of a picture, m
+CORNER_DECIMALS = 4  # decimal places of the position of a picture, m
 
 
 class ReferenceImageTool(EditorTool):
@@ -21,7 +21,7 @@ class ReferenceImageTool(EditorTool):
     Attributes
     ----------
     moved : Background or None
-        The image at the position to which it is dragged.
+        The image at the position to which it is being dragged.
     """
 
     name = "picture"
@@ -35,12 +35,12 @@ class ReferenceImageTool(EditorTool):
         self.moved: Background | None = None
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Start a click or a drag."""
+        """Start a click or a drag; raise MapError if there is no picture."""
         require(context.sketch.background is not None, "there is no picture under the map: Ctrl B takes one")
         self.pressed = event
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Ignore a double click: two points in one place have no distance."""
+        """Ignore the second press of a double click, because two points in one place have no distance."""
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag the image."""
@@ -73,7 +73,7 @@ class ReferenceImageTool(EditorTool):
             )
 
     def finish(self, context: EditorContext) -> None:
-        """Turn the image so that the line between the two points is level or upright."""
+        """Rotate the image so that the line between the two points is horizontal or vertical."""
         if len(self.clicked) != 2 or context.sketch.background is None:
             return
         start, end = self.clicked
@@ -82,7 +82,7 @@ class ReferenceImageTool(EditorTool):
         context.apply(set_background(context.sketch, background))
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """Scale the image so that the two points have a typed distance."""
+        """Scale the image so that the distance between the two points is a typed length."""
         if len(self.clicked) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
         start, end = self.clicked
@@ -91,7 +91,7 @@ class ReferenceImageTool(EditorTool):
         context.apply(set_background(context.sketch, background))
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop the drag, and the points."""
+        """Cancel the drag, and remove the points."""
         self.moved = None
         return super().cancel(context)
 

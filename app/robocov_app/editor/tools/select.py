@@ -1,4 +1,4 @@
-"""The tool that selects and drags objects and vertices, and the one that pans."""
+"""The tool that selects and drags objects and vertices, and the tool that pans the view."""
 
 from dataclasses import replace
 
@@ -13,9 +13,9 @@ from robocov_app.editor.tools.handles import Handle, find_handle
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.tool import CursorShape
 
-HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach, within which a handle or an edge is picked
-OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach, within which an object is picked
-EDGE_TOLERANCE_M = 1e-5  # a point closer to an edge lies on it
+HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach: handles and edges are picked within this distance
+OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach: objects are picked within this distance
+EDGE_TOLERANCE_M = 1e-5  # a point this close to an edge counts as lying on it
 _SIDE_CURSORS: dict[tuple[int, int], CursorShape] = {
     (1, 0): "sideways",
     (-1, 0): "sideways",
@@ -29,7 +29,7 @@ _SIDE_CURSORS: dict[tuple[int, int], CursorShape] = {
 
 
 class SelectTool(EditorTool):
-    """Selects, and drags the selection: objects, their vertices, or their frame.
+    """Selects objects and vertices, and drags them or the frame around them.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class SelectTool(EditorTool):
     hovered_handle : Handle or None
         Handle under the cursor.
     drag : Drag or None
-        The present drag.
+        The current drag.
     """
 
     name = "select"
@@ -52,8 +52,9 @@ class SelectTool(EditorTool):
         self.hovered: Owner | None = None
         self.hovered_handle: Handle | None = None
         self.drag: Drag | None = None
-        self._handle: Handle | None = None  # that was pressed
-        self._narrows = False  # whether a click narrows the selection, as the press was on a selected object
+        self._handle: Handle | None = None  # the handle that was pressed
+        # Whether a click narrows the selection, because the press was on a selected object.
+        self._narrows = False
 
     @property
     def is_busy(self) -> bool:
@@ -61,7 +62,7 @@ class SelectTool(EditorTool):
         return self.drag is not None
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Select the handle's vertex or the object under the pointer."""
+        """Select the vertex whose handle is under the pointer, or else the object there."""
         self.pressed = event
         self.drag = None
         self._narrows = False
@@ -81,10 +82,11 @@ class SelectTool(EditorTool):
             context.select(pressed)
 
     def _press_object(self, context: EditorContext, event: EditorPointerEvent) -> None:
+        """Select the object under the pointer with its group; with Shift, add it or remove it."""
         owners = _find_owners(context, event)
         if not owners:
             return
-        # A selected object is meant even where another lies on top of it.
+        # A selected object takes precedence over others on top of it.
         selected = next((owner for owner in owners if owner in context.selection.owners), None)
         owner = owners[0]
         if selected is not None and not event.shift:
@@ -98,7 +100,7 @@ class SelectTool(EditorTool):
             self._narrows = True
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Find the handle or object under the pointer, or drag."""
+        """Find the handle or object under the pointer or, while the button is held down, drag."""
         if self.pressed is None:
             self.hovered_handle = self._find_handle(context, event)
             self.hovered = None
@@ -112,6 +114,7 @@ class SelectTool(EditorTool):
             self.guides = self.drag.guides
 
     def _start_drag(self, context: EditorContext, pressed: EditorPointerEvent) -> Drag:
+        """Return the drag for what was pressed: a handle, a selected object, or an empty place."""
         handle = self._handle
         objects = context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
@@ -125,7 +128,7 @@ class SelectTool(EditorTool):
         return BoxDrag(context, pressed.raw, adds=pressed.shift)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """End a drag; a click narrows the selection, the next click selects what lies below."""
+        """End the drag, or handle the click."""
         pressed = self.pressed
         drag = self.drag
         self._stop()
@@ -136,6 +139,7 @@ class SelectTool(EditorTool):
             self._click(context, pressed)
 
     def _click(self, context: EditorContext, pressed: EditorPointerEvent) -> None:
+        """Narrow the selection to the clicked object; on a single selected object, select the one below."""
         owners = _find_owners(context, pressed)
         selected = context.selection.owners
         if not owners:
@@ -148,7 +152,7 @@ class SelectTool(EditorTool):
             context.select(Selection.of(owners[below]))
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Insert a vertex into the edge under the pointer; away from edges it is another press."""
+        """Insert a vertex into the edge under the pointer; if there is none, handle it like a press."""
         owners = context.vertex_owners or _find_owners(context, event)[:1]
         edge = find_edge(context.sketch, event.raw, HANDLE_REACH_FRACTION * event.reach, owners)
         if edge is None or self._find_handle(context, event) is not None:
@@ -157,13 +161,13 @@ class SelectTool(EditorTool):
         self.pressed = None
         self.drag = None
         if not event.ctrl:
-            # The vertex stays on the edge, but at a round position.
+            # Snap the vertex, but only if it remains on the edge.
             position = context.snap(edge.point, event.reach).point
             edge = find_edge(context.sketch, position, EDGE_TOLERANCE_M, [edge.owner]) or edge
         context.apply(vertices.insert_vertex(context.sketch, edge))
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """End a drag by a typed value."""
+        """End the drag with a value that the user typed."""
         drag = self.drag
         if drag is None:
             super().enter_text(context, text)
@@ -173,7 +177,7 @@ class SelectTool(EditorTool):
         drag.end()
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop a drag; without one select owners instead of vertices, or nothing."""
+        """Cancel the drag; without one, select the owners of selected vertices, or else nothing."""
         had_something = bool(self.drag or context.selection)
         if self.drag is not None:
             self._stop()
@@ -222,7 +226,7 @@ def _find_owners(context: EditorContext, event: EditorPointerEvent) -> tuple[Own
 
 
 class PanTool(EditorTool):
-    """Moves the view; the window does it, because it owns the camera."""
+    """Pans the view. The tool itself does nothing, because the window has the camera."""
 
     name = "pan"
     title = "Pan"

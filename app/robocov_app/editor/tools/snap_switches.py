@@ -11,9 +11,9 @@ class SnapMode(NamedTuple):
     Attributes
     ----------
     title : str
-        Its label.
+        Label of the mode.
     kinds : frozenset of str
-        Kinds of `SnapSettings.kinds` that it switches.
+        Kinds of snap targets that the mode includes; see `SnapSettings.kinds`.
     """
 
     title: str
@@ -27,4 +27,4 @@ SNAPS: dict[str, SnapMode] = {
     "angles": SnapMode("Angles", frozenset({"angle"})),
     "alignment": SnapMode("Alignment", frozenset({"aligned"})),
 }
-"""The snap modes by their names."""
+"""The snap modes by name."""

@@ -1,4 +1,4 @@
-"""Collecting the points and edges of a map to which the pointer can snap."""
+"""Collection of the points and edges of a map to which the pointer can snap."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -16,14 +16,14 @@ from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.tools.snap_targets import Edges, SnapTargets, list_outline_edges
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
-MANY_VERTICES = 1500  # the window does not wait for the targets of maps with this many vertices
+MANY_VERTICES = 1500  # the window does not wait for the targets of larger maps
 
 
 class _TargetCollector:
-    """Collects the points and edges of the objects of a map that are not dragged."""
+    """Collects the points and edges of objects, without the vertices that are being dragged."""
 
     def __init__(self, dragged: dict[tuple[Owner, int], set[int]]) -> None:
-        self.dragged = dragged
+        self.dragged = dragged  # indices of dragged vertices by (owner, ring)
         self.vertices: list[Point] = []
         self.rim_points: list[Point] = []
         self.centers: list[Point] = []
@@ -32,7 +32,7 @@ class _TargetCollector:
         self.circles: list[shapely.Geometry] = []
 
     def add(self, sketch: Sketch, owner: Owner) -> None:
-        """Add an object of a map."""
+        """Add the points and edges of an object."""
         shape = sketch.find_object(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
             self.centers.append(shape.center)
@@ -48,11 +48,11 @@ class _TargetCollector:
             self._add_ring(ring, self.dragged[owner, ring.number])
 
     def build_targets(self) -> SnapTargets:
-        """Return the collected targets."""
+        """Build the snap targets from everything that was added."""
         starts, ends = np.array(self.edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
         wall_corners = list_outline_edges(self.walls).starts
         vertices = np.concatenate([to_array([*self.vertices, *self.rim_points]), wall_corners])
-        # Walls and circles are found by their visible outlines, too.
+        # The pointer also snaps to the visible outlines of walls and circles.
         outlines = list_outline_edges([*self.walls, *self.circles])
         return SnapTargets(vertices, to_array(self.centers), Edges(starts, ends), outlines)
 
@@ -71,11 +71,11 @@ def collect_snap_targets(sketch: Sketch, without: Dragged = (), more: Sequence[P
     Parameters
     ----------
     sketch : Sketch
-        The map; hidden obstacles are no targets.
+        The map. Hidden obstacles are ignored.
     without : iterable of Owner or Vertex
-        Objects and vertices that are dragged.
+        Objects and vertices to ignore, because they are being dragged.
     more : sequence of Point
-        Further points, m.
+        Additional points, m.
     """
     dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
     skipped: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
@@ -93,12 +93,12 @@ def collect_snap_targets(sketch: Sketch, without: Dragged = (), more: Sequence[P
 
 
 class Snapper:
-    """Keeps the latest snap targets; those of large maps are computed in a thread.
+    """Computes snap targets in a thread, and caches the latest ones.
 
     Attributes
     ----------
     waits_for_targets : bool
-        Whether to wait for the targets of large maps, too.
+        Whether to wait even for the targets of large maps.
     """
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ class Snapper:
     def find_targets(
         self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()
     ) -> SnapTargets | None:
-        """Return the targets of `collect_snap_targets`; None while they are being computed."""
+        """Return the result of `collect_snap_targets`; None while that of a large map is being computed."""
         dragged = frozenset(without)
         points = tuple(more)
         future = self._latest.get(
@@ -128,7 +128,7 @@ class Snapper:
 
 
 def count_vertices(sketch: Sketch) -> int:
-    """Return the number of vertices of all polygons and walls, without those of holes."""
+    """Count the vertices of all polygons and walls, without those of holes."""
     count = 0
     for item in sketch.obstacles:
         if not isinstance(item.shape, CircleObstacle):

@@ -1,4 +1,4 @@
-"""Base class of the editor's tools, and the pointer events that they get; all lengths in meters."""
+"""Base class of the editor's tools, and the pointer events that they receive. All lengths are in meters."""
 
 from dataclasses import dataclass
 
@@ -15,17 +15,17 @@ from robocov_app.toolkit.tools.tool import PointerEvent, Tool
 
 @dataclass(frozen=True)
 class EditorPointerEvent(PointerEvent):
-    """Position of the pointer over the sheet."""
+    """Event of the pointer on the sheet."""
 
     def constrain(self, origin: Point | None) -> Point:
-        """Return the point; with Shift, the nearest one at a round angle from `origin`."""
+        """Return the snapped point; with Shift, the nearest point at a round angle from `origin`."""
         if self.shift and origin is not None:
             return constrain_angle(origin, self.raw)
         return self.point
 
 
 class EditorTool(Tool[EditorContext, EditorPointerEvent]):
-    """A tool of the editor that does nothing: base class of the others.
+    """Base class of the editor's tools, with methods that do nothing.
 
     Attributes
     ----------
@@ -34,17 +34,17 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
     accepts_text : bool
         Whether values can be typed while the tool is busy.
     starts_with_text : bool
-        Whether values can also be typed before it is busy.
+        Whether values can also be typed before the tool is busy.
     guides : tuple of Guide
         Guides of the latest snap.
     pressed : EditorPointerEvent or None
-        Event with which the button was pressed that is held down.
+        The press of the left button, while it is held down.
     clicked : list of Point
         Points clicked so far, m.
     cursor : Point
         Position of the cursor, m.
     change : Change or None
-        Change that releasing the button would make.
+        Change that would be made if the button was released now.
     """
 
     snaps = True
@@ -60,12 +60,12 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether an action is half done."""
+        """Whether an action has been started but not completed."""
         return self.pressed is not None or bool(self.clicked)
 
     @property
     def pending(self) -> Sketch | None:
-        """The map as releasing the button would change it."""
+        """The map as it would be if the button was released now; None if it would not change."""
         if self.change is None:
             return None
         return self.change.sketch
@@ -94,10 +94,10 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         self.cursor = event.point
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Handle the release of the button; `clicked` if the pointer has not moved since the press."""
+        """Handle the release of the left button; `clicked` if the pointer has not moved since the press."""
 
     def finish(self, context: EditorContext) -> None:
-        """Complete the action: Enter, or a right click."""
+        """Complete the action, as Enter or a right click does."""
 
     def remove_last(self, context: EditorContext) -> bool:
         """Remove the last point, as Backspace does; return whether there was one."""
@@ -107,7 +107,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Give up the action; return whether there was one."""
+        """Cancel the action; return whether there was one."""
         was_busy = self.is_busy
         self.pressed = None
         self.change = None
@@ -115,9 +115,9 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         return was_busy
 
     def enter_text(self, context: EditorContext, text: str) -> None:
-        """Handle a typed value; raise MapError if it means nothing."""
+        """Handle a value that the user typed; raise MapError if it is invalid."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return the marks of the tool on the sheet."""
+        """Return what the tool shows on the sheet."""
         return EditorDrawState()

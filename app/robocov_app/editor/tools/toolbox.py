@@ -27,11 +27,11 @@ class EditorToolbox(Toolbox[EditorTool]):
     by_name, current
         See `Toolbox`.
     selector : SelectTool
-        The tool to which Escape returns.
+        Selection tool, to which Escape returns.
     tape : MeasureTool
-        The tool whose line levels the map.
+        Measuring tool, by whose line the map can be levelled.
     density : DensityTool
-        The tool with the weight of new areas.
+        Density tool, which has the weight of new areas.
     """
 
     def __init__(self) -> None:

@@ -1,1 +1,1 @@
-"""The editor's window."""
+"""The window of the editor."""

@@ -1,4 +1,4 @@
-"""Actions on the editor that commands, menus and fields of the panel share."""
+"""Editor actions that are shared by commands, menus and fields of the panel."""
 
 from collections.abc import Callable
 
@@ -12,22 +12,23 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.toolkit.tools.viewport import REACH_PX
 
 Edit = Callable[..., Change]
-FAR_STEPS = 10  # grid steps by which arrows nudge with Shift
-DUPLICATE_STEPS = 5.0  # grid steps between an object and its duplicate
-TRIM_STEPS = 2  # grid steps that are cut off corners, unless a length is typed
+FAR_STEPS = 10  # grid steps by which an arrow key with Shift moves the selection
+DUPLICATE_STEPS = 5.0  # displacement of a duplicate, in grid steps
+TRIM_STEPS = 2  # default length that is cut off corners, in grid steps
 MIN_WALL_WIDTH_M = 0.01
+# Types of shapes that have each attribute.
 _SHAPES_WITH = {"width": (WallObstacle,), "radius": (CircleObstacle, DiscStart)}
 
 
 def require_selection(editor: Editor) -> Selection:
-    """Return the selected objects, and the owners of selected vertices; raise MapError without any."""
+    """Return the selected objects and owners of selected vertices; raise MapError if there are none."""
     return require(
         select_owners(editor.selection), "nothing is selected: click something first, or press Ctrl A"
     )
 
 
 def select_owners(selection: Selection) -> Selection:
-    """Return a selection with the owners of its vertices instead of the vertices."""
+    """Return a selection in which the owners of vertices replace the vertices."""
     owners = {vertex.owner for vertex in selection.vertices}
     return selection.without_vertices().union(Selection.of(*owners))
 
@@ -40,7 +41,7 @@ def prefer_vertices(selection: Selection) -> Selection:
 
 
 def align(editor: Editor, side: transform.Side) -> None:
-    """Align the selection at a side."""
+    """Align the selected vertices or, without any, the selected objects at a side."""
     selection = editor.selection
     if not selection.vertices:
         selection = require_selection(editor)
@@ -48,7 +49,7 @@ def align(editor: Editor, side: transform.Side) -> None:
 
 
 def toggle_motion(editor: Editor) -> str:
-    """Start or stop to show obstacles in motion; return the status message."""
+    """Start or stop the animation of moving obstacles; return the status message."""
     if editor.moves_since is not None:
         editor.moves_since = None
         return "obstacles are shown at time zero"
@@ -58,14 +59,14 @@ def toggle_motion(editor: Editor) -> str:
 
 
 def remove_last(editor: Editor) -> None:
-    """Remove the last point of a drawing, or delete the selection."""
+    """Remove the last point of the drawing or, if nothing is being drawn, delete the selection."""
     has_removed = editor.tool.remove_last(editor)
     if not has_removed and not editor.tool.is_busy and editor.selection:
         delete(editor)
 
 
 def delete(editor: Editor) -> None:
-    """Delete the selected vertices, or else the selected objects."""
+    """Delete the selected vertices or, without any, the selected objects."""
     selection = prefer_vertices(require(editor.selection, "nothing is selected: click something first"))
     if selection.vertices:
         editor.apply(vertices.delete_vertices(editor.sketch, selection))
@@ -87,7 +88,7 @@ def cut(editor: Editor) -> None:
 
 
 def paste(editor: Editor, position: Point | None) -> None:
-    """Paste the clipboard at a position, m, or where it was copied."""
+    """Paste the clipboard at a position, m; None pastes objects at their original positions."""
     text = editor.clipboard.get()
     require(text.strip(), "the clipboard is empty")
     grid = None
@@ -97,13 +98,13 @@ def paste(editor: Editor, position: Point | None) -> None:
 
 
 def duplicate(editor: Editor) -> None:
-    """Duplicate the selected objects next to them."""
+    """Duplicate the selected objects with a displacement to the lower right."""
     offset = editor.grid * DUPLICATE_STEPS
     editor.apply(transform.duplicate(editor.sketch, require_selection(editor), offset, -offset))
 
 
 def level(editor: Editor) -> None:
-    """Turn the map so that the measured line is level or upright."""
+    """Rotate the map so that the measured line is horizontal or vertical."""
     measured = editor.toolbox.tape.measured
     require(len(measured) == 2, "measure along a wall first: the tool Measure, two clicks")
     start, end = measured
@@ -112,7 +113,7 @@ def level(editor: Editor) -> None:
 
 
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
-    """Move the selection by grid steps in a direction."""
+    """Move the selection by a number of grid steps in a direction (x, y)."""
     selection = require(
         editor.selection, "nothing is selected: arrows move the selection; Ctrl and arrows move the sheet"
     )
@@ -122,14 +123,14 @@ def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
 
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
-    """Return the change that moves vertices, or else objects, by a displacement, m."""
+    """Return the change that moves the selected vertices or, without any, objects by a displacement, m."""
     if selection.vertices:
         return vertices.move_vertices(editor.sketch, selection, dx, dy)
     return transform.move(editor.sketch, selection, dx, dy)
 
 
 def cancel(editor: Editor) -> None:
-    """Drop the typed value; without one cancel the tool's action, or choose the selection tool."""
+    """Drop the typed value; without one, cancel the tool's action, or else choose the selection tool."""
     if editor.typed:
         editor.typed = ""
         return
@@ -148,6 +149,7 @@ def select_next(editor: Editor, step: int) -> None:
         return
     selected = [order.index(owner) for owner in select_owners(editor.selection).owners if owner in order]
     if not selected:
+        # Without a selection, start at the first object, or at the last one.
         index = 0 if step > 0 else -1
     elif step > 0:
         index = max(selected) + step
@@ -164,7 +166,7 @@ def require_vertex(editor: Editor) -> Vertex:
 
 
 def trim_corners(editor: Editor, edit: Edit, length: float | None = None) -> None:
-    """Bevel or round the selected corners by a length, m, by default two grid steps."""
+    """Bevel or round the selected corners with a length, m; by default, `TRIM_STEPS` grid steps."""
     corners = require(
         Selection(vertices=editor.selection.vertices),
         "select corners first: click an obstacle, then its corners, or drag a box around them",
@@ -173,7 +175,7 @@ def trim_corners(editor: Editor, edit: Edit, length: float | None = None) -> Non
 
 
 def split_wall(editor: Editor) -> None:
-    """Cut a wall in two at the selected vertex."""
+    """Split a wall into two at the selected vertex."""
     editor.apply(vertices.split_wall(editor.sketch, require_vertex(editor)))
 
 
@@ -195,7 +197,7 @@ def fill_hole(editor: Editor) -> None:
 
 
 def scale_wall_width(editor: Editor, factor: float) -> None:
-    """Make the selected walls and new walls wider by a factor."""
+    """Multiply the width of the selected walls and of new walls by a factor."""
     selection = select_owners(editor.selection)
     shapes = [editor.sketch.get_item(key).shape for key in selection.items]
     widths = [shape.width for shape in shapes if isinstance(shape, WallObstacle)]
@@ -233,7 +235,7 @@ def convert_to_areas(editor: Editor) -> None:
 
 
 def fix_problem(editor: Editor) -> None:
-    """Fix the chosen problem, or the first that can be fixed."""
+    """Fix the chosen problem or, without one, the first that can be fixed automatically."""
     problems = editor.problems
     if editor.problem is not None:
         problems = (editor.problem,)
@@ -246,7 +248,7 @@ def fix_problem(editor: Editor) -> None:
 
 
 def show_next_problem(editor: Editor) -> None:
-    """Choose the next problem."""
+    """Choose the next problem, and show its message."""
     problems = editor.problems
     if not problems:
         editor.problem = None
@@ -272,7 +274,7 @@ def rename(editor: Editor, name: str) -> None:
 
 
 def find_common_length(editor: Editor, attribute: str) -> float | None:
-    """Return the width or radius of the selected objects; None if they differ or have none."""
+    """Return the common width or radius of the selected objects, m; None if they differ or have none."""
     sketch, selection = editor.displayed
     lengths: set[float] = set()
     for owner in selection.owners:

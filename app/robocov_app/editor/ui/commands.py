@@ -1,4 +1,7 @@
-"""All commands of the editor, by key, menu, button or palette: a group for each heading of the help."""
+"""All commands of the editor, grouped by the headings of the help.
+
+Commands are run by keys, menus, buttons and the command palette.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +23,7 @@ from robocov_app.toolkit.window.command_window import Action, WindowActions
 ArrowAction = Callable[[int, int], object]
 
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
-"""Headings of the help, in their order."""
+"""Headings of the help, in order."""
 
 PALETTE_HINT = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 · robots 8"
 WALL_WIDTH_STEP = 1.25
@@ -30,20 +33,20 @@ _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
 
 @dataclass(frozen=True)
 class EditorWindowActions(WindowActions):
-    """Actions of the window that commands start.
+    """Actions of the window that are run by commands.
 
     Attributes
     ----------
     show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
         See `WindowActions`.
     try_map : callable
-        Opens the viewer on the map.
+        Opens the map in the viewer.
     edit_name : callable
-        Puts the text cursor into the field with the name.
+        Puts the text cursor into the field for the name.
     open_menu : callable
         Opens the context menu.
     hold_pan : callable
-        Pans with the left button while the key is held down.
+        Makes the left button pan while the key is held down.
     """
 
     try_map: Action
@@ -70,7 +73,7 @@ class EditorCommandGroup(CommandGroup):
     def add_edit(
         self, name: str, title: str, edit: Edit, *keys: str, value: object = None, repeats: bool = False
     ) -> None:
-        """Add a command that applies an edit to the selected objects, with a value if it needs one."""
+        """Add a command that applies an edit to the selected objects, with a value unless it is None."""
         editor = self.editor
 
         def apply() -> None:
@@ -83,7 +86,7 @@ class EditorCommandGroup(CommandGroup):
         self.add(name, title, apply, *keys, repeats=repeats)
 
     def add_arrows(self, name: str, title: str, action: ArrowAction, keys: str) -> None:
-        """Add a command for each arrow key; the first one stands for all in the help."""
+        """Add a command for each arrow key; only the first one has a title, for all of them in the help."""
         for direction, (x, y) in _ARROWS.items():
             key = keys.format(direction)
             self.add(name.format(direction), title, partial(action, x, y), key, repeats=True)
@@ -93,7 +96,7 @@ class EditorCommandGroup(CommandGroup):
 def list_commands(
     editor: Editor, canvas: EditorCanvas, documents: FileCommands, window: EditorWindowActions
 ) -> list[Command]:
-    """Return all commands that take no typed value.
+    """Return all commands that do not take a typed value.
 
     Parameters
     ----------
@@ -126,6 +129,7 @@ def list_commands(
 def _list_file_commands(
     editor: Editor, documents: FileCommands, window: EditorWindowActions
 ) -> EditorCommandGroup:
+    """Return the commands on files, on the picture under the map, and on the window as a whole."""
     ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
     ask_picture = partial(
         documents.ask_path, "Picture under the map", documents.open_background, PICTURE_SUFFIXES
@@ -151,6 +155,8 @@ def _list_file_commands(
 
 
 def _list_edit_commands(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
+    """Return the commands to undo, copy, select, move and delete, and those that control a drawing."""
+
     def select_all() -> None:
         editor.select(Selection.select_all(editor.sketch))
 
@@ -189,6 +195,8 @@ def _list_edit_commands(editor: Editor, window: EditorWindowActions) -> EditorCo
 
 
 def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
+    """Return the commands to rotate, mirror, align, distribute, restack, group, lock and hide objects."""
+
     def release_all() -> None:
         editor.apply(properties.release(editor.sketch))
 
@@ -222,6 +230,8 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
 
 
 def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
+    """Return the commands that combine obstacles, or convert them to something else."""
+
     def clip() -> None:
         selection = editor.selection.without_vertices()
         editor.apply(boolean.clip_to_boundary(editor.sketch, selection))
@@ -245,6 +255,7 @@ def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
 
 
 def _list_vertex_commands(editor: Editor) -> EditorCommandGroup:
+    """Return the commands on corners, walls, outlines and paths of obstacles."""
     bevel = partial(actions.trim_corners, editor, vertices.bevel_corners)
     round_corners = partial(actions.trim_corners, editor, vertices.round_corners)
     widen = partial(actions.scale_wall_width, editor, WALL_WIDTH_STEP)
@@ -279,6 +290,8 @@ def _list_grid_commands(editor: Editor) -> EditorCommandGroup:
 def _list_view_commands(
     editor: Editor, canvas: EditorCanvas, window: EditorWindowActions
 ) -> EditorCommandGroup:
+    """Return the commands that change the view, the window, or what is shown."""
+
     def fit_selection() -> None:
         canvas.fit(editor.selection)
 
@@ -305,6 +318,8 @@ def _list_view_commands(
 
 
 def _list_robot_commands(editor: Editor) -> EditorCommandGroup:
+    """Return the commands on starts and the team."""
+
     def add_uniform_start() -> None:
         editor.apply(create.add_uniform_start(editor.sketch))
 

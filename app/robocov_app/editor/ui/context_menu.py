@@ -1,4 +1,4 @@
-"""The commands of the context menu, by the kind of the selection."""
+"""Commands of the context menu, which depend on the selection."""
 
 from robocov.environment import PolygonObstacle, WallObstacle
 from robocov_app.editor.editor import Editor
@@ -16,7 +16,7 @@ DRAW_COMMANDS = (
 
 
 def list_menu_commands(editor: Editor) -> list[str]:
-    """Return the names of the commands that apply to the selection, with empty ones between groups."""
+    """Return the names of the commands that apply to the selection; an empty name separates two groups."""
     if editor.selection.vertices:
         groups = _list_vertex_groups(editor)
     else:
@@ -41,6 +41,7 @@ def _list_object_groups(editor: Editor) -> list[list[str]]:
 
 
 def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
+    """Return the groups of commands for a selection that contains obstacles."""
     selection = editor.selection
     count = len(selection.items & editor.sketch.index_by_key.keys())
     groups = [["cut", "copy", "duplicate", "delete"]]
@@ -61,7 +62,7 @@ def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
 
 
 def _list_shape_commands(editor: Editor) -> list[str]:
-    """Return commands that apply to the kinds of the selected obstacles."""
+    """Return the commands that depend on the kinds of the selected obstacles and on their problems."""
     selection = editor.selection
     index_by_key = editor.sketch.index_by_key
     shapes = [editor.sketch.get_item(key).shape for key in selection.items if key in index_by_key]
@@ -82,6 +83,7 @@ def _list_shape_commands(editor: Editor) -> list[str]:
 
 
 def _list_vertex_groups(editor: Editor) -> list[list[str]]:
+    """Return the groups of commands for selected vertices."""
     selection = editor.selection
     edit = ["delete", "bevel", "round"]
     align = ["align:left", "align:bottom"]

@@ -1,4 +1,4 @@
-"""Fields of the panel: the value that each shows, and how it applies a typed value."""
+"""Fields of the panel: which value each field shows, and how it applies a typed value."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from robocov_app.editor.settings import SETTING_ATTRIBUTES
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, run_typed_command
 
-DECIMALS = 4  # of numbers in fields: a tenth of a millimeter
+DECIMALS = 4  # decimal places of numbers in fields: tenths of a millimeter
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class PanelField:
     Attributes
     ----------
     read : callable
-        Returns the text for an editor; raises MapError or LookupError if there is no value.
+        Takes the editor, and returns the text to show. Raises MapError or LookupError if there is no value.
     write : callable
-        Gets the editor and the typed text; raises MapError if that means nothing.
+        Takes the editor and the typed text, and applies it. Raises MapError if the text is invalid.
     tip : str
         Tool tip.
     """
@@ -39,7 +39,7 @@ class PanelField:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Position of the selection, m, and size of its bounding box, m."""
+    """Position of the selection and size of its bounding box, m."""
 
     x: float
     y: float
@@ -48,14 +48,18 @@ class _Frame:
 
 
 def format_number(value: float | None) -> str:
-    """Format a number for a field, without trailing zeros; None as an empty text."""
+    """Format a number for a field, without trailing zeros; None becomes an empty text."""
     if value is None:
         return ""
     return f"{round(value, DECIMALS) + 0.0:.12g}"
 
 
 def _compute_frame(editor: Editor) -> _Frame:
-    """Return the position of a vertex, of a center, or of the box's lower left corner, and the size."""
+    """Return the position of the selection and the size of its bounding box.
+
+    The position is that of a single vertex, the center of a single circle or disc, or else the lower left
+    corner of the box.
+    """
     sketch, selection = editor.displayed
     bounds = transform.compute_bounds(sketch, actions.select_owners(selection))
     x, y, high_x, high_y = require(bounds, "nothing is selected")
@@ -99,11 +103,11 @@ def _write_y(editor: Editor, text: str) -> None:
 
 
 def _parse_step(text: str, present: float) -> float:
-    """Return the distance from the present coordinate to a typed one, or a typed step as ``+0.5``, m."""
+    """Return the step, m, to a typed coordinate from the present one; ``+0.5`` is the step itself."""
     text = text.strip()
     if text.startswith(("+", "@")):
         return parse_length(text.lstrip("+@"))
-    # Parsed as a point, so that signs and units mean the same as everywhere else.
+    # The coordinate is parsed as that of a point, so that signs and units have the same meaning as elsewhere.
     x, _ = parse_point(f"{text} 0", last=(present, 0.0))
     return x - present
 
@@ -119,7 +123,7 @@ def _write_height(editor: Editor, text: str) -> None:
 
 
 def _resize(editor: Editor, width: float, height: float) -> None:
-    """Resize the selection; a size of 0 m stays as it is."""
+    """Resize the selection; a width or height of 0 m follows in proportion to the other."""
     selection = actions.select_owners(editor.selection)
     editor.apply(transform.resize(editor.sketch, selection, width or None, height or None))
 
@@ -186,7 +190,7 @@ def set_picture_opacity(editor: Editor, opacity: float) -> None:
 
 
 def _build_setting_field(word: str, tip: str) -> PanelField:
-    """Return a field for a setting that has a typed command."""
+    """Build the field of a setting that is also a typed command."""
 
     def read(editor: Editor) -> str:
         return format_number(getattr(editor, SETTING_ATTRIBUTES[word]))
@@ -195,7 +199,7 @@ def _build_setting_field(word: str, tip: str) -> PanelField:
 
 
 def _build_length_field(attribute: str, word: str, tip: str) -> PanelField:
-    """Return a field for a length that the selected objects have in common."""
+    """Build the field of a length that the selected objects have in common."""
 
     def read(editor: Editor) -> str:
         return format_number(actions.find_common_length(editor, attribute))
@@ -223,4 +227,4 @@ FIELDS: dict[str, PanelField] = {
     "picture:scale": PanelField(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
     "picture:turn": PanelField(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),
 }
-"""The fields of the panel by their names."""
+"""The fields of the panel by name."""

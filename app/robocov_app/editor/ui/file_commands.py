@@ -1,4 +1,4 @@
-"""Commands on files: open, save, import, export, recover, with the questions that have to be asked."""
+"""Commands on files: open, save, import, export and recover, with the dialogs that they need."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -28,10 +28,10 @@ from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.dialogs import Option, create_file_choice, create_list_choice
 
 Action: TypeAlias = Callable[[], object]
-IMPORT_PATIENCE_S = 2.0  # after which an import whose settings have changed is abandoned
+IMPORT_PATIENCE_S = 2.0  # an import that takes longer is aborted when its settings change
 MIN_BACKGROUND_WIDTH_M = 1.0
-MAX_PARENT_FOLDERS = 1  # in the path of a picture relative to its map
-HEADER_BYTES = 4096  # of a file, which name the format of a map
+MAX_PARENT_FOLDERS = 1  # maximum number of ".." in the path of a picture relative to its map
+HEADER_BYTES = 4096  # first bytes of a file, in which the format of a map is named
 OPEN_SUFFIXES = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 _CANCEL = ("Cancel", "c", lambda: None)
@@ -52,11 +52,11 @@ class FileCommands:
     editor : Editor
         The editor.
     drafts : Path or None
-        Folder of drafts; None to keep none.
+        Folder for drafts; None to save no drafts.
     fit : callable
-        Shows the whole map.
+        Fits the view to the whole map.
     waits_for_workers : bool
-        Whether to wait for imports.
+        Whether to import in this process and wait, instead of in the background.
 
     Attributes
     ----------
@@ -72,13 +72,15 @@ class FileCommands:
         self.may_close = False
         self._fit = fit
         self._waits_for_workers = waits_for_workers
-        self._pending: Document | None = None  # opened, until the present document may be closed
+        # A document that is open, but not shown until the current one may be closed.
+        self._pending: Document | None = None
 
     def leave(self, then: Action) -> None:
-        """Close the document, after asking about unsaved changes, and then run an action."""
+        """Run an action and close the document, after asking the user about unsaved changes."""
         document = self.editor.document
 
         def discard() -> None:
+            # The document is kept if the action fails.
             then()
             document.close(discard=True)
 
@@ -91,12 +93,12 @@ class FileCommands:
         self.editor.ask_question("Save the changes?", text, *answers)
 
     def _leave_for(self, document: Document, message: str) -> None:
-        """Show another document as soon as the present one may be closed."""
+        """Show a document as soon as the current one may be closed, which may need an answer of the user."""
         self._pending = document
         self.leave(lambda: self._show(document, message))
 
     def _close_pending(self) -> None:
-        """Close a document that was opened but not shown, because the present one stayed open."""
+        """Close a document that was opened but never shown, because the user kept the current one."""
         if self._pending is not None:
             self._pending.close(discard=True)
             self._pending = None
@@ -111,7 +113,7 @@ class FileCommands:
         self.editor.show_message(message)
 
     def quit(self) -> None:
-        """Close the editor."""
+        """Close the editor, after asking the user about unsaved changes."""
 
         def allow_closing() -> None:
             self.may_close = True
@@ -119,25 +121,25 @@ class FileCommands:
         self.leave(allow_closing)
 
     def new(self) -> None:
-        """Open a new map."""
+        """Open a new map in place of the current one."""
         message = "a new map: 10 x 10 m; B draws another boundary"
         self.leave(lambda: self._show(Document.new(self.drafts), message))
 
     def ask_path(
         self, title: str, action: Callable[[Path], object], suffixes: Sequence[str], text: str = ""
     ) -> None:
-        """Ask for a path, and call an action with it.
+        """Open a dialog for a path, and call an action with the path that the user chooses.
 
         Parameters
         ----------
         title : str
             Title of the dialog.
         action : callable
-            Gets the path.
+            Takes the path.
         suffixes : sequence of str
             Suffixes of the files that are offered.
         text : str
-            The path that is suggested.
+            Suggested path.
         """
 
         def choose(path: Path) -> None:
@@ -147,7 +149,7 @@ class FileCommands:
         self.editor.dialogs.ask(dialog)
 
     def ask_recent(self) -> None:
-        """Ask for a recent or bundled map, and open it."""
+        """Open a dialog with recent and bundled maps, and open the one that the user chooses."""
         options = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
         options += [Option(name, "comes with robocov; opens as a copy") for name in list_bundled_maps()]
 
@@ -157,7 +159,7 @@ class FileCommands:
         self.editor.dialogs.ask(create_list_choice("Open a recent or bundled map", lambda: options, choose))
 
     def open(self, path: Path) -> None:
-        """Open a map, or import a foreign file; the open map itself is reloaded.
+        """Open a map, or import a file of another format. If the map is open already, it is reloaded.
 
         Raises
         ------
@@ -179,7 +181,10 @@ class FileCommands:
             self.ask_import(path, result)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
-        """Ask how a foreign file is to be imported, and open the result."""
+        """Open the import dialog for a file of another format, and then open the imported map.
+
+        The file is imported in a separate process, which the dialog controls.
+        """
 
         def accept(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
@@ -194,26 +199,26 @@ class FileCommands:
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, accept))
 
     def recover(self, draft: MapDraft) -> None:
-        """Open a map that an editor left unsaved."""
+        """Open the map of a draft that another editor left behind."""
         message = f"recovered: {draft.describe()}"
         self.leave(lambda: self._show(Document.recover(draft, self.drafts), message))
 
     def remember(self, path: Path) -> None:
-        """Put a path at the top of the recent maps."""
+        """Move a path to the top of the recent maps."""
         # Links are not resolved, so that the user recognizes the path.
         name = os.path.abspath(path)  # noqa: PTH100
         others = [recent for recent in self.editor.recent if recent != name]
         self.editor.recent = [name, *others][:MAX_RECENT]
 
     def save(self, then: Action | None = None) -> str | None:
-        """Save the map, and then run an action; return the status message."""
+        """Save the map, and then run an action; return the status message, or None if a dialog was opened."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
     def ask_name(self, then: Action | None = None) -> None:
-        """Ask for a path, save the map there, and then run an action."""
+        """Open a dialog for a path, save the map there, and then run an action."""
         folder = self.editor.folder
         suggested = self.editor.document.suggest_path(folder)
         text = str(suggested)
@@ -224,7 +229,10 @@ class FileCommands:
     def _save(
         self, path: Path, then: Action | None, *, overwrites: bool = False, replaces_valid_map: bool = False
     ) -> str | None:
-        """Save the map, after asking before a file is replaced that has changed or contains a valid map."""
+        """Save the map, and then run an action; return the status message, or None if a dialog was opened.
+
+        The user is asked first if the file has changed, or if an invalid map would replace a valid one.
+        """
         document = self.editor.document
         may_replace = overwrites or replaces_valid_map
         if not may_replace and document.would_replace_valid_map(path):
@@ -252,8 +260,8 @@ class FileCommands:
         self.editor.ask_question(title, text, save_as, ("Replace it", "r", overwrite), _CANCEL)
 
     def ask_export(self) -> None:
-        """Ask for a path, and export the map there."""
-        # Raises before a path is chosen if the map cannot be exported.
+        """Open a dialog for a path, and export the map there; raise MapError if the map is invalid."""
+        # This raises an error before the dialog is opened if the map cannot be exported.
         self.editor.sketch.build_environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
@@ -272,7 +280,7 @@ class FileCommands:
         return "; ".join([f"exported: {files}", *report.warnings, *report.dropped])
 
     def poll(self) -> None:
-        """Accept an import that is ready, and look for changes of the file."""
+        """Accept a finished import, and report changes of the file by other programs."""
         editor = self.editor
         dialog = editor.dialogs.current
         if isinstance(dialog, ImportDialog):
@@ -293,21 +301,21 @@ class FileCommands:
             editor.ask_question("The file has changed", text, reload, keep)
 
     def reload(self) -> str:
-        """Read the file again, which can be undone; return the status message."""
+        """Read the file again, as a change that can be undone; return the status message."""
         require(self.editor.document.path, "the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
         return f"read again: {self.editor.document.title}"
 
     def open_background(self, path: Path) -> None:
-        """Put a picture under the map, and choose its tool."""
+        """Put a picture under the map, and choose the tool that scales and moves it."""
         set_reference_image(self.editor, path)
         self.editor.choose_tool("picture")
         self._fit()
 
 
 def set_reference_image(editor: Editor, path: Path) -> None:
-    """Put a picture under the map, as wide as the map, or 20 m wide.
+    """Put a picture under the map. It becomes as wide as the map, or gets a default width.
 
     Raises
     ------
@@ -335,7 +343,7 @@ def set_reference_image(editor: Editor, path: Path) -> None:
 
 
 def _describe_picture_path(path: Path, map_path: Path | None) -> str:
-    """Return the path of a picture as in a map: relative to a map in a nearby folder, otherwise absolute."""
+    """Return the path of a picture as written in a map: relative if the map is nearby, otherwise absolute."""
     path = path.resolve()
     if map_path is not None:
         try:
@@ -349,24 +357,24 @@ def _describe_picture_path(path: Path, map_path: Path | None) -> str:
 
 
 def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
-    """Open a map, or detect the format of a foreign file.
+    """Open a map, or detect the format of another file.
 
     Parameters
     ----------
     path : Path
-        A map, a foreign file, or the path of a new map.
+        Path of a map, of a file in another format, or of a new map.
     drafts : Path or None
-        Folder of drafts; None to keep none.
+        Folder for drafts; None to save no drafts.
 
     Returns
     -------
     Document or Importer
-        The opened map, or the importer of a foreign file.
+        The opened map, or the importer for the format of the file.
 
     Raises
     ------
     MapError
-        If the file is neither a map nor of a known format.
+        If the file is neither a valid map nor in a known format.
     """
     require_regular_file(path)
     has_map_suffix = path.suffix.lower() == SUFFIX
@@ -381,7 +389,7 @@ def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
     try:
         return detect_format(path)
     except MapError:
-        # The error of a foreign file names its format; that of a broken map names the mistake.
+        # For a broken map, the first error is more useful, because it names the mistake.
         if has_map_suffix or _is_map(path):
             raise map_error from None
         raise
@@ -397,7 +405,7 @@ def describe_opening(document: Document) -> str:
 
 
 def _is_map(path: Path) -> bool:
-    """Return whether a file claims to be a map, or cannot be read."""
+    """Return whether a file seems to be a map by its first bytes; also true if it cannot be read."""
     try:
         with path.open("rb") as file:
             return b"robocov-map" in file.read(HEADER_BYTES)

@@ -1,4 +1,4 @@
-"""The import dialog: options on the left, the map before and after on the right, the report below."""
+"""The import dialog: options on the left, the map before and after on the right, the report below them."""
 
 import math
 from collections.abc import Callable
@@ -33,7 +33,7 @@ REPORT_LINE_PX = 17
 OPTIONS_MARGIN_PX = 44  # below the options, for the buttons
 HELP_MARGIN_PX = 40  # below the help of an option
 BUTTONS_HEIGHT_PX = 30
-CHIP_WIDTH_PX = 78  # of a color with its role
+CHIP_WIDTH_PX = 78  # of a button that shows a color and its role
 CHIP_GAP_PX = 6
 SWATCH_PX = 12
 MAPS_GAP_PX = 14  # between maps and report
@@ -49,29 +49,29 @@ _ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ig
 
 
 class ImportDialog(Dialog):
-    """Asks how a file is to be imported, with a live preview.
+    """Dialog for the options of an import, with a live preview.
 
     Parameters
     ----------
     path : Path
-        The file.
+        File to import.
     importer : Importer
-        Its format.
+        Importer for the format of the file.
     worker : Worker of Imported
-        Imports it.
+        Imports the file in the background.
     call : callable
-        Gets the imported map that the user accepts.
+        Takes the imported map when the user accepts it.
 
     Attributes
     ----------
     form : ImportForm
-        The options of the import, as typed and chosen.
+        Options of the import, as text that the user typed or chose.
     imported : Imported or None
-        The map with the newest settings that could be imported.
+        The map from the latest import that succeeded.
     accepted : bool
-        Whether the user has accepted the map, as soon as it is ready.
+        Whether the user has accepted the map, which may still have to be imported.
     click_action : str
-        Effect of a click into a map: it keeps a part, or sets the role of a color.
+        Effect of a click on a map: `KEEP_PART` of the free space, or `SET_COLOR` to a role.
     """
 
     width = 10_000.0  # as wide as the window
@@ -88,25 +88,25 @@ class ImportDialog(Dialog):
         self.click_action = KEEP_PART
         self.preview = ImportPreview()
         self._worker = worker
-        self._mistake = ""  # in the options
+        self._mistake = ""  # error in the options
         self._request()
 
     @property
     def sheet(self) -> ColorSheet | None:
-        """The file in its own colors, if these can be given roles."""
+        """The file in its own colors; None if colors cannot have roles in this format."""
         if self.imported is None or "free_color" not in self.importer.options:
             return None
         return self.imported.sheet
 
     @property
     def _shown_sheet(self) -> ColorSheet | None:
-        """The file in its own colors, if a click sets the role of a color."""
+        """The file in its own colors if a click sets the role of a color; otherwise None."""
         if self.click_action != SET_COLOR:
             return None
         return self.sheet
 
     def _request(self) -> None:
-        """Request an import with the present settings."""
+        """Request an import with the current settings."""
         self.accepted = False
         self._mistake = ""
         try:
@@ -116,7 +116,7 @@ class ImportDialog(Dialog):
             self._mistake = str(error)
 
     def poll(self) -> Imported | None:
-        """Return the imported map once the user has accepted it and it is ready."""
+        """Receive a finished import; return the map if the user has accepted it, otherwise None."""
         imported = self._worker.poll()
         if imported is not None and not self._worker.is_busy:
             self.imported = imported
@@ -133,7 +133,7 @@ class ImportDialog(Dialog):
 
     @property
     def problem(self) -> str:
-        """Why the file cannot be imported with the present settings; empty while that is not known."""
+        """Reason why the file cannot be imported with the current settings; empty if none is known."""
         if self._mistake:
             return self._mistake
         if self._worker.is_busy:
@@ -142,22 +142,22 @@ class ImportDialog(Dialog):
 
     @property
     def is_ready(self) -> bool:
-        """Whether the map has been imported with the present settings."""
+        """Whether the map has been imported with the current settings."""
         return self.imported is not None and not self.is_busy and not self.problem
 
     def handle_key(self, name: str, ui: Ui) -> bool:
-        """Accept the map with Enter; return whether the key was used."""
+        """Accept the map if the key is Enter; return whether the key was used."""
         is_accepting = name in ("return", "enter") and ui.open_list is None
         if is_accepting:
             self.accepted = True
         return is_accepting
 
     def handle_cancel(self) -> None:
-        """End the import."""
+        """End the process that imports."""
         self._worker.close()
 
     def show_content(self, ui: Ui) -> None:
-        """Draw the dialog."""
+        """Draw the options on the left, and the maps with the report below them on the right."""
         left = ui.x
         top = ui.y
         width = ui.width
@@ -177,7 +177,7 @@ class ImportDialog(Dialog):
         ui.width = width
 
     def _draw_maps(self, ui: Ui, height: float) -> None:
-        """Draw the two maps, or a text while there is none."""
+        """Draw the two maps in a given height, px, or a text if there is no map yet; handle clicks."""
         top = ui.y
         ui.row(height=height, below=0)
         box, is_clicked = ui.area("maps")
@@ -201,7 +201,7 @@ class ImportDialog(Dialog):
     def _draw_preview(self, surface: Surface, ui: Ui, imported: Imported) -> None:
         self.preview.draw(surface, imported, ui.scale, ui.theme, self._shown_sheet)
         if self.problem:
-            # The maps are those of earlier settings.
+            # The maps belong to earlier settings.
             self.preview.veil(surface, ui.theme)
             return
         position = self.form.find_inside()
@@ -209,7 +209,7 @@ class ImportDialog(Dialog):
             self.preview.mark(surface, position, ui.scale, ui.theme)
 
     def _click(self, pixel: tuple[int, int]) -> None:
-        """Keep the part under a pixel, or change the role of its color."""
+        """Handle a click on a map: keep the part of the free space there, or change the role of the color."""
         for number, camera in enumerate(self.preview.cameras):
             if not Rect(camera.view).collidepoint(pixel):
                 continue
@@ -220,12 +220,12 @@ class ImportDialog(Dialog):
                 if color is not None:
                     self.form.cycle_color(color)
             else:
-                # No finer than a pixel.
+                # Round the position to the size of a pixel.
                 digits = max(0, math.ceil(math.log10(camera.zoom)))
                 self.form.keep_inside((round(x, digits), round(y, digits)))
 
     def _draw_click_actions(self, ui: Ui) -> None:
-        """Draw the choice of the effect of a click, and the colors with their roles."""
+        """Draw the buttons that choose the effect of a click, and the colors with their roles."""
         ui.row(56, 84, 84, 0, height=24, below=6)
         ui.label("A click", style="unit")
         part_tip = "A click into a map keeps that part of the free space"
@@ -251,6 +251,7 @@ class ImportDialog(Dialog):
         ui.end_row()
 
     def _draw_chip(self, ui: Ui, color: Color) -> None:
+        """Draw the button of a color, which shows its role; a click changes the role."""
         role = find_role(self.form.entries, color)
         name = name_color(color)
         key = f"color:{name}"
@@ -266,7 +267,7 @@ class ImportDialog(Dialog):
             pygame.draw.rect(ui.surface, ui.theme.faint, swatch, 1)
 
     def _draw_options(self, ui: Ui, foot: float) -> None:
-        """Draw the options, the help of the focused one, and the buttons; `foot` is the lower edge."""
+        """Draw the options, the help of the focused option and the buttons, above the lower edge `foot`."""
         ui.paragraph(f"Import {self.path.name}", size=16, bold=True)
         ui.label(self.importer.title, style="unit")
         ui.end_row()
@@ -289,6 +290,7 @@ class ImportDialog(Dialog):
         return self.imported.report.format_lines()
 
     def _draw_report(self, ui: Ui, foot: float) -> None:
+        """Draw the report of the import or the problem, and a hint, above the lower edge `foot`."""
         lines: list[str] = []
         for text in self._list_report_lines():
             lines += wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))

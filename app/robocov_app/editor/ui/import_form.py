@@ -1,4 +1,4 @@
-"""The options of an import: their texts, and the fields in which they are typed and chosen."""
+"""The options of an import as text, and the fields in which the user types or chooses it."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -16,14 +16,14 @@ from robocov_app.toolkit.widgets.ui import Ui
 
 # Lengths in pixels at scale 1.
 OPTION_LABEL_WIDTH_PX = 126
-MAX_ROW_PX = 28.0  # of an option
+MAX_ROW_PX = 28.0  # maximum height of the row of an option
 
 MAX_ENTRY_CHARACTERS = 200
 DEFAULT_TEXT = "default"
 
 
 class ImportForm:
-    """The options of an import, as typed and chosen.
+    """The options of an import, as text that the user typed or chose.
 
     Parameters
     ----------
@@ -35,23 +35,23 @@ class ImportForm:
     Attributes
     ----------
     options : tuple of ImportOption
-        The options.
+        All options of the format.
     entries : dict of str to str
-        Typed and chosen texts by the names of options; options with their default value have none.
+        Text by option name, for options that do not have their default value.
     """
 
     def __init__(self, importer: Importer, handle_change: Callable[[], object]) -> None:
         self.options = list_options(importer)
         self.entries: dict[str, str] = {}
         self._handle_change = handle_change
-        self._focused_ui: Ui | None = None  # in which the first field has got the text cursor
+        self._focused_ui: Ui | None = None  # where the first field has received the text cursor
 
     def find_option(self, name: str) -> ImportOption:
-        """Return the option of a name."""
+        """Return the option with a given name."""
         return next(option for option in self.options if option.name == name)
 
     def set(self, name: str, text: str) -> None:
-        """Set an option to a typed or chosen text; an empty one sets the default."""
+        """Set an option to text that the user typed or chose; empty text restores the default."""
         option = self.find_option(name)
         if not text or text in (option.default, DEFAULT_TEXT):
             self.entries.pop(name, None)
@@ -60,24 +60,24 @@ class ImportForm:
         self._handle_change()
 
     def keep_inside(self, position: Point) -> None:
-        """Keep the part of the free space around a position, m."""
+        """Set the options so that the part of the free space around a position, m, is kept."""
         self.entries.pop("keep", None)
         self.set("inside", f"{position[0]:.10g} {position[1]:.10g}")
 
     def cycle_color(self, color: Color) -> None:
-        """Give a color the next role: free, solid, ignored, and none."""
+        """Give a color the next role in the cycle: none, free, solid, ignored."""
         set_role(self.entries, color, choose_next_role(find_role(self.entries, color)))
         self._handle_change()
 
     def find_inside(self) -> Point | None:
-        """Return the position around which the free space is kept, m; None if there is none."""
+        """Return the position around which the free space is kept, m; None if it is not set."""
         if "inside" not in self.entries:
             return None
         x, y = self.find_option("inside").parse(self.entries["inside"])
         return x, y
 
     def build_settings(self) -> tuple[ReadOptions, Shaping]:
-        """Return the settings that were typed and chosen; raise RobocovError if any means nothing."""
+        """Parse the options for reading and for shaping; raise RobocovError if an option is invalid."""
         reading_names = {field.name for field in fields(ReadOptions)}
         reading: dict[str, Any] = {}
         shaping: dict[str, Any] = {}
@@ -90,7 +90,7 @@ class ImportForm:
         return ReadOptions(**reading), Shaping(**shaping)
 
     def show(self, ui: Ui, foot: float) -> None:
-        """Show a row for each option above a lower edge, px at scale 1."""
+        """Show a row for each option, above the lower edge `foot`, px at scale 1."""
         if ui is not self._focused_ui:
             self._focused_ui = ui
             self._focus_first_field(ui)
@@ -101,7 +101,7 @@ class ImportForm:
         ui.end_row()
 
     def show_help(self, ui: Ui, foot: float) -> None:
-        """Show the help of the focused option above a lower edge, px at scale 1."""
+        """Show the help of the focused option, above the lower edge `foot`, px at scale 1."""
         text = next((option.help for option in self.options if option.name == ui.focus), "")
         max_lines = max(int((foot - ui.y) / (SMALL_TEXT_PX + 5)), 0)
         lines = wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))[:max_lines]
@@ -113,6 +113,7 @@ class ImportForm:
         ui.edit = TextEdit.select_all(self.entries.get(first, ""))
 
     def _show_option(self, ui: Ui, option: ImportOption) -> None:
+        """Show the label of an option, and its drop-down list or text field; apply what the user enters."""
         name = option.name
         present = self.entries.get(name, option.default)
         style = "bold" if name in self.entries else ""

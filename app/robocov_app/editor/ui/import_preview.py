@@ -1,4 +1,4 @@
-"""The two maps in the import dialog: as read, and as imported."""
+"""The two maps in the import dialog: as read from the file, and as imported."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 CAPTION_HEIGHT_PX = 40  # above each map
 MAPS_GAP_PX = 20
 MAP_MARGIN_PX = 2
-MIN_GAP_LENGTH_PX = 20  # shorter gaps are circled
+MIN_GAP_LENGTH_PX = 20  # shorter gaps have a circle around them
 MARK_ARM_PX = 7
 MARK_OPACITY = 150
 VEIL_OPACITY = 140
@@ -34,7 +34,7 @@ _CLEAR = (0, 0, 0, 0)
 
 
 class _Caption(NamedTuple):
-    """Caption of a map: title, facts, and the label of the marked areas."""
+    """Caption of a map: title, facts, and label and color of the marked areas."""
 
     title: str
     facts: str
@@ -48,12 +48,12 @@ class ImportPreview:
     Attributes
     ----------
     cameras : list of Camera
-        Views of the map as read and as imported.
+        Cameras of the map as read and as imported.
     """
 
     def __init__(self) -> None:
         self.cameras: list[Camera] = []
-        self._width = 0  # for a caption, px
+        self._width = 0  # maximum width of a caption, px
         self._picture: LatestValue[Surface] = LatestValue()
 
     def arrange(self, box: Rect, imported: Imported, scale: float) -> float:
@@ -62,7 +62,7 @@ class ImportPreview:
         Parameters
         ----------
         box : Rect
-            Free space, px.
+            Box for both maps with their captions, px.
         imported : Imported
             The maps.
         scale : float
@@ -95,7 +95,7 @@ class ImportPreview:
     def draw(
         self, screen: Surface, imported: Imported, scale: float, theme: Theme, sheet: ColorSheet | None
     ) -> None:
-        """Draw both maps with their captions; with a sheet, the first one in its own colors."""
+        """Draw both maps with captions; if `sheet` is not None, draw the first map in its own colors."""
         look = (*(camera.view for camera in self.cameras), scale, theme, sheet is not None)
 
         def draw_maps() -> Surface:
@@ -112,6 +112,7 @@ class ImportPreview:
     def _draw_caption(
         self, screen: Surface, camera: Camera, caption: _Caption, scale: float, theme: Theme
     ) -> None:
+        """Draw the caption above a map: the title with the label of marked areas, and the facts below it."""
         title_size = round(13 * scale)
         text_size = round(SMALL_TEXT_PX * scale)
         x = round(camera.view[0])
@@ -127,9 +128,10 @@ class ImportPreview:
         screen.blit(render_text(facts, text_size, theme.faint), (x, y + round(20 * scale)))
 
     def mark(self, screen: Surface, position: Point, scale: float, theme: Theme) -> None:
-        """Draw a cross at a position, m, of both maps."""
+        """Draw a cross at a position, m, on both maps."""
         for camera in self.cameras:
             x, y = camera.to_pixels(np.array(position)).tolist()
+            # A wide line in the background color under a thin one makes the cross visible everywhere.
             for line_width, color in ((5, theme.background), (2, theme.final)):
                 arm = MARK_ARM_PX * scale + line_width / 2
                 width = round(line_width * scale)
@@ -137,7 +139,7 @@ class ImportPreview:
                 pygame.draw.line(screen, color, (x, y - arm), (x, y + arm), width)
 
     def veil(self, screen: Surface, theme: Theme) -> None:
-        """Draw a veil over both maps, which are outdated."""
+        """Cover both maps with a translucent veil, to show that they are outdated."""
         for camera in self.cameras:
             left, top, width, height = camera.view
             veil = Surface((width, height), pygame.SRCALPHA)
@@ -146,6 +148,7 @@ class ImportPreview:
 
 
 def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) -> list[_Caption]:
+    """Return the captions of the map as read and as imported."""
     comparison = imported.comparison
     report = imported.report
     lost = _describe_difference(comparison.lost, "left out")
@@ -170,7 +173,7 @@ def _describe_difference(area: shapely.Geometry, verb: str) -> str:
 def _draw_comparison(
     size: tuple[int, int], comparison: ImportComparison, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
-    """Draw the free space before and after on a transparent picture of a size, px, with the differences."""
+    """Draw the free space before and after the import, with the differences, on a transparent image."""
     picture = Surface(size, pygame.SRCALPHA)
     before, after = cameras
     _draw_map(picture, before, comparison, comparison.before, theme)
@@ -205,7 +208,7 @@ def _draw_marked_area(picture: Surface, camera: Camera, area: shapely.Geometry, 
 def _fill_polygons(
     surface: Surface, camera: Camera, area: shapely.Geometry, inside: Sequence[int], holes: Sequence[int]
 ) -> None:
-    """Fill polygons and their holes, large ones first, because small ones may lie in their holes."""
+    """Fill polygons and their holes; large polygons first, because small ones may lie in their holes."""
     polygons = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]
     polygons.sort(key=lambda polygon: -shapely.Polygon(polygon.exterior).area)
     for polygon in polygons:

@@ -1,4 +1,4 @@
-"""A file in its own colors as the import dialog shows it, and the roles of its colors."""
+"""A file in its own colors, as shown in the import dialog, and the roles of these colors."""
 
 from collections import defaultdict
 from collections.abc import MutableMapping, Sequence
@@ -22,9 +22,9 @@ from robocov_app.formats.colors import (
 from robocov_app.formats.foreign_map import Painted, Thumbnail
 from robocov_app.render.camera import Camera
 
-MAX_COLORS = 12  # that are listed; others are chosen by a click on the picture
-COLOR_TOLERANCE = 24.0  # levels in each channel within which colors of a picture count as one
-MIN_LISTED_SHARE = 0.001  # of a picture; rarer colors are not listed
+MAX_COLORS = 12  # number of colors that are listed; others can be chosen by a click on the picture
+COLOR_TOLERANCE = 24.0  # colors of a picture that differ by at most this in each channel count as one
+MIN_LISTED_SHARE = 0.001  # of the pixels of a picture; rarer colors are not listed
 _ROLE_CYCLE: tuple[Role | None, ...] = (None, "free", "solid", "ignore")
 
 
@@ -35,11 +35,11 @@ class ColorSheet:
     Attributes
     ----------
     painted : tuple of Painted
-        Shapes of a drawing, from the bottom to the top.
+        Shapes of a drawing, from bottom to top.
     thumbnail : Thumbnail or None
-        A picture.
+        The picture, if the file is one.
     colors : tuple of Color
-        Its colors, the most frequent first.
+        Colors of the file, the most frequent first.
     """
 
     painted: tuple[Painted, ...]
@@ -47,7 +47,7 @@ class ColorSheet:
     colors: tuple[Color, ...]
 
     def find_color(self, x: float, y: float) -> Color | None:
-        """Return the color at a position, m; None where there is none."""
+        """Return the color at a position, m; None if there is none."""
         if self.thumbnail is not None:
             return self._find_pixel(self.thumbnail, x, y)
         point = shapely.Point(x, y)
@@ -57,6 +57,7 @@ class ColorSheet:
         return None
 
     def _find_pixel(self, thumbnail: Thumbnail, x: float, y: float) -> Color | None:
+        """Return the color of a picture at a position, m; None outside the picture."""
         left, bottom, right, top = thumbnail.bounds
         rows, columns = thumbnail.pixels.shape[:2]
         column = int((x - left) / (right - left) * columns // 1)
@@ -64,7 +65,7 @@ class ColorSheet:
         if not (0 <= row < rows and 0 <= column < columns):
             return None
         red, green, blue = thumbnail.pixels[row, column].tolist()
-        # Because of soft edges and noise, the frequent color that is nearest is meant.
+        # Soft edges and noise have many colors, so the nearest of the frequent colors is returned.
         key = ColorKey(tuple((color, "free") for color in self.colors), COLOR_TOLERANCE)
         nearest = key.find_nearest((red, green, blue))
         if nearest is None:
@@ -72,7 +73,7 @@ class ColorSheet:
         return nearest
 
     def draw(self, surface: Surface, camera: Camera) -> None:
-        """Draw the file into the view of a camera."""
+        """Draw the file in the view of a camera."""
         clip = surface.get_clip()
         view = Rect(camera.view)
         surface.set_clip(view)
@@ -87,7 +88,7 @@ class ColorSheet:
 
 
 def build_color_sheet(foreign: ForeignMap) -> ColorSheet | None:
-    """Return a foreign map in its own colors, None if it has none."""
+    """Build the color sheet of a foreign map; return None if the map has no colors."""
     if foreign.thumbnail is not None:
         return ColorSheet((), foreign.thumbnail, _list_pixel_colors(foreign.thumbnail))
     if not foreign.painted:
@@ -100,7 +101,7 @@ def build_color_sheet(foreign: ForeignMap) -> ColorSheet | None:
 
 
 def _list_pixel_colors(thumbnail: Thumbnail) -> tuple[Color, ...]:
-    """Return the frequent colors of a picture, without mixtures of two others."""
+    """Return the frequent colors of a picture, without mixtures of two more frequent ones."""
     pixels = thumbnail.pixels.reshape(-1, 3)
     values, counts = np.unique(pixels, axis=0, return_counts=True)
     min_count = MIN_LISTED_SHARE * len(pixels)
@@ -116,7 +117,7 @@ def _list_pixel_colors(thumbnail: Thumbnail) -> tuple[Color, ...]:
 
 
 def _is_mixture(color: Color, others: Sequence[Color]) -> bool:
-    """Return whether a color is near another, or between two others, as on soft edges."""
+    """Return whether a color is close to another one, or between two others, as on soft edges."""
     points = np.array(others, dtype=float).reshape(-1, 3)
     offsets = np.array(color, dtype=float) - points
     if (np.abs(offsets).max(axis=1) <= COLOR_TOLERANCE).any():
@@ -125,6 +126,7 @@ def _is_mixture(color: Color, others: Sequence[Color]) -> bool:
         directions = points - start
         squared_lengths = (directions**2).sum(axis=1)
         has_length = squared_lengths > 0.0
+        # Position of the nearest point to the color on the line to each other color, from 0 to 1.
         shares = np.divide(directions @ offset, squared_lengths, out=np.zeros(len(points)), where=has_length)
         between = start + np.clip(shares, 0.0, 1.0)[:, None] * directions
         differences = np.abs(between - np.array(color)).max(axis=1)
@@ -143,11 +145,12 @@ def _draw_thumbnail(surface: Surface, camera: Camera, thumbnail: Thumbnail) -> N
 
 
 def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, color: Color) -> None:
+    """Fill a polygon, without its holes."""
     outline = camera.to_pixels(shapely.get_coordinates(polygon.exterior))
     if not len(polygon.interiors):
         pygame.draw.polygon(surface, color, outline.tolist())
         return
-    # A layer of its own, so that what lies below is visible through the holes.
+    # The polygon is drawn on a separate layer, so that whatever is below is visible through the holes.
     low = np.floor(outline.min(axis=0))
     high = np.ceil(outline.max(axis=0))
     box = Rect(low.tolist(), (high - low + 1).tolist()).clip(surface.get_clip())
@@ -163,7 +166,7 @@ def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, co
 
 
 def find_role(entries: MutableMapping[str, str], color: Color) -> Role | None:
-    """Return the role that the typed options give to exactly this color."""
+    """Return the role that the options give to exactly this color; None if it has no role."""
     for role in ROLES:
         if color in map(parse_css_color_on_white, _list_words(entries, role)):
             return role
@@ -171,7 +174,7 @@ def find_role(entries: MutableMapping[str, str], color: Color) -> Role | None:
 
 
 def list_declared_colors(entries: MutableMapping[str, str]) -> list[Color]:
-    """Return the colors that have a role in the typed options."""
+    """Return the colors to which the options give a role."""
     colors: list[Color] = []
     for role in ROLES:
         for word in _list_words(entries, role):
@@ -182,12 +185,12 @@ def list_declared_colors(entries: MutableMapping[str, str]) -> list[Color]:
 
 
 def choose_next_role(role: Role | None) -> Role | None:
-    """Return the role that follows: none, free, solid, ignored."""
+    """Return the next role in the cycle: none, free, solid, ignored."""
     return _ROLE_CYCLE[(_ROLE_CYCLE.index(role) + 1) % len(_ROLE_CYCLE)]
 
 
 def set_role(entries: MutableMapping[str, str], color: Color, role: Role | None) -> None:
-    """Change the typed options so that a color has a role, or none."""
+    """Change the options so that a color has the given role, or no role."""
     for option_role in ROLES:
         words = [
             word for word in _list_words(entries, option_role) if parse_css_color_on_white(word) != color

@@ -1,4 +1,4 @@
-"""Options of an import, and the job that imports in another process."""
+"""Options of an import, and the service that imports maps in a separate process."""
 
 import ast
 import inspect
@@ -26,7 +26,7 @@ from robocov_app.jobs.messages import Channel
 OptionKind = Literal["number", "position", "words", "colors", "width", "text", "choice"]
 ImportSettings: TypeAlias = type[ReadOptions] | type[Shaping]
 ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
-"""A file, its format, and how it is to be read and shaped."""
+"""File, name of its format, and settings for reading and shaping."""
 
 ON = "yes"  # value of a switch that is on
 OFF = "no"
@@ -41,13 +41,14 @@ class ImportOption:
     name : str
         Name of the field of `ReadOptions` or `Shaping`.
     kind : str
-        A number; a position; words or colors between commas; a width in m or px; a text; or a choice.
+        Kind of the value: a number, a position, words or colors separated by commas, a width in m or px, any
+        text, or a choice.
     choices : tuple of str
         Possible values of a choice, the default first.
     default : str
-        Text that is shown where nothing was typed.
+        Text that is shown while the option has its default value.
     help : str
-        Its effect.
+        Help text: what the option does.
     """
 
     name: str
@@ -57,7 +58,7 @@ class ImportOption:
     help: str
 
     def parse(self, text: str) -> Any:
-        """Return the value of a typed or chosen text; raise ParameterError if it means nothing."""
+        """Parse text that the user typed or chose; raise ParameterError if it is invalid."""
         if self.kind == "choice":
             if text == ON:
                 return True
@@ -77,7 +78,7 @@ class ImportOption:
 
 
 def _parse_numbers(text: str) -> tuple[float, ...]:
-    """Return the numbers between blanks; none if any word is not a number."""
+    """Parse numbers separated by blanks; return an empty tuple if any of them is invalid."""
     try:
         return tuple(float(word) for word in text.split())
     except ValueError:
@@ -85,7 +86,7 @@ def _parse_numbers(text: str) -> tuple[float, ...]:
 
 
 def list_options(importer: Importer) -> tuple[ImportOption, ...]:
-    """Return the options of an importer, those of reading first."""
+    """Return the options of an importer: those for reading first, then those for shaping."""
     reading = [option for option in _list_fields(ReadOptions) if option.name in importer.options]
     return (*reading, *_list_fields(Shaping))
 
@@ -99,7 +100,7 @@ def _list_fields(settings: ImportSettings) -> Iterator[ImportOption]:
 
 
 def _read_field_docstrings(settings: ImportSettings) -> dict[str, str]:
-    """Return the texts below the fields of a dataclass in its source, by the names of the fields."""
+    """Return the docstrings of the fields of a dataclass, by field name, from its source code."""
     texts: dict[str, str] = {}
     (definition,) = ast.parse(inspect.getsource(settings)).body
     assert isinstance(definition, ast.ClassDef)
@@ -112,25 +113,28 @@ def _read_field_docstrings(settings: ImportSettings) -> dict[str, str]:
 
 
 def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
-    """Return the option for a field, by the type of its values."""
+    """Build the option for a field of a dataclass, with a kind that follows from the type of the field."""
     name = field.name
     default = ""
     if field.default is not None:
         default = str(field.default)
     if get_origin(hint) not in (Literal, tuple):
-        # An optional type becomes the type that is not None.
+        # Optional types: use the type other than None.
         members = [member for member in get_args(hint) if member is not type(None)]
         hint = next(iter(members), hint)
     if hint is bool:
         return ImportOption(name, "choice", (OFF, ON), OFF, help_text)
     if get_origin(hint) is Literal:
+        # False sorts before True, so the default comes first.
         choices = tuple(sorted(get_args(hint), key=lambda choice: bool(default) and choice != default))
         return ImportOption(name, "choice", choices, default, help_text)
     return ImportOption(name, _choose_kind(name, hint), (), default, help_text)
 
 
 def _choose_kind(name: str, hint: Any) -> OptionKind:
+    """Return the kind of an option that is not a choice, by its name and type."""
     if get_origin(hint) is tuple:
+        # Tuples of a fixed length are positions.
         if ... not in get_args(hint):
             return "position"
         if name.endswith("_color"):
@@ -152,11 +156,11 @@ class Imported:
     environment : Environment
         The map.
     report : ImportReport
-        Objects that were read, changed and left out.
+        What was read, changed and left out.
     comparison : ImportComparison
-        The free space before and after.
+        The free space before and after the import.
     sheet : ColorSheet or None
-        The file in its own colors.
+        The file in its own colors; None if it has none.
     """
 
     environment: Environment
@@ -166,7 +170,7 @@ class Imported:
 
 
 class _ReadKey(NamedTuple):
-    """Everything on which reading a file depends."""
+    """Everything that determines the result of reading a file."""
 
     path: Path
     format: str
@@ -174,7 +178,7 @@ class _ReadKey(NamedTuple):
 
 
 class ImportJob:
-    """Imports maps; keeps the latest file, because shaping it again takes less time than reading it."""
+    """Service that imports maps. The latest file is cached, because shaping is faster than reading."""
 
     failure_message = "the map could not be imported"
 
@@ -183,7 +187,7 @@ class ImportJob:
         self._sheet: tuple[_ReadKey, ColorSheet | None] | None = None
 
     def __call__(self, questions: list[ImportRequest], channel: Channel) -> Imported:
-        """Import the newest request."""
+        """Import the file of the newest request."""
         path, format_name, options, shaping = questions[-1]
         key = _ReadKey(path, format_name, options)
         foreign = self._read_map(key)
@@ -193,13 +197,13 @@ class ImportJob:
 
     def _read_map(self, key: _ReadKey) -> ForeignMap:
         if self._read is None or self._read[0] != key:
-            # Frees the memory of the previous file first.
+            # Free the memory of the previous file first.
             self._read = None
             self._read = (key, read_map(key.path, format=key.format, options=key.options))
         return self._read[1]
 
     def _build_sheet(self, key: _ReadKey, foreign: ForeignMap) -> ColorSheet | None:
-        """Return the file in its own colors, including those that its options leave out."""
+        """Return the file in its own colors, including shapes that the options leave out; cached."""
         options = replace(
             key.options,
             free_color=None,

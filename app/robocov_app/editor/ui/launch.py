@@ -1,4 +1,4 @@
-"""Opening the editor with or without a display, from the options of the command line."""
+"""Opens the editor with the options of the command line, with or without a display."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -46,21 +46,21 @@ class EditorLauncher:
     Attributes
     ----------
     path : Path or None
-        Map to open, or foreign file to import; None for a new map.
+        Map to open, or file in another format to import; None for a new map.
     folder : Path
-        Folder of files without a path, and of the drafts of a `served` window.
+        Working folder for files; if `served`, also the folder in which drafts are stored.
     background : Path or None
         Picture to put under the map.
     theme : str or None
-        ``light`` or ``dark``; None for the one used last.
+        ``light`` or ``dark``; None for the theme that was used last.
     size : tuple of int or None
-        Width and height, px; None for those used last.
+        Width and height, px; None for the size that was used last.
     scale : float or None
-        Size of texts and widgets; None for the one used last.
+        Size of text and widgets; None for the scale that was used last.
     headless : bool
-        Whether to draw without a display; neither settings nor drafts are kept.
+        Whether to draw without a display. Neither settings nor drafts are saved.
     served : bool
-        Whether to draw for a browser: without a display, but in real time. No settings are kept.
+        Whether to draw for a browser: without a display, but in real time. Settings are not saved.
     """
 
     path: Path | None
@@ -74,7 +74,7 @@ class EditorLauncher:
 
     @contextmanager
     def window(self) -> Iterator[EditorWindow]:
-        """Open the window with its settings, and keep those that were changed.
+        """Open the window with the saved settings, and save those that have changed when it closes.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class EditorLauncher:
         if not isinstance(document, Document):
             document = Document.new(self._draft_folder)
         with ExitStack() as stack:
-            # Does nothing if the document has been closed before.
+            # This does nothing if the document has been closed before.
             stack.callback(document.close, discard=False)
             worker = stack.enter_context(closing(create_measurement_worker(direct=self.headless)))
             stack.enter_context(open_display(headless=not self._has_display, missing_message=NO_DISPLAY))
@@ -110,7 +110,7 @@ class EditorLauncher:
                 is_discarded = window.documents.may_close
             finally:
                 window.close()
-                # Unsaved changes are kept to be offered, unless the user has decided about them.
+                # Unsaved changes are kept as a draft, unless the user has decided to save or discard them.
                 editor.document.close(discard=is_discarded)
 
     @property
@@ -119,7 +119,7 @@ class EditorLauncher:
 
     @property
     def _draft_folder(self) -> Path | None:
-        """Folder for drafts; None if none are kept."""
+        """Folder for drafts; None if no drafts are saved."""
         if self.headless:
             return None
         if self.served:
@@ -127,7 +127,7 @@ class EditorLauncher:
         return find_draft_folder(None)
 
     def _read_file(self) -> Document | Importer:
-        """Return the document to edit, or the importer of a foreign file."""
+        """Open the document to edit, or return the importer for a file in another format."""
         drafts = self._draft_folder
         if self.path is None:
             return Document.new(drafts)
@@ -141,13 +141,14 @@ class EditorLauncher:
         return ""
 
     def _prepare_editor(self, editor: Editor, settings: EditorSettings) -> None:
-        """Apply the options to the editor."""
+        """Apply the theme, and put the picture under the map."""
         editor.theme = self.theme or settings.theme
         if self.background is not None:
             set_reference_image(editor, self.background)
             editor.choose_tool("picture", shows_hint=False)
 
     def _open_window(self, editor: Editor, settings: EditorSettings) -> EditorWindow:
+        """Open the window of an editor, and offer to recover drafts."""
         drafts = self._draft_folder
         scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
         size = self._choose_size(settings)
@@ -161,7 +162,7 @@ class EditorLauncher:
         return window
 
     def _choose_size(self, settings: EditorSettings) -> tuple[int, int]:
-        """Return the size of the window, px; that of the settings is limited to the display."""
+        """Return the size of the window, px: the given size, or the saved size limited to the display."""
         if self.size:
             return self.size
         saved = (settings.width, settings.height)
@@ -171,7 +172,7 @@ class EditorLauncher:
 
 
 def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
-    """Offer to recover the first of several drafts; after discarding it, the next one."""
+    """Open a dialog that offers to recover the first draft; if it is discarded, offer the next one."""
     if not drafts:
         return
     draft = drafts[0]
@@ -193,7 +194,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 
 
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
-    """Return the present settings of a window; those that it does not change are as before."""
+    """Return the current settings of a window; settings that cannot change there are as in `before`."""
     editor = window.editor
     width, height = limit_window_size(window.windowed_size or window.screen.get_size())
     changes: dict[str, object] = {

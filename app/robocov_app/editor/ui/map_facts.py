@@ -1,4 +1,4 @@
-"""Facts about the map that the panel and the status bar show."""
+"""Facts about the map, for the panel and the status bar."""
 
 from typing import NamedTuple
 
@@ -19,9 +19,9 @@ class Fact(NamedTuple):
     Attributes
     ----------
     label : str
-        Its name.
+        Name of the fact.
     text : str
-        The fact; "…" while the map is being measured.
+        Value of the fact; "…" if the map has not been measured yet.
     tip : str
         Tool tip.
     """
@@ -32,7 +32,7 @@ class Fact(NamedTuple):
 
 
 def list_map_facts(editor: Editor) -> list[Fact]:
-    """Return the facts on the map page of the panel."""
+    """Return the facts for the map page of the panel."""
     sketch = editor.sketch
     measurement = editor.measurement
     return [
@@ -103,7 +103,7 @@ def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[st
     frame_rate : float
         Frames per second.
     team : Team or None
-        The team at a start.
+        The team that is shown at a start.
     """
     texts: list[str] = []
     if editor.cursor is not None:

@@ -1,4 +1,4 @@
-"""The editor's panel: buttons, tools, and pages that follow the selection."""
+"""The panel of the editor: buttons, tools, and pages, one of which depends on the selection."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -31,13 +31,13 @@ from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
 from robocov_app.toolkit.widgets.ui import Ui
 
 TOOL_COLUMNS = 4
-ROW_HEIGHT_PX = 20.0  # of a line of a list
+ROW_HEIGHT_PX = 20.0  # height of a row in a list
 LABEL_WIDTH_PX = 62.0
 SHORT_LABEL_WIDTH_PX = 14.0
 MEDIUM_LABEL_WIDTH_PX = 48.0
 UNIT_WIDTH_PX = 16.0
-MAX_PROBLEMS = 200  # that are listed
-MAX_PROBLEM_COUNT = 99  # in the title of their page
+MAX_PROBLEMS = 200  # number of problems that are listed
+MAX_PROBLEM_COUNT = 99  # largest number of problems in the title of their page
 NOTHING_SELECTED = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab selects the next; Ctrl A selects all."
@@ -52,9 +52,9 @@ class FieldCell(NamedTuple):
     name : str
         Name of the field in `FIELDS`.
     label : str
-        Text before it.
+        Text before the field.
     unit : str
-        Text after it.
+        Text after the field.
     """
 
     name: str
@@ -159,7 +159,7 @@ OBJECT_BUTTONS: dict[str, tuple[tuple[PanelButton, ...], ...]] = {
         ),
     ),
 }
-"""Rows of buttons of the page "object", by the kind of the selection."""
+"""Rows of buttons on the page "object", by the kind of the selection; see `find_object_kind`."""
 
 _NAMED_KINDS = ("polygon", "circle", "wall", "disc", "start")
 _NOTED_KINDS = ("polygon", "circle", "wall", "several")
@@ -167,7 +167,7 @@ _SIZED_KINDS = ("polygon", "wall", "several", "boundary")
 
 
 class EditorPanel(CommandPanel):
-    """Shows the editor, and lets it be edited.
+    """Panel of the editor.
 
     Parameters
     ----------
@@ -176,9 +176,9 @@ class EditorPanel(CommandPanel):
     commands : CommandTable
         The commands of the window.
     run_command : callable
-        Runs a command given its name.
+        Takes the name of a command, and runs it.
     show_problem : callable
-        Called when a problem was clicked.
+        Called after a problem was clicked.
     """
 
     tabs = ("map", "object", "snap", "problems", "history")
@@ -196,7 +196,7 @@ class EditorPanel(CommandPanel):
         self._show_problem = show_problem
 
     def update(self) -> None:
-        """Draw the panel again if anything that it shows has changed."""
+        """Request a redraw if anything that the panel shows has changed."""
         editor = self.editor
         sketch, selection = editor.displayed
         state = (
@@ -212,7 +212,7 @@ class EditorPanel(CommandPanel):
             self.ui.needs_redraw = True
 
     def list_pages(self) -> dict[str, PanelPage]:
-        """Return the pages by the names of their tabs."""
+        """Return the functions that draw the pages, by tab name."""
         return {
             "map": self._draw_map_page,
             "object": self._draw_object_page,
@@ -222,7 +222,7 @@ class EditorPanel(CommandPanel):
         }
 
     def show_content(self, ui: Ui) -> None:
-        """Show the buttons that stay in sight, the tools, and the page that is open."""
+        """Show the title, the buttons and tools that are always visible, and the open page."""
         ui.inset(12, 8, 12)
         document = self.editor.document
         title = document.title
@@ -247,6 +247,7 @@ class EditorPanel(CommandPanel):
             self._run_command(command)
 
     def _draw_field(self, ui: Ui, cell: FieldCell) -> None:
+        """Draw the label, text and unit of a field; apply the text that the user enters."""
         editor = self.editor
         field = FIELDS[cell.name]
         ui.label(cell.label, key=f"word:{cell.name}", tip=field.tip)
@@ -271,6 +272,7 @@ class EditorPanel(CommandPanel):
         self._draw_field(ui, FieldCell(name, label))
 
     def _draw_map_page(self, ui: Ui) -> None:
+        """Draw the page "map": name, description, facts, robots and starts."""
         with ui.scroll("map"):
             self._draw_wide_field(ui, "title", "Name")
             self._draw_wide_field(ui, "description", "About")
@@ -292,6 +294,7 @@ class EditorPanel(CommandPanel):
             self._draw_check(ui, "show:robots", "Show the team there", is_on=is_on)
 
     def _draw_object_page(self, ui: Ui) -> None:
+        """Draw the page "object": fields and buttons for the selection, and a list of vertices or objects."""
         editor = self.editor
         kind = find_object_kind(editor)
         if kind == "nothing":
@@ -313,6 +316,7 @@ class EditorPanel(CommandPanel):
             self._draw_object_list(ui)
 
     def _draw_object_fields(self, ui: Ui, kind: str) -> None:
+        """Draw the fields that a selection of the given kind has."""
         if kind in _NAMED_KINDS:
             self._draw_wide_field(ui, "name", "Name")
         if kind in _NOTED_KINDS:
@@ -327,6 +331,7 @@ class EditorPanel(CommandPanel):
             self._draw_field_pair(ui, FieldCell("width", "Thick", "m"))
 
     def _draw_snap_page(self, ui: Ui) -> None:
+        """Draw the page "snap": snap modes, grid, visible layers, and the picture under the map."""
         with ui.scroll("snap"):
             ui.header("SNAP TO")
             ui.row(0, 0, height=20, below=3)
@@ -343,6 +348,7 @@ class EditorPanel(CommandPanel):
             self._draw_picture_section(ui)
 
     def _draw_picture_section(self, ui: Ui) -> None:
+        """Draw the buttons, fields and opacity slider of the picture under the map."""
         ui.header("PICTURE UNDER THE MAP")
         self.show_buttons(ui, PICTURE_BUTTONS)
         scale = FieldCell("picture:scale", "Pixel", "m")
@@ -359,6 +365,7 @@ class EditorPanel(CommandPanel):
             self.editor.attempt(lambda: set_picture_opacity(self.editor, round(opacity, 2)))
 
     def _draw_problems_page(self, ui: Ui) -> None:
+        """Draw the page "problems": buttons, and a list of all problems."""
         problems = self.editor.problems
         self.show_buttons(ui, PROBLEM_BUTTONS)
         with ui.scroll("problems"):
@@ -370,13 +377,13 @@ class EditorPanel(CommandPanel):
             for number, problem in enumerate(problems[:MAX_PROBLEMS]):
                 is_fixed = self._draw_problem(ui, number, problem)
                 if is_fixed:
-                    # The remaining problems are those of the map before.
+                    # The remaining problems are those of the map before the fix.
                     return
             if len(problems) > MAX_PROBLEMS:
                 ui.paragraph(f"… and {len(problems) - MAX_PROBLEMS} more", color=ui.theme.faint)
 
     def _draw_problem(self, ui: Ui, number: int, problem: Problem) -> bool:
-        """Draw a problem; return whether its fix has been applied."""
+        """Draw a problem with its badge and fix; return whether the user has applied the fix."""
         editor = self.editor
         fix = FIXES.get(problem.kind)
         text_width = ui.width - 44
@@ -403,10 +410,11 @@ class EditorPanel(CommandPanel):
         return False
 
     def _draw_history_page(self, ui: Ui) -> None:
+        """Draw the page "history": a list of all steps, in which a click undoes or redoes changes."""
         history = self.editor.document.history
         self.show_buttons(ui, HISTORY_BUTTONS)
         undone = history.redo_descriptions
-        steps: list[tuple[str, int]] = []  # description, and number of changes to undo to get there
+        steps: list[tuple[str, int]] = []  # description, and number of changes to undo (negative: redo)
         steps += [(text, k - len(undone)) for k, text in enumerate(reversed(undone))]
         steps += [(text, k) for k, text in enumerate(history.undo_descriptions)]
         steps.append(("as it was opened", len(history.undo_descriptions)))
@@ -420,10 +428,10 @@ class EditorPanel(CommandPanel):
                     self.editor.undo_steps(count)
 
     def _draw_object_list(self, ui: Ui) -> None:
-        """Draw the list of all objects, the topmost obstacle first."""
+        """Draw the list of all objects, the topmost obstacle first; a click selects an object."""
         editor = self.editor
         sketch = editor.sketch
-        rows: list[tuple[Owner, str]] = []  # object, and its marks
+        rows: list[tuple[Owner, str]] = []  # object, and text about its marks
         rows += [(item.key, _describe_marks(item)) for item in reversed(sketch.obstacles)]
         rows += [(name, "") for name, _ in sketch.starts]
         if sketch.boundary is not None:
@@ -437,6 +445,7 @@ class EditorPanel(CommandPanel):
                     self._select(Selection.of(owner), editor.selection.without_vertices())
 
     def _draw_vertex_list(self, ui: Ui) -> None:
+        """Draw the list of the vertices of the selected objects; a click selects a vertex."""
         editor = self.editor
         vertices = []
         for owner in editor.vertex_owners:
@@ -452,14 +461,14 @@ class EditorPanel(CommandPanel):
                     self._select(Selection(vertices=frozenset({vertex})), previous)
 
     def _select(self, clicked: Selection, previous: Selection) -> None:
-        """Select the clicked object; with Shift, add it to the previous selection or remove it."""
+        """Select what was clicked in a list; with Shift, add it to the previous selection or remove it."""
         if pygame.key.get_mods() & pygame.KMOD_SHIFT:
             clicked = previous.toggle(clicked)
         self.editor.select(clicked)
 
 
 def _describe_marks(item: Item) -> str:
-    """Return the text next to an obstacle in the list of objects: its group, locked and hidden."""
+    """Return the text next to an obstacle in the list of objects: group, and whether locked or hidden."""
     marks: list[str] = []
     if item.group:
         marks.append(item.group)

@@ -1,4 +1,4 @@
-"""The viewer on the map that is being edited, in the same window, and the return to the editor."""
+"""Play mode: the viewer opens the edited map in the same window, and later returns to the editor."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,19 +23,19 @@ from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window.window import ViewerWindow
 
-DRAFT_PAUSE_S = 1.0  # between two drafts of a map that is tried
+DRAFT_PAUSE_S = 1.0  # minimum time between two drafts of a map in play mode
 FIRST_UPDATE_S = 0.01
 
 
 class PlayFiles(FileActions):
-    """The viewer's files, among which the map that is tried is offered by its title.
+    """The file actions of the viewer, which also offer the edited map by its title.
 
     Attributes
     ----------
     tried : Environment
         The map as it was in the editor.
     has_left_tried_map : bool
-        Whether another map was opened meanwhile.
+        Whether another map is open in the viewer.
     """
 
     def __init__(self, viewer: Presenter, folder: Path, title: str) -> None:
@@ -45,7 +45,7 @@ class PlayFiles(FileActions):
         self._title = title
 
     def open_map(self, name: str) -> None:
-        """Open a map, or the one that is tried by its title."""
+        """Open a map by name, or the edited map by its title."""
         if name == self._title:
             self._viewer.session.restart(environment=self.tried)
             self.map_name = name
@@ -59,7 +59,7 @@ class PlayFiles(FileActions):
 
 
 class PlayPresenter(Presenter):
-    """The viewer's presenter with the files of a trial."""
+    """The presenter of the viewer in play mode."""
 
     files: PlayFiles
 
@@ -69,12 +69,12 @@ class PlayPresenter(Presenter):
 
 
 class TrialDrafts:
-    """Keeps drafts of a map with the changes made in the viewer, about once a second.
+    """Saves drafts of the edited map with the changes made in the viewer, at most once a second.
 
     Parameters
     ----------
     document : Document
-        The document that is tried.
+        Document of the edited map.
     tried : Environment
         The map as it was in the editor.
     """
@@ -86,7 +86,7 @@ class TrialDrafts:
         self._due = 0.0
 
     def update(self, environment: Environment, *, at_once: bool) -> None:
-        """Keep a draft if the map has changed, and the previous draft is old enough or it is the last one."""
+        """Save a draft if the map has changed; unless `at_once`, not too soon after the previous one."""
         now = monotonic()
         if environment is self._drafted or (now < self._due and not at_once):
             return
@@ -100,16 +100,16 @@ class TrialDrafts:
 
 
 class PlayWindow(ViewerWindow):
-    """The viewer's window, from which F5 and Escape lead back to the editor.
+    """The window of the viewer in play mode, in which F5 and Escape return to the editor.
 
     Attributes
     ----------
     ended : bool
         Whether to return to the editor.
     held : int or None
-        The key that started it, until it is released, because it may repeat.
+        The key that started play mode, until it is released. Its repetitions are ignored.
     drafts : TrialDrafts
-        Keeps drafts of the map.
+        Saves drafts of the map.
     """
 
     viewer: PlayPresenter
@@ -130,7 +130,7 @@ class PlayWindow(ViewerWindow):
         super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event; F5 leads back."""
+        """Handle an event; F5 returns to the editor."""
         is_released = event.type == pygame.KEYUP and event.key == self.held
         if event.type == pygame.WINDOWFOCUSLOST or is_released:
             self.held = None
@@ -142,12 +142,12 @@ class PlayWindow(ViewerWindow):
             super().handle_event(event)
 
     def keep_draft(self, *, at_once: bool = False) -> None:
-        """Keep a draft of the map with the changes made here, unless another map was opened."""
+        """Save a draft of the map with the changes made here, unless another map was opened."""
         if not self.viewer.files.has_left_tried_map:
             self.drafts.update(self.viewer.session.displayed.environment, at_once=at_once)
 
     def do(self, name: str) -> None:
-        """Run a command; Escape leads back where it would do nothing."""
+        """Run a command; Escape returns to the editor if there is nothing to cancel."""
         is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
         viewer = self.viewer
         hand = viewer.toolbox.hand
@@ -161,18 +161,18 @@ class PlayWindow(ViewerWindow):
 def start_trial(
     editor: Editor, screen: pygame.Surface, scale: float, *, waits_for_workers: bool
 ) -> PlayWindow:
-    """Open the viewer on the map of an editor.
+    """Open the map of an editor in the viewer.
 
     Parameters
     ----------
     editor : Editor
         The editor.
     screen : Surface
-        The window in which the viewer is shown.
+        Screen of the window in which the viewer is shown.
     scale : float
-        Size of texts and widgets.
+        Size of text and widgets.
     waits_for_workers : bool
-        Whether to wait for everything that is computed in the background.
+        Whether to wait for everything instead of computing in the background.
 
     Raises
     ------
@@ -203,26 +203,26 @@ def start_trial(
     except BaseException:
         costs.close()
         raise
-    # Without an update the first frame would have no panel.
+    # Without this update, the first frame would have no panel.
     trial.panel.update(FIRST_UPDATE_S)
     viewer.show_message(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
     return trial
 
 
 def build_trial_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Return the obstacles drawn, moved and deleted in the viewer as one change.
+    """Build one change of all obstacles that were drawn, moved or deleted in the viewer.
 
     Parameters
     ----------
     sketch : Sketch
         The map in the editor.
     before, after : Environment
-        The map as it was tried, and as it is in the viewer.
+        The map when play mode started, and the current one of the viewer.
 
     Returns
     -------
     Change or None
-        The change; None if no obstacle has changed. Obstacles that are the same keep their key and note.
+        None if no obstacle has changed. Unchanged obstacles keep their keys and marks.
     """
     if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
         return None

@@ -1,4 +1,4 @@
-"""The mouse over the editor's map: tools, panning, double clicks, the wheel and the context menu."""
+"""The mouse over the map of the editor: tools, panning, double clicks, wheel and context menu."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 
 
 class EditorPointer(Pointer):
-    """Turns mouse events over the map into actions of the tools, and pans.
+    """Passes mouse events over the map to the tools, and pans and zooms the view.
 
     Parameters
     ----------
@@ -25,14 +25,14 @@ class EditorPointer(Pointer):
     canvas : EditorCanvas
         The view of the map.
     panel : SidePanel
-        The panel, which gets events first.
+        The panel, which receives events first.
     open_menu : callable
         Opens the context menu at a pixel.
 
     Attributes
     ----------
     pans_with_left : bool
-        Whether the left button pans, because a key is held down.
+        Whether the left button pans, while a key is held down.
     """
 
     def __init__(
@@ -50,21 +50,21 @@ class EditorPointer(Pointer):
 
     @property
     def is_panning(self) -> bool:
-        """Whether dragging pans."""
+        """Whether a drag pans the view."""
         return self.pans_with_left or (self.gesture is not None and self.gesture.is_pan)
 
     def hold_pan(self) -> None:
-        """Pan with the left button until the key is released."""
+        """Let the left button pan until the key is released."""
         self.pans_with_left = True
 
     def leave(self) -> None:
-        """Handle that the mouse has left the map."""
+        """Forget the position of the mouse, which has left the map."""
         self.editor.cursor = None
         self.canvas.at = None
         self.canvas.hovered = None
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        """Pan, show the message of a problem, or use the tool."""
+        """Handle a press: start to pan, show or hide the message of a problem, or start to use the tool."""
         if not self.canvas.contains(event.pos):
             return None
         tool = self.editor.tool
@@ -97,7 +97,7 @@ class EditorPointer(Pointer):
         editor.attempt(lambda: handle(editor, pointer))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
-        """Handle a click that did not pan: the right button completes a drawing, or opens the menu."""
+        """Handle a click of a button that pans: a right click completes a drawing or opens the menu."""
         editor = self.editor
         if event.button != RIGHT_BUTTON:
             return
@@ -107,7 +107,7 @@ class EditorPointer(Pointer):
             self._open_menu(event.pos)
 
     def hover(self, event: pygame.event.Event) -> None:
-        """Follow the mouse with the cursor, and with the tool while no button is held down."""
+        """Update the position of the mouse and, while no button is held down, what is under it."""
         editor = self.editor
         canvas = self.canvas
         is_over_map = canvas.contains(event.pos)
@@ -125,28 +125,28 @@ class EditorPointer(Pointer):
             editor.tool.guides = ()
 
     def move_tool(self, event: pygame.event.Event) -> None:
-        """Move the tool to the mouse."""
+        """Tell the tool that the mouse has moved."""
         editor = self.editor
         pointer = self._build_event(event.pos)
         revision = editor.revision
         editor.attempt(lambda: editor.tool.move(editor, pointer))
-        # The panel need not be drawn again for every move of the mouse.
+        # The panel need not be redrawn for every move of the mouse.
         editor.revision = revision
 
     def release_tool(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Release the tool at the mouse."""
+        """Tell the tool that the button was released."""
         editor = self.editor
         pointer = self._build_event(event.pos)
         editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))
         editor.document.history.starts_new_step = True
 
     def turn_wheel(self, event: pygame.event.Event) -> None:
-        """Zoom about the mouse by the notches of the wheel."""
+        """Zoom about the mouse position, by the notches that the wheel has turned."""
         if self.canvas.contains(self.at):
             self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), self.at)
 
     def _build_event(self, pixel: Pixel) -> EditorPointerEvent:
-        """Return the pointer at a pixel, snapped unless the tool or Ctrl prevents it."""
+        """Build the event of the pointer at a pixel; its point snaps unless the tool or Ctrl prevents it."""
         editor = self.editor
         tool = editor.tool
         raw = self.canvas.to_world(pixel)
@@ -171,7 +171,7 @@ class EditorPointer(Pointer):
 
 
 class EditorToolGesture(Gesture):
-    """Passes a drag on to the tool.
+    """Gesture that passes a drag to the tool.
 
     Parameters
     ----------
@@ -183,9 +183,9 @@ class EditorToolGesture(Gesture):
         self._pointer = pointer
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Move the tool."""
+        """Pass a move to the tool."""
         self._pointer.move_tool(event)
 
     def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Release the tool."""
+        """Pass the release of the button to the tool."""
         self._pointer.release_tool(event, is_click=is_click)

@@ -1,4 +1,4 @@
-"""Values that are typed for a tool while something is drawn."""
+"""Values that the user types for a tool, for example while drawing."""
 
 import pygame
 
@@ -14,7 +14,7 @@ _COMMAND_MODIFIERS = pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
 
 
 def type_for_tool(editor: Editor, event: pygame.event.Event) -> bool:
-    """Handle a key as part of a value for the tool; return whether it was."""
+    """Handle a key as part of a value for the tool; return whether the key was used."""
     if not _accepts_text(editor) or event.mod & _COMMAND_MODIFIERS:
         return False
     text = editor.typed
@@ -43,7 +43,10 @@ def _accepts_text(editor: Editor) -> bool:
 
 
 def _continues_value(editor: Editor, character: str) -> bool:
-    """Return whether a character can follow what is typed."""
+    """Return whether a character can follow the text typed so far.
+
+    Fewer characters can begin a value while the tool is idle, because others are keys of commands.
+    """
     if len(character) != 1:
         return False
     if editor.typed:

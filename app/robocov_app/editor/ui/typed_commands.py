@@ -1,4 +1,4 @@
-"""Commands that are typed with a value, such as ``rotate 30``."""
+"""Commands that the user types with a value, such as ``rotate 30``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ class TypedCommand:
     Attributes
     ----------
     word : str
-        Its name.
+        Name of the command.
     help : str
-        Example of a value with its meaning.
+        Example of a value, and its meaning.
     action : callable
-        Gets the editor and the value; raises MapError if that means nothing.
+        Takes the editor and the typed value; raises MapError if the value is invalid.
     """
 
     word: str
@@ -40,7 +40,7 @@ class TypedCommand:
 
 
 def list_typed_commands(editor: Editor) -> list[Command]:
-    """Return the typed commands for the palette."""
+    """Return the typed commands for the command palette."""
     commands = []
     for typed in TYPED_COMMANDS.values():
         run = partial(_carry_out, editor, typed.word)
@@ -61,14 +61,14 @@ def run_typed_command(editor: Editor, value: str, word: str) -> None:
     editor : Editor
         The editor.
     value : str
-        The value as it was typed.
+        Value that the user typed.
     word : str
-        The name of the command.
+        Name of the command.
 
     Raises
     ------
     MapError
-        If the value means nothing, or the command cannot be carried out.
+        If the value is invalid, or the command cannot be carried out.
     """
     value = value.strip()
     require(value, f"{word}: expected a value after it")
@@ -121,7 +121,7 @@ def _set_seed(editor: Editor, text: str) -> None:
 
 
 def _apply_edit(edit: Edit, parse: Callable[[str], object]) -> TypedAction:
-    """Return an action that applies an edit to the selected objects with one parsed value."""
+    """Build an action that parses a value, and applies an edit with this value to the selected objects."""
 
     def apply(editor: Editor, text: str) -> None:
         value = parse(text)
@@ -131,7 +131,7 @@ def _apply_edit(edit: Edit, parse: Callable[[str], object]) -> TypedAction:
 
 
 def _apply_common_length(edit: Edit, attribute: str) -> TypedAction:
-    """Return an action that gives the selected objects a length, m, which may be relative to the present."""
+    """Build an action that sets a length of the selected objects; the text may be relative, such as +0.1."""
 
     def apply(editor: Editor, text: str) -> None:
         length = parse_length(text, now=actions.find_common_length(editor, attribute))
@@ -248,4 +248,4 @@ _ROWS = (
     TypedCommand("title", "Hall: of the map", _set_title),
 )
 TYPED_COMMANDS = {row.word: row for row in _ROWS}
-"""The typed commands by their names."""
+"""The typed commands by name."""

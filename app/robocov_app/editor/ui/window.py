@@ -1,4 +1,4 @@
-"""The editor's window: events come in, frames go out; what happens in between is up to the editor."""
+"""The window of the editor, which handles events and draws frames."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -45,11 +45,11 @@ class EditorWindow(CommandWindow):
     size : tuple of int
         Width and height, px.
     scale : float
-        Size of texts and widgets.
+        Size of text and widgets.
     drafts : Path or None
-        Folder of drafts; None to keep none.
+        Folder for drafts; None to save no drafts.
     waits_for_workers : bool
-        Whether to wait for everything that is computed in the background.
+        Whether to wait for everything instead of computing in the background.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class EditorWindow(CommandWindow):
     pointer : EditorPointer
         The mouse over the map.
     trial : PlayWindow or None
-        The viewer in which the map is tried.
+        The viewer in play mode; None while the map is being edited.
     team_sampler : TeamSampler
         Computes the positions of the team at a start.
     """
@@ -104,7 +104,7 @@ class EditorWindow(CommandWindow):
         self.draw()
 
     def _build_actions(self) -> EditorWindowActions:
-        """Return the actions of the window that commands start."""
+        """Build the actions of the window for the commands that run them."""
         return EditorWindowActions(
             try_map=self.try_it,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
@@ -118,7 +118,7 @@ class EditorWindow(CommandWindow):
         )
 
     def create_save_point(self) -> Callable[[], None]:
-        """Return a function that undoes all changes made from now on."""
+        """Return a function that restores the current state of the document after an unexpected error."""
         editor = self.editor
         document = editor.document
         restore_history = document.history.build_save_point()
@@ -131,7 +131,7 @@ class EditorWindow(CommandWindow):
             try:
                 editor.tool.cancel(editor)
             except Exception:
-                # Choosing the tool again makes it forget its action.
+                # If the tool cannot be cancelled, the selection tool replaces it.
                 editor.toolbox.current = editor.toolbox.selector
                 raise
             finally:
@@ -141,13 +141,13 @@ class EditorWindow(CommandWindow):
         return restore
 
     def restore_view(self) -> None:
-        """Close everything that may be the cause of an exception in drawing."""
+        """Close everything that may have caused an error while drawing."""
         super().restore_view()
         self.editor.problem = None
         self.canvas.fit()
 
     def close(self) -> None:
-        """End the trial, and everything that is computed in the background."""
+        """End play mode and all background work."""
         if self.trial is not None:
             self.trial.keep_draft(at_once=True)
             self.trial.close()
@@ -156,7 +156,7 @@ class EditorWindow(CommandWindow):
         self.editor.snapper.close()
 
     def get_visible_state(self) -> object:
-        """Return everything that can change the frame without an event; None while something moves."""
+        """Return everything that can change the frame without an event; None to redraw it in any case."""
         editor = self.editor
         canvas = self.canvas
         dialog = editor.dialogs.current
@@ -188,7 +188,7 @@ class EditorWindow(CommandWindow):
         )
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Set scale and theme; `panel` shows or hides the panel, None leaves it as it is."""
+        """Set scale and theme, and show or hide the panel; `panel` None leaves the panel as it is."""
         self.scale = scale
         self.editor.theme = theme
         if panel is not None:
@@ -198,7 +198,7 @@ class EditorWindow(CommandWindow):
             self.trial.set_appearance(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
-        """Advance the clock: poll files and workers, and adapt layout, cursor and title."""
+        """Advance the clock, poll files and workers, and update layout, panel, cursor and title."""
         if self.trial is not None:
             self._update_trial(self.trial, seconds)
             return
@@ -245,7 +245,7 @@ class EditorWindow(CommandWindow):
         return self.editor.tool.choose_cursor(self.editor)
 
     def _arrange(self) -> None:
-        """Lay the window out again after a change of size, scale or theme."""
+        """Update the layout after a change of size, scale, panel or theme; otherwise do nothing."""
         editor = self.editor
         key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.theme)
         if key == self._arranged:
@@ -257,7 +257,7 @@ class EditorWindow(CommandWindow):
         self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
+        """Draw the map, the status bar, the panel, the message and everything above the map."""
         layout = self.layout
         theme = self.theme
         editor = self.editor
@@ -281,7 +281,7 @@ class EditorWindow(CommandWindow):
         self.canvas.show_problem(self.editor.problem)
 
     def _edit_name(self) -> None:
-        """Put the text cursor into the name of the selected object, or of the map."""
+        """Put the text cursor into the name of the selected object or, without one, of the map."""
         tab = "map"
         field = "title"
         if len(self.editor.selection.owners) == 1:
@@ -294,7 +294,7 @@ class EditorWindow(CommandWindow):
         self.panel.ui.set_focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the context menu, and select the object under a pixel unless it is selected."""
+        """Open the context menu at a pixel; first select the object there unless it is selected already."""
         editor = self.editor
         if self.canvas.contains(pixel) and not editor.selection.vertices:
             reach = 0.5 * REACH_PX * editor.pixel
@@ -305,9 +305,9 @@ class EditorWindow(CommandWindow):
         self.dialogs.ask(Menu(commands, pixel, self.do))
 
     def try_it(self) -> None:
-        """Open the viewer on the map in this window."""
+        """Open the map in the viewer, in this window."""
         if self.editor.toolbox.selector.is_busy:
-            # A drag ends, but an unfinished drawing stays.
+            # A drag is cancelled, but an unfinished drawing is kept.
             self.editor.toolbox.selector.cancel(self.editor)
         trial = start_trial(self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers)
         trial.windowed_size = self.windowed_size
@@ -340,7 +340,7 @@ class EditorWindow(CommandWindow):
         if change is not None and not viewer.files.has_left_tried_map:
             editor.apply(change)
         editor.document.update_draft()
-        # A key that is still held down repeats, and must not start the next trial.
+        # If the key is still held down, its repetitions must not start play mode again.
         if pygame.key.get_pressed()[pygame.K_F5]:
             self.commands.reset_keys(pygame.K_F5)
         else:
@@ -353,7 +353,7 @@ class EditorWindow(CommandWindow):
             self.do("quit")
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event; screenshots work while a dialog is open, too."""
+        """Handle an event; the key for screenshots works even while a dialog is open."""
         is_space_released = event.type == pygame.KEYUP and event.key == pygame.K_SPACE
         if is_space_released or event.type == pygame.WINDOWFOCUSLOST:
             self.pointer.pans_with_left = False
@@ -365,24 +365,24 @@ class EditorWindow(CommandWindow):
             super().handle_event(event)
 
     def handle_quit(self) -> None:
-        """Quit, unless a question is open; dialogs that hold nothing back are closed."""
+        """Quit, unless a question must be answered first; menus and the import dialog are closed."""
         if isinstance(self.dialogs.current, ImportDialog | Menu):
             self.dialogs.close()
         if not self.dialogs.is_open:
             self.do("quit")
 
     def open_file(self, path: Path) -> None:
-        """Open a map, or import a foreign file, that was dropped on the window."""
+        """Open or import a file that was dropped on the window."""
         self.documents.open(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Use a key in a field of the panel, or as part of a value for the tool."""
+        """Use a key for a text field, or as part of a value for the tool; return whether it was used."""
         if super().use_key(event):
             return True
         return not self.panel.ui.is_busy and type_for_tool(self.editor, event)
 
     def press_key(self, event: pygame.event.Event) -> None:
-        """Handle a key: as input, or as the key of a command."""
+        """Handle a key press, as input or as the key of a command."""
         super().press_key(event)
         if self.trial is not None:
             self.trial.held = event.key
