@@ -64,7 +64,6 @@ def draw_episode(
         If a map cannot be read.
     """
     options = options or {}
-    # A map is drawn even if an option replaces it, so that the numbers that follow stay the same.
     environment = sampler.draw(rng)
     if "map" in options:
         environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))

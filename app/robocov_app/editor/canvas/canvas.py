@@ -127,7 +127,8 @@ class EditorCanvas:
         rows = max(len(legend_strip.arrange_legend_rows(canvas, self.entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, self.editor.document, is_shown)
         if key == self._legend_key:
-            # The legend never shrinks in the same view, so that the map does not jump as entries come and go.
+            # As long as the key is the same, the legend does not shrink, so that the map does not jump when
+            # entries come and go.
             rows = max(rows, self._legend_rows)
         self._legend_rows = rows
         self._legend_key = key
@@ -159,6 +160,7 @@ class EditorCanvas:
         if selection:
             bounds = transform.compute_bounds(self.editor.sketch, selection)
         low_x, low_y, high_x, high_y = bounds or self.editor.sketch.bounds or EMPTY_VIEW_M
+        # Enlarge the bounds of small objects to the minimum size of the view.
         margin_x = max(MIN_VIEW_M - (high_x - low_x), 0) / 2
         margin_y = max(MIN_VIEW_M - (high_y - low_y), 0) / 2
         box = (low_x - margin_x, low_y - margin_y, high_x + margin_x, high_y + margin_y)

@@ -148,6 +148,7 @@ class TeamAtStart:
         true_radii = np.full(len(centers), team.radius * canvas.camera.zoom)
         readable = min(READABLE_RADIUS_PX * scale, MAX_RADIUS_PX)
         radii = np.minimum(fit_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
+        # 0.55: a thin gray line around each robot separates robots that touch.
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             # Half pixels, so that sprites can be reused.

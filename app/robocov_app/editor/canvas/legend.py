@@ -33,6 +33,7 @@ def build_legend_entries(
     list of LegendEntry
         Entries in the order in which they are shown.
     """
+    # Whether each entry is shown, its text, and the function that draws its symbol.
     rows: list[tuple[bool, str, Glyph]] = [
         (True, "obstacle", _draw_obstacle),
         (True, "boundary", _draw_boundary),

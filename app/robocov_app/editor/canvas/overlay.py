@@ -322,7 +322,7 @@ def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
-    """Write its length above each edge of a line, except for the last edge, which follows the cursor."""
+    """Write the length of each edge next to it, except for the last edge, which follows the cursor."""
     color = mix(canvas.theme.background, canvas.theme.ink, 0.85)
     size = canvas.theme.small_text
     for start, end in list(pairwise(line[:-1]))[-MAX_EDGE_LABELS:]:
@@ -334,6 +334,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
         if length < label_width:
             continue
         across = np.array([along[1], -along[0]]) / max(length, MIN_LENGTH_PX)
+        # The label is above the edge, or to the right of a vertical one; pixel rows count downwards.
         points_down = across[1] > 0 or (across[1] == 0 and across[0] < 0)
         if points_down:
             across = -across

@@ -213,7 +213,7 @@ class Sheet:
         outlines = [self.outlines.get(item) for item in items]
         rings = [ring for outline in outlines for ring in outline.rings]
         if rings:
-            # All rings are drawn together, which is much faster; `ends` divides their corners.
+            # All rings are drawn with one call. `ends` contains the index after the last corner of each ring.
             ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
             corners = canvas.camera.to_pixels(np.concatenate(rings))
             fills: list[Color | None] = []
@@ -308,6 +308,7 @@ def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) ->
     theme = view.theme
     fine_step, coarse_step = compute_grid_steps(view.grid, view.camera.zoom, view.scale)
     is_light = theme is LIGHT
+    # Shares of the grid color: the same shares would look stronger on a dark background.
     fine_share = 0.32 if is_light else 0.2
     coarse_share = 0.75 if is_light else 0.5
     if has_fine_lines:

@@ -199,6 +199,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
     _check_size(width, present_width, "width")
     _check_size(height, present_height, "height")
     require(width is not None or height is not None, "expected a width or a height")
+    # 0 stands for a factor that is not given.
     factor_x = (width or 0.0) / max(present_width, MIN_SIZE_M)
     factor_y = (height or 0.0) / max(present_height, MIN_SIZE_M)
     if width is None or height is None:
@@ -220,7 +221,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
 
 
 def _check_size(size: float | None, present: float, name: str) -> None:
-    """Raise MapError if a size, m, is out of range, or if the present size is too small to be scaled."""
+    """Raise MapError if a size, m, is out of range, or if the current size is too small to be scaled."""
     if size is None:
         return
     if not MIN_SIZE_M <= size <= MAX_SIZE_M:

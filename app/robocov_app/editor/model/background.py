@@ -158,6 +158,7 @@ MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 """Marks of an obstacle with their types. Empty and false values are not written to files."""
 
 _HOME = "editor"  # free key of the editor, unless another program uses it
+# Sections of the editor's key, each a list of entries with some of these marks.
 _SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OWN_KEYS = {*_SECTIONS, "background"}
 _LOST_NOTES = "notes of obstacles that are gone"
@@ -227,6 +228,7 @@ def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
 
     A key whose content the editor could not have written is left to other programs.
     """
+    # At most len(extra) keys can be in use, so the search ends after one more.
     for home in islice(_list_homes(), len(extra) + 1):
         content = extra.get(home)
         if not isinstance(content, dict) or _is_free(content):

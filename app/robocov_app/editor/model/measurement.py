@@ -207,6 +207,7 @@ def _build_reach_warnings(
     """Warn if robots fit nowhere, or if they cannot reach all parts of the free space from the largest."""
     if not free.is_empty and not swept:
         return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
+    # Parts without any connection are reported as sealed rooms, so each of them may have one swept part.
     min_area = np.pi * radius**2
     if len(swept) <= sum(part.area >= min_area for part in free.geoms):
         return []

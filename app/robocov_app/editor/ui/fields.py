@@ -103,7 +103,7 @@ def _write_y(editor: Editor, text: str) -> None:
 
 
 def _parse_step(text: str, present: float) -> float:
-    """Return the step, m, to a typed coordinate from the present one; ``+0.5`` is the step itself."""
+    """Return the step, m, to a typed coordinate from the current one; ``+0.5`` is the step itself."""
     text = text.strip()
     if text.startswith(("+", "@")):
         return parse_length(text.lstrip("+@"))

@@ -83,6 +83,7 @@ class ImportPreview:
         free_height = (box.height - (rows - 1) * gap) // rows
         height = min(free_height - caption_height, round(width / aspect))
         second_top = box.top + (rows - 1) * (caption_height + height + gap)
+        # With one column, the second map is below the first one; with two, to the right of it.
         corners = [box.topleft, (box.right - width, second_top)]
         map_width = float(min(width, round(height * aspect)))
         self.cameras = []

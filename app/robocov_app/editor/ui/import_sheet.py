@@ -126,7 +126,7 @@ def _is_mixture(color: Color, others: Sequence[Color]) -> bool:
         directions = points - start
         squared_lengths = (directions**2).sum(axis=1)
         has_length = squared_lengths > 0.0
-        # Position of the nearest point to the color on the line to each other color, from 0 to 1.
+        # Fractions along the lines to all other colors at which they are nearest to the color.
         shares = np.divide(directions @ offset, squared_lengths, out=np.zeros(len(points)), where=has_length)
         between = start + np.clip(shares, 0.0, 1.0)[:, None] * directions
         differences = np.abs(between - np.array(color)).max(axis=1)

@@ -192,6 +192,7 @@ def start_trial(
     )
     session = Session(scenario)
     if waits_for_workers:
+        # The simulation may take as long as it needs in each frame.
         session.playback.clock.budget = float("inf")
     costs = Costs(DEFAULT_LATTICE, direct=waits_for_workers)
     try:
@@ -230,6 +231,7 @@ def build_trial_change(sketch: Sketch, before: Environment, after: Environment) 
     items: list[Item] = []
     key = sketch.next_key
     for shape in after.obstacles:
+        # Shapes in the viewer have no keys, so unchanged obstacles are found by equality.
         same = next((item for item in remaining if item.shape == shape), None)
         if same is not None:
             remaining.remove(same)
