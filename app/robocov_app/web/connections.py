@@ -165,7 +165,8 @@ class Listener:
             timer.cancel()
 
     async def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        # Versions of websockets before 17 accept GET only, and lack the attribute.
+        """Answer a request; refuse other methods than GET and HEAD, and too many downloads at a time."""
+        # Versions of websockets before 17 accept only GET, and requests lack this attribute.
         method = getattr(request, "method", "GET")
         if method not in ("GET", "HEAD"):
             return respond(connection, HTTPStatus.METHOD_NOT_ALLOWED, "Expected GET or HEAD.\n")

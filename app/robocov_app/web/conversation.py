@@ -113,6 +113,7 @@ class Conversation:
     # Messages from the page
 
     async def _receive_messages(self) -> None:
+        """Handle the messages of the page; pause while it sends too many, or the window cannot keep up."""
         from websockets.exceptions import ConnectionClosed
 
         budget = _EventBudget()
@@ -218,6 +219,7 @@ class Conversation:
     # Messages to the page.
 
     async def _send_news(self) -> None:
+        """Send state, notices and frames to the page whenever there are new ones."""
         from websockets.exceptions import ConnectionClosed
 
         page = self._page

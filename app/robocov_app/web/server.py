@@ -187,6 +187,7 @@ class WebDisplay:
             self._file_executor.shutdown(wait=False, cancel_futures=True)
 
     async def _serve(self) -> None:
+        """Run the server until it is asked to stop; report an error in listening to the window's thread."""
         self._loop = asyncio.get_running_loop()
         listener = Listener(self._answer, self._talk)
         try:

@@ -162,6 +162,7 @@ class VisitorServer:
             await self._end_all(listener)
 
     async def _end_all(self, listener: Listener) -> None:
+        """End all windows and connections, and kill processes that do not end in time."""
         self._is_ending = True
         for process in self._processes:
             process.terminate()
@@ -221,6 +222,7 @@ class VisitorServer:
         return ""
 
     async def _download(self, connection: ServerConnection, visitor: str, name: str) -> Response:
+        """Return a saved file from the folder of a visitor's window."""
         window = self._windows.get(visitor)
         process = None if window is None else window.process
         if process is None or name not in list_saved(process.folder, process.opened_at):

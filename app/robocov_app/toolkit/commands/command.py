@@ -189,6 +189,7 @@ class CommandTable:
         attempt: Callable[[Callable[[], object]], object],
         list_temporary: Callable[[], Iterable[Command]] = _list_no_commands,
     ) -> None:
+        """Index the commands by name and by key."""
         self.commands = list(commands)
         self._attempt = attempt
         self._list_temporary = list_temporary
@@ -278,7 +279,7 @@ def split_command(text: str) -> tuple[str, str]:
 
 
 def find_commands(commands: Sequence[Command], text: str) -> list[Command]:
-    """Return the commands whose title or name contains all words of a text, best matches first."""
+    """Return the commands whose title or name contains all typed words, best matches first."""
     words = text.lower().split()
     start = text.lower().strip()
 

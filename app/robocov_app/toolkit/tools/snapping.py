@@ -100,9 +100,9 @@ def snap_point(
 def snap_move(
     points: Sequence[Point], dx: float, dy: float, targets: SnapTargets, settings: SnapSettings
 ) -> Snap:
-    """Snap the displacement of points that move together, by the one that snaps best.
+    """Snap the displacement of points that move together, by the point with the best snap.
 
-    Along each axis that has not snapped otherwise, the first point snaps to the grid, even beyond the reach.
+    Along each axis without such a snap, the first point snaps to the grid, however far that is.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ def shade(page: Page, fraction: float) -> Color:
 
 
 def get_text_size(*, small: bool) -> float:
-    """Return the size of a text at scale 1, px."""
+    """Return the text size for normal or small text, at scale 1, px."""
     if small:
         return SMALL_TEXT_PX
     return TEXT_PX
@@ -86,6 +86,7 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
     is_hovered = page.is_hovered(rect)
     is_held = page.active == key and bool(rect.collidepoint(page.pointer))
     if not enabled:
+        # Disabled: the colors are close to that of the panel, so the button looks faint.
         fill = theme.panel
         edge = shade(page, 0.14)
         ink = shade(page, 0.45)

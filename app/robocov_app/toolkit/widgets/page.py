@@ -95,6 +95,7 @@ class Page(RowLayout):
     """
 
     def __init__(self, theme: Theme, scale: float = 1.0) -> None:
+        """Build an empty page; its box must be set before it runs."""
         super().__init__(scale)
         self.theme = theme
         self.background: Color | None = theme.panel

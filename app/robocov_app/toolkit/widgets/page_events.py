@@ -19,6 +19,7 @@ class PageEvents:
     """
 
     def __init__(self, page: Page) -> None:
+        """Map each type of event to its handler."""
         self._page = page
         self._handlers = {
             pygame.MOUSEMOTION: self._handle_motion,

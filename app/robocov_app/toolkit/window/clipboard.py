@@ -6,7 +6,7 @@ import pygame
 
 from robocov.text import remove_controls
 
-_NOT_AVAILABLE = (pygame.error, AttributeError, ValueError)  # ValueError: a text that is not UTF-8
+_NOT_AVAILABLE = (pygame.error, AttributeError, ValueError)  # ValueError: the text is not valid UTF-8
 
 
 class Clipboard:

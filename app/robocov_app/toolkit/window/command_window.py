@@ -34,7 +34,7 @@ class WindowActions:
     toggle_fullscreen : callable
         Switches full screen on and off.
     save_screenshot : callable
-        Saves a picture of the window.
+        Saves a screenshot of the window.
     toggle_help : callable
         Shows or hides the help page.
     open_palette : callable
@@ -107,6 +107,7 @@ class CommandWindow(BaseWindow):
         scale: float,
         screen: Surface | None = None,
     ) -> None:
+        """Open the window; subclasses build the commands, the panel and the pointer."""
         super().__init__(size, screen)
         self.model = model
         self.dialogs = dialogs

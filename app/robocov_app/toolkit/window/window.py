@@ -95,6 +95,7 @@ class BaseWindow:
     contains_faults = True
 
     def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
+        """Open a window of the given size, or draw on an existing surface."""
         self.screen = screen or open_window(size)
         self.windowed_size: tuple[int, int] | None = None
         self.closed = False

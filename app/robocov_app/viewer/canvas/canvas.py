@@ -41,7 +41,7 @@ MAX_RAYS_PER_SCAN = 120
 MAX_RAYS_PER_PANE = 720
 MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
 UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
-MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, the caption says of which time it is
+MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, its caption states its time
 
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
@@ -243,6 +243,7 @@ class ViewerCanvas:
         """Adapt the color scale to the largest distance, m, but only when it has changed considerably."""
         low, high = _COLOR_LIMIT_RANGE
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
+            # Leave a margin of 10 %, so that the scale does not have to change again soon.
             self._color_limit = choose_color_limit(1.1 * largest)
 
     def _get_path(self, known: KnownCost | None) -> Array | None:

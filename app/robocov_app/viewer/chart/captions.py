@@ -56,7 +56,7 @@ def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) 
 
 
 def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
-    """Return a name followed by a text; the name is shortened so that both fit into a width, px."""
+    """Return a name and `text` in one string; the name is shortened to fit into a width, px."""
     size = canvas.theme.small_text
     name_width = width - canvas.measure_text(f"  {text}", size, bold=True)
     short_name = shorten_to_width(name, canvas.scale_text_size(size), name_width, bold=True)

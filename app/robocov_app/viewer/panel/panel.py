@@ -57,7 +57,7 @@ _LABEL_PX = 100
 _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
 _NUMBER_PX = (50, 34)  # the value and its unit
-_UNLIMITED_PX = (87,)  # a word in place of both
+_UNLIMITED_PX = (87,)  # the word "unlimited" instead of value and unit
 # Column widths of the rows with controllers: each controller has a button that removes its pane, and a gap.
 _SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
 _TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one

@@ -90,6 +90,7 @@ class SessionScenario:
     conditions: Annotated[Conditions | None, _CONDITIONS] = None
 
     def __post_init__(self) -> None:
+        """Check the numbers of robots and controllers."""
         if not 1 <= self.robots <= MAX_ROBOTS:
             expected = f"expected a whole number from 1 to {MAX_ROBOTS}"
             raise ParameterError(f"robots: {expected}, got {quote(self.robots)}")

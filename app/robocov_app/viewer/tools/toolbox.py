@@ -29,6 +29,7 @@ class ViewerToolbox(Toolbox[ViewerTool]):
     """
 
     def __init__(self, inspection: Inspection) -> None:
+        """Create the tools, in the order in which the panel shows them."""
         self.hand = HandTool(inspection)
         self.wall = AddWallTool()
         tools: list[ViewerTool] = [

@@ -226,6 +226,7 @@ class ViewerWindow(CommandWindow):
         )
 
     def _pass_time(self, seconds: float) -> None:
+        """Advance the message, drafts, saved runs, the lesson and the simulation by real time, s."""
         viewer = self.viewer
         viewer.pass_time(seconds)
         viewer.files.workspace.save_draft(viewer.files.view)
