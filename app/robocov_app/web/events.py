@@ -308,4 +308,5 @@ def _get_key_code(name: str, held: int) -> int:
     character = name.lower()
     if held & _SHIFT:
         character = character.translate(_UNSHIFTED)
+    # pygame's code of a character key is the character's code point.
     return ord(character) if len(character) == 1 and character.isascii() else 0

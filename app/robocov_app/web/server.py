@@ -157,6 +157,7 @@ class WebDisplay:
     def send(self, surface: pygame.Surface, cursor: int = pygame.SYSTEM_CURSOR_ARROW) -> None:
         """Send the frame and the state of the window to the pages, if they have changed."""
         delivery = self.shared.delivery
+        # The server's thread reads `newest`; it is woken only if the frame differs.
         previous = delivery.newest
         number = 1 if previous is None else previous.number + 1
         frame = Frame.from_surface(surface, number)

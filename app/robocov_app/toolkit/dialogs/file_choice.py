@@ -43,7 +43,7 @@ def create_file_choice(
     Choice
     """
     browser = _FileBrowser(folder, tuple(suffixes), tuple(recent))
-    saves = bool(text)
+    saves = bool(text)  # A proposed name means that the dialog saves a file rather than opens one.
 
     def accept_text(typed: str, option: Option | None) -> object:
         """Accept a file, or return the completion of a folder so that the dialog lists its content."""

@@ -113,6 +113,7 @@ def list_outline_edges(polygons: Sequence[shapely.Geometry]) -> Edges:
     """Return the edges of the outlines of polygons."""
     rings = shapely.get_rings(np.array(polygons, dtype=object))
     points, ring_numbers = shapely.get_coordinates(rings, return_index=True)
+    # Consecutive points form an edge unless they belong to different rings.
     is_edge = ring_numbers[1:] == ring_numbers[:-1]
     return Edges(points[:-1][is_edge], points[1:][is_edge])
 

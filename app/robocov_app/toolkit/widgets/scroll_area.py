@@ -46,11 +46,13 @@ def scroll(page: Page, key: str) -> Iterator[None]:
     page.clip = page.clip.clip(area)
     if page.surface is not None:
         page.surface.set_clip(page.clip)
+    # Shift the content up by the scroll offset; the clip hides what lies outside the area.
     page.y -= offset
     content_start = page.y
     page.clear_cells()
     yield
     page.end_row()
+    # The height is known only now. If it has changed, the scroll bar must be laid out again.
     new_height = page.y - content_start
     if abs(new_height - content_height) > _HEIGHT_TOLERANCE_PX:
         page.content_heights[key] = new_height
@@ -82,6 +84,7 @@ def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
     first = int((page.clip.top - page.box.top - page.px(page.y)) / page.px(height))
     first = min(max(first, 0), count)
     last = min(first + page.clip.height // page.px(height) + 2, count)
+    # Skip the invisible rows above and below without laying them out.
     page.y += first * height
     page.row(height=height, below=0)
     yield from range(first, last)

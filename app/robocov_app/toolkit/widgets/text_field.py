@@ -146,6 +146,7 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     selection.centery = rect.centery
     if start != end:
         screen.fill(mix(get_field_color(theme), theme.final, 0.35), selection)
+    # Composed text is shown at the caret and underlined, although it is not part of the text yet.
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
     image = render_text(text or placeholder, size, _get_text_color(page, text))
     screen.blit(image, image.get_rect(midleft=(left, rect.centery)))

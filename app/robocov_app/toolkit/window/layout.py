@@ -91,6 +91,7 @@ def build_layout(
     panel_width = timeline_height = chart_height = legend_height = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
+    # In small windows, the chart takes at most a third of the height.
     if plot:
         timeline_height = round(TIMELINE_HEIGHT_PX * scale)
         chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)

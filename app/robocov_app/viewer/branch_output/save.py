@@ -71,6 +71,7 @@ class _BranchWriter:
         costs: list[PartCost] = []
         part_rows: list[dict[str, Any]] = []
         run_rows: list[dict[str, Any]] = []
+        # A branch without edits has one part, whose files are directly in the result's folder.
         for number, part in enumerate(parts, 1):
             description = part.node.description
             folder = f"{number:02d}-{_build_folder_name(description)}" if has_several_parts else ""

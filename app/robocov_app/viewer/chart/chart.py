@@ -130,6 +130,7 @@ class Chart:
         """
         timeline = frame.timeline
         samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
+        # The key does not contain the samples of the curves, which change with almost every frame.
         key = (
             tuple(pane.number for pane in timeline.panes),
             len(timeline.events),

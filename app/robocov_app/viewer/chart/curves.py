@@ -134,6 +134,7 @@ def thin_points(points: Array) -> Array:
     """
     if len(points) < MIN_THINNED_POINTS:
         return points
+    # Keep the last point in each column of 1 / _MAX_POINTS_PER_PX pixels.
     columns = np.rint(points[:, 0] * _MAX_POINTS_PER_PX)
     is_last_in_column = np.append(columns[1:] != columns[:-1], True)
     return np.asarray(points[is_last_in_column])

@@ -36,7 +36,7 @@ def draw_events(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
         frame.draw_rule(canvas.surface, times.to_column(event.time), line_color, top=0)
     size = frame.theme.small_text
     row = scale.top + _TEXT_TOP_PX * frame.scale
-    free_from = scale.times.left
+    free_from = scale.times.left  # column from which on there is space for the next text
     for event in events:
         column = times.to_column(event.time)
         sign = _EVENT_SIGNS.get(event.kind, _OTHER_EVENT_SIGN)

@@ -345,6 +345,7 @@ class CostService:
                 channel.report_progress((fraction, remaining_s))
 
         self._varying_cost = None
+        # If only the density differs, the geodesic distances of the previous map can be reused.
         before = self._cost
         is_reusable = (
             before is not None

@@ -47,6 +47,7 @@ def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
     extent = float(np.hypot(*np.ptp(path, axis=0)))
     if path_length > _TREMBLING_RATIO * max(_MIN_SWAY_M, extent):
         return Motion.TREMBLING
+    # A robot that has covered some distance is moving steadily, or has just stopped.
     covered = complex(*(path[-1] - path[0]))
     if abs(covered) >= SETTLED_DISTANCE_M:
         if situation.speed > _MIN_STEADY_SPEED_M_S:

@@ -140,6 +140,7 @@ class RobotSituation:
         self.neighbors = self._list_neighbors(snapshot, team, robot, numbers)
         self.forces = _split_force(snapshot.decision, robot)
         self.drag = -self.viscosity * self.velocity
+        # Limits of speed and acceleration, and contact forces, are not included.
         self.resultant = sum(self.forces.values(), self.drag)
         self.is_balanced = self._is_balanced()
         self.touched = self._list_touched()

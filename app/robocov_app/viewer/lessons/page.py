@@ -65,6 +65,7 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     for k, line in enumerate(lines):
         y = box.top + round((35 + _CAPTION_LINE_PX * k) * scale)
         screen.blit(render_text(line, text_size, theme.ink), (x, y))
+    # A thin progress bar along the lower edge of the card.
     bar_top = box.bottom - max(3, round(3 * scale))
     bar = pygame.Rect(box.left + 8, bar_top, box.width - 16, max(2, round(2 * scale)))
     screen.fill(mix(theme.panel, theme.ink, 0.15), bar)

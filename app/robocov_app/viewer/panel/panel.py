@@ -161,6 +161,7 @@ class ViewerPanel(CommandPanel):
         start = ui.dropdown("start", viewer.playback.list_starts(), scenario.start_name)
         if start is not None:
             viewer.attempt(partial(viewer.playback.restart, start=start))
+        # Columns: label, number of robots, minus, plus, gap, label, seed, next seed.
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
         robots = ui.text_field("robots", str(len(viewer.robot_numbers)))
@@ -197,6 +198,7 @@ class ViewerPanel(CommandPanel):
             if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
                 viewer.inspection.active_pane = k
                 self._run_command("pane:remove")
+            # The narrow columns between two controllers are gaps; a cell without a widget stays empty.
             if count == 2 or k % 2 == 0:
                 ui.cell()
         if count < MAX_PANES:

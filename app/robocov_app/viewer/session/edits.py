@@ -428,6 +428,7 @@ def _change_robot(
     numbers = tuple(sorted(positions))
     if numbers != setup.numbers or failed != setup.failed:
         setup = replace(setup, numbers=numbers, failed=failed)
+    # If the working robots are the same and none was placed, positions and velocities do not change.
     if numbers == pane.numbers and working_at is None:
         return Continuation(setup)
     return Continuation(

@@ -175,6 +175,7 @@ class Lockstep:
                 self._edit_map(edit)
             case _:
                 self._edit_panes(edit)
+        # Map and properties are the same in all panes.
         setup = self.panes[0].setup
         self.scenario = replace(
             self.scenario,

@@ -59,6 +59,7 @@ def replace_obstacles(
     starts = dict(environment.starts)
     while True:
         changed = replace(environment, obstacles=obstacles, starts=starts)
+        # Writing and reading the map checks all its rules. If obstacles cover starts, retry without these.
         try:
             return from_json(to_json(changed), "map")
         except MapError as error:

@@ -124,6 +124,7 @@ def build_present(
         start = Present.start(path[0])
         run = start.run
         history = start.history
+    # Simulate only from the last known state on.
     since = next(ancestor for ancestor in path if ancestor.number == history.last.node)
     first_step = run.step
     step_count = max(step - first_step, 1)
@@ -131,6 +132,7 @@ def build_present(
         if (run.step, current.number) != (history.last.step, history.last.node):
             history.amend(run.build_state(current.number))
         yield (run.step - first_step) / step_count
+    # Store the old present first: the new one may share nodes with it, and reuses their trails and curves.
     cache_present(document, old)
     new = Present(node, run, history)
     for _ in _restore_panes(document, old, new):

@@ -158,6 +158,7 @@ def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunH
         roster = build_roster(record)
         setup = PaneSetup(scenario.environment, choice, scenario.properties, roster.numbers, roster.failed)
         pane_states.append(_build_states(record, setup))
+    # Enough memory that the record is not thinned, up to `MAX_RECORD_BYTES`.
     needed_bytes = len(first) * len(records) * (STATE_BYTES + first.positions[0].nbytes * 2)
     history = RunHistory(dt, MAX_HISTORY_BYTES + min(needed_bytes, MAX_RECORD_BYTES))
     steps_between_states = round(first.dt / dt)

@@ -169,6 +169,7 @@ class Session:
             _extend_node(node, replace(edit, step=timeline.step), kind, description)
         else:
             node = timeline.document.build_node(timeline.head, timeline.step, kind, description, edit)
+            # A replay must release the dragged robot as well, before the edit.
             if releases_robot:
                 node.edits.insert(0, ReleaseRobot(step=timeline.step))
         self._gesture = None

@@ -245,6 +245,7 @@ class ViewerWindow(CommandWindow):
         size = self.screen.get_size()
         panes = len(session.timeline.panes)
         legend_rows = 1
+        # The number of legend rows is known only after the first layout, when there are scenes.
         if panes > 1 and self._arranged is not None:
             legend_rows = max(self.canvas.count_legend_rows(), 1)
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
@@ -261,6 +262,7 @@ class ViewerWindow(CommandWindow):
         )
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
+        # The panel depends neither on the panes nor on the legend.
         if before is None or frame != before[0]:
             self.panel.arrange(self.layout, self.theme)
 

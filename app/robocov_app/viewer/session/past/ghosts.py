@@ -66,6 +66,7 @@ def _build_branch_curves(
         for quantity in QUANTITIES:
             curve = Curve()
             for node in path:
+                # Up to this step, the curve of the present already shows the same values.
                 start = last_steps.get(node.number, -np.inf)
                 end = branch_last_steps[node.number]
                 if end > start:
