@@ -1,4 +1,4 @@
-"""Descriptions of pictures in words, for readers who cannot see them, and the lifetimes of robots."""
+"""Text descriptions of pictures, for readers who cannot see them, and the lifetimes of robots."""
 
 import numpy as np
 
@@ -20,8 +20,8 @@ def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
     Returns
     -------
     list of (float, float or None)
-        Seconds since the start of the record. A robot that never joins has a time after the end, and one that
-        never fails has None.
+        Time of joining and of failure of each robot, in seconds since the start of the record. The time of a
+        robot that never joins is after the end; None means that a robot never fails.
     """
     times = record.time - record.time[0]
     lifetimes: list[tuple[float, float | None]] = []
@@ -54,7 +54,7 @@ def describe_map(environment: Environment) -> str:
 
 
 def _describe_obstacles(environment: Environment) -> str:
-    """Return the number of obstacles of a map, and of those that move, as text."""
+    """Describe how many obstacles a map has, and how many of them move."""
     count = len(environment.obstacles)
     moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     text = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
@@ -81,7 +81,7 @@ def describe_run(record: Record, history: CostHistory | None) -> str:
 
 
 def _list_events(record: Record) -> list[tuple[float, str]]:
-    """Return the times at which robots join and fail, with a text for each."""
+    """Return the times, s, at which robots join and fail during a run, each with a description."""
     if record.conditions is None:
         return []
     duration = record.time[-1] - record.time[0]
@@ -95,7 +95,7 @@ def _list_events(record: Record) -> list[tuple[float, str]]:
 
 
 def _describe_costs(environment: Environment, history: CostHistory) -> list[str]:
-    """Return sentences about the first and the final cost; none if they are not known."""
+    """Return sentences about the first and the final cost; an empty list if they are unknown."""
     first, final = history.mean_distance[[0, -1]]
     if not np.isfinite([first, final]).all():
         return []

@@ -1,4 +1,4 @@
-"""A report: results as one HTML page that uses neither a network nor other files."""
+"""A report: results as a single HTML page that needs neither a network nor other files."""
 
 import base64
 import hashlib
@@ -44,7 +44,7 @@ from robocov_app.report.theme_css import build_theme_rules
 MAX_MAPS = 12
 """Maximum number of maps that are drawn."""
 MAX_WORD_CHARS = 40
-"""A longer word is shortened. The whole one is in a tooltip."""
+"""Longer words are shortened, with the whole word in a tooltip."""
 
 
 class Report(NamedTuple):
@@ -65,13 +65,15 @@ class Report(NamedTuple):
 def build_report(
     results: Sequence[ReportedResult], *, title: str | None = None, theme: str = "auto"
 ) -> Report:
-    """Build a page with a section for each result. The same results give the same page.
+    """Build a page with a section for each result.
+
+    The same results always give the same page.
 
     Parameters
     ----------
     results : sequence of ReportedResult
     title : str, optional
-        By default that of the only result, or the number of results.
+        Title of the page. By default, that of the only result, or the number of results.
     theme : str
         Name of a theme, or "auto" to follow the reader's browser.
 
@@ -103,7 +105,7 @@ def build_report(
 
 
 def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str, Any]:
-    """Build the variables of a result's section in the template; `key` starts the ids of the section."""
+    """Build the template variables of a result's section; all ids in the section start with `key`."""
     styles = choose_group_styles(result)
     selection = select_runs(result, MAX_SHOWN_RUNS, replay.MAX_PANES)
     runs = _build_replay_runs(result, selection.runs)
@@ -141,7 +143,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
 
 
 def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key: str) -> dict[str, Any]:
-    """Build the variables about comparisons in pairs, and the findings, which quote them."""
+    """Build the template variables about comparisons in pairs, and the findings, which quote them."""
     compared_groups, tuning_note = choose_compared_groups(result)
     comparisons = compare_groups(compared_groups)
     has_pairs = any(comparison.pair_count > 1 for comparison in comparisons)
@@ -157,7 +159,7 @@ def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key
 
 
 def _build_replay_runs(result: ReportedResult, runs: Sequence[ReportedRun]) -> list[ReplayRun]:
-    """Return runs of a result with their records, titles and styles."""
+    """Read the records of runs, and combine them with titles and styles for the replay."""
     labels = label_runs(result)
     styles = choose_group_styles(result)
     replay_runs = []
@@ -176,14 +178,14 @@ def _build_replay_runs(result: ReportedResult, runs: Sequence[ReportedRun]) -> l
 
 
 def _has_failures(run: ReplayRun) -> bool:
-    """Return whether robots of a run fail."""
+    """Return whether any robot fails during a run."""
     if run.record.conditions is None:
         return False
     return any(failure is not None for _, failure in list_lifetimes(run.record))
 
 
 def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun) -> dict[str, Any]:
-    """Build the variables of a small picture of a run in the template."""
+    """Build the template variables of a run's small picture."""
     final_distance = ""
     if not math.isnan(run.final_distance):
         final_distance = f"{run.final_distance:.3f} m"
@@ -197,7 +199,7 @@ def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun) -> dict[str, Any]:
 
 @cache
 def load_template(name: str) -> Template:
-    """Load a template from the folder ``assets`` with the filters and names that reports use."""
+    """Load a template from the folder ``assets``, with the filters and global names that reports use."""
     environment = Environment(
         loader=FunctionLoader(replay.read_asset),
         autoescape=True,
@@ -217,9 +219,10 @@ def load_template(name: str) -> Template:
 
 
 def _shorten_words(text: str) -> Markup:
-    """Return a text as HTML whose long words are shortened: no name makes a page wider than a telephone."""
+    """Convert text to HTML with long words shortened, so that no name makes a page wider than a phone."""
     html = Markup("")
     long_word = rf"\S{{{MAX_WORD_CHARS + 1},}}"
+    # The group in the pattern makes `split` return the long words, too.
     for piece in re.split(f"({long_word})", text):
         if re.fullmatch(long_word, piece):
             short = shorten_word(piece, MAX_WORD_CHARS)

@@ -1,6 +1,6 @@
 """Hues of Voronoi cells over a run, for the replay in a page.
 
-JavaScript clips the cells; which cells share an edge, and so must differ, is found here.
+The cells are computed in JavaScript. Which cells share an edge, and so need different hues, is computed here.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from robocov.voronoi import partition, partition_by_travel_time
 from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 
 MAX_CELLS = 400
-"""Maximum number of robots whose cells are drawn in replays. More would take too long in each frame."""
+"""Maximum number of robots for which a replay draws cells. More would take too long in each frame."""
 
 
 def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str, Any]:
@@ -25,13 +25,14 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
     positions : (T, n, 2) array, m
         Positions of the robots in the embedded frames.
     working : (T, n) bool array
-        Which robots work in these frames; only they have cells.
+        Which robots work in these frames; only working robots have cells.
 
     Returns
     -------
     dict
-        ``first``: hue of each robot in the first frame. ``changes``: list of ``[frame, robot, hue]`` in the
-        order of time. Between two frames, cells that share an edge in either of them differ.
+        ``first``: hue of each robot in the first frame. ``changes``: list of ``[frame, robot, hue]`` in
+        chronological order. From one frame to the next, cells that share an edge in either of the two frames
+        have different hues.
     """
     robots = positions.shape[1]
     if not MAX_OWN_HUES < robots <= MAX_CELLS:
@@ -41,7 +42,7 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
     changes: list[list[int]] = []
     previous_hues: IntArray | None = None
     for frame in range(len(adjacencies)):
-        # The hues remain until the next frame, so its pairs count as well.
+        # The hues stay until the next frame, so they must also suit its pairs of cells.
         pairs = np.concatenate(adjacencies[frame : frame + 2])
         hues = choose_robot_hues(robots, np.unique(pairs, axis=0), previous_hues)
         if previous_hues is None:
@@ -54,7 +55,7 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
 
 
 def _find_adjacency(record: Record, positions: Array, working: BoolArray) -> IntArray:
-    """Return pairs of robots whose cells share an edge, (m, 2), the lower number first."""
+    """Return the pairs of robots whose cells share an edge, (m, 2), the lower index first."""
     robots = np.flatnonzero(working & np.isfinite(positions).all(axis=1))
     if len(robots) < 2:
         return np.empty((0, 2), dtype=np.intp)

@@ -1,6 +1,6 @@
-"""Runs and maps as small JSON in a page, read by ``data.js``.
+"""Runs and maps as compact JSON in a page, read by ``data.js``.
 
-Positions and costs are quantized numbers at even times. Coordinates of maps are rounded.
+Positions and costs are sampled at equal time steps and quantized. Coordinates of maps are rounded.
 """
 
 import base64
@@ -28,13 +28,13 @@ from robocov_app.report.pictures import build_density_image, extract_rings, has_
 from robocov_app.runs.saved_runs import build_roster
 
 MAX_RATE_HZ = 5.0
-"""Frames of a run per simulated second, if there is space."""
+"""Maximum number of frames of a run per simulated second."""
 MAX_BYTES = 1_500_000
-"""Maximum size of all runs of a page. Larger runs are embedded at a lower rate."""
+"""Maximum total size of the runs in a page. If they are larger, they are embedded at a lower rate."""
 NO_NUMBER = 65535
-"""Stands for a number that is missing."""
+"""Code of a missing number among quantized numbers, which have 16 bits."""
 MAX_OBSTACLE_VERTICES = 4000
-"""Obstacles of a map with more vertices are simplified."""
+"""Maximum number of vertices of all obstacles of a map. If there are more, the obstacles are simplified."""
 _RATES_HZ = (MAX_RATE_HZ, 4.0, 2.5, 2.0, 1.25, 1.0)
 _MIN_RATE_HZ = 0.05
 _TIME_TOLERANCE_S = 1e-9
@@ -49,13 +49,13 @@ class ReplayRun:
     record : Record
     history : CostHistory or None
     title : str
-        Above the pane of the run.
+        Title above the pane of the run.
     facts : str
-        Below the title.
+        Text below the title.
     label : str
-        Label of its curve; by default that of the record.
+        Label of the run's curve. By default, that of the record.
     style : CurveStyle or None
-        Style of its curve; by default one that no other controller has.
+        Style of the run's curve. By default, one that differs from those of other controllers.
     """
 
     record: Record
@@ -80,9 +80,9 @@ def embed_replay(
     styles : sequence of CurveStyle
         Style of the curve of each run.
     panes : sequence of int
-        Runs that are shown first.
+        Indices of the runs that are shown at first.
     max_bytes : int
-        The rate, and whether goals are included, are chosen so that the runs take no more.
+        Maximum size of the runs. It determines the frame rate, and whether goals are included.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def embed_replay(
 
 
 def embed_axis_rules() -> dict[str, Any]:
-    """Build the rules for axes as JSON content; the axes themselves depend on the runs the reader chooses."""
+    """Build the rules for axes as JSON content; the axes themselves depend on the runs that are shown."""
     return {
         "maxLowFraction": axes.MAX_LOW_FRACTION,
         "margin": axes.VALUE_MARGIN,
@@ -125,9 +125,9 @@ def embed_map(environment: Environment) -> dict[str, Any]:
     -------
     dict
         ``region``: a ring. ``blocked``: polygons, each a list of rings. ``density``, if it is not uniform:
-        the data URL of an image. ``movers``, if obstacles move: for each its rings, the line of one round
-        trip and its speed, m/s. Rings and lines are flat lists x, y, x, y, ... in multiples of ``unit``
-        meters: a millimeter or, for tiny maps, less.
+        the data URL of an image. ``movers``, if obstacles move: for each of them its rings, the line of one
+        round trip, and its speed, m/s. Rings and lines are flat lists x, y, x, y, ... of integer multiples of
+        ``unit``, a length in meters: a millimeter or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
@@ -161,7 +161,7 @@ def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[
         if path.repeat == "loop":
             return_points = path.points[:1]
         else:
-            return_points = path.points[-2::-1]
+            return_points = path.points[-2::-1]  # back from the last point but one to the first
         mover = {
             "rings": _round_rings(extract_rings(obstacle.polygon), unit),
             "line": _round_points([*path.points, *return_points], unit),
@@ -172,12 +172,12 @@ def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[
 
 
 def _round_points(points: ArrayLike, unit: float) -> list[int]:
-    """Return points as a flat list of multiples of a unit, m."""
+    """Convert points, m, to a flat list of integer multiples of a unit, m."""
     return [int(value) for value in np.rint(np.asarray(points) / unit).ravel()]
 
 
 def _round_rings(rings: Iterable[Array], unit: float) -> list[list[int]]:
-    """Return each ring as a flat list of multiples of a unit, m."""
+    """Convert each ring, m, to a flat list of integer multiples of a unit, m."""
     return [_round_points(ring, unit) for ring in rings]
 
 
@@ -190,13 +190,13 @@ def embed_run(
     ----------
     run : ReplayRun
     map_number : int
-        Index of its map.
+        Index of the run's map.
     style : CurveStyle
-        Style of its curve.
+        Style of the run's curve.
     rate : float
         Frames per simulated second.
     has_goals : bool
-        Whether goals are included.
+        Whether to include the goals of the robots.
 
     Returns
     -------
@@ -259,7 +259,7 @@ def _embed_team(record: Record) -> dict[str, Any]:
 
 
 def _find_working(record: Record, times: Array) -> BoolArray:
-    """Return which robots work at times since the start, (T, n)."""
+    """Return which robots work at given times, s since the start, as a (T, n) array."""
     working = np.ones((len(times), len(record.team)), dtype=bool)
     if record.conditions is None:
         return working
@@ -271,7 +271,10 @@ def _find_working(record: Record, times: Array) -> BoolArray:
 
 
 def _embed_headings(record: Record, steering: Array, times: Array) -> str:
-    """Return the directions of unicycles as quantized unit vectors, which interpolate well."""
+    """Return the headings of unicycles at given times as quantized unit vectors.
+
+    Unit vectors are used because angles cannot be interpolated across a full turn.
+    """
     angles = np.where(record.team.is_unicycle, steering[:, :, 0], np.nan)
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
     return quantize(_interpolate_rows(record.time, vectors, times), -1.0, 1.0)
@@ -280,7 +283,7 @@ def _embed_headings(record: Record, steering: Array, times: Array) -> str:
 def _embed_cost(
     history: CostHistory | None, start: float, times: Array, step: float
 ) -> dict[str, Any] | None:
-    """Build the mean distances at times since the start as JSON content; None if there are none."""
+    """Build the mean distances at given times, s since the start, as JSON content; None if unknown."""
     if history is None:
         return None
     values = _interpolate_rows(history.time - start, history.mean_distance[:, None], times)[:, 0]
@@ -309,19 +312,19 @@ def list_even_times(end: float, rate: float) -> Array:
 
 
 def quantize(values: Array, low: float, high: float) -> str:
-    """Return numbers as text.
+    """Encode numbers as text, with 16 bits each.
 
     Parameters
     ----------
     values : array
-        Numbers; those that are not finite are marked as missing.
+        Numbers. Those that are not finite are encoded as missing.
     low, high : float
-        Limits of the numbers.
+        Range of the numbers. Numbers outside are clipped.
 
     Returns
     -------
     str
-        Base64 of 16 bits a number, 0 for `low`, 65534 for `high` and `NO_NUMBER` for a missing one.
+        Base64 of little-endian 16-bit integers: 0 for `low`, 65534 for `high`, `NO_NUMBER` for missing.
     """
     span = high - low if high > low else 1.0
     with np.errstate(invalid="ignore"):
@@ -331,32 +334,32 @@ def quantize(values: Array, low: float, high: float) -> str:
 
 
 def _quantize_points(record: Record, points: Array) -> str:
-    """Return (T, n, 2) points, m, as text, between the corners of the region."""
+    """Quantize points, (T, n, 2) m, relative to the bounding box of the region."""
     low, high = np.array(record.environment.region.bounds).reshape(2, 2)
     return quantize((points - low) / (high - low), 0.0, 1.0)
 
 
 def _interpolate_points(record: Record, points: Array, times: Array) -> Array:
-    """Return points of a record, (k, n, 2) m, at other times, (T, n, 2) m."""
+    """Interpolate points of a record, (k, n, 2) m, at other times, s; the result is (T, n, 2) m."""
     rows = _interpolate_rows(record.time, points.reshape(len(record), -1), times)
     return rows.reshape(len(times), -1, 2)
 
 
 def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
-    """Return (k, m) rows interpolated linearly at other times, (T, m); nan if either neighbor is nan."""
+    """Interpolate (k, m) rows linearly at other times; the (T, m) result is nan if a neighboring row is."""
     if len(time) == 1:
         return np.asarray(np.repeat(rows, len(times), axis=0))
     after = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
     before = after - 1
     fraction = ((times - time[before]) / (time[after] - time[before]))[:, None]
     mixed = (1.0 - fraction) * rows[before] + fraction * rows[after]
-    # At a time of the record only its own row counts: the other one may be nan.
+    # At a time of the record, only the row at that time is used, because the other one may be nan.
     mixed = np.where(fraction >= 1.0 - 1e-9, rows[after], mixed)
     return np.where(fraction <= 1e-9, rows[before], mixed)
 
 
 def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bool]:
-    """Return the rate, Hz, and whether goals are embedded, for runs that must fit in some bytes."""
+    """Choose the frame rate, Hz, and whether to include goals, so that the runs fit in `max_bytes`."""
     for has_goals, rate in product((True, False), _RATES_HZ):
         if _estimate_bytes(runs, rate, has_goals=has_goals) <= max_bytes:
             return rate, has_goals
@@ -365,7 +368,7 @@ def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bo
 
 
 def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) -> float:
-    """Estimate the size of runs in the page at a rate, Hz."""
+    """Estimate the size of runs in the page, in bytes, at a frame rate, Hz."""
     total = 0.0
     for run in runs:
         record = run.record
@@ -375,6 +378,7 @@ def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) 
         points_per_robot = 1
         if has_goals and np.isfinite(record.goals).any():
             points_per_robot = 2
+        # Two 16-bit numbers for each point, and one for the cost.
         bytes_per_frame = 4 * len(record.team) * points_per_robot + 2
         # Base64 writes 3 bytes as 4 characters.
         total += frames * bytes_per_frame * 4 / 3
@@ -382,14 +386,14 @@ def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) 
 
 
 def format_script_json(content: Any) -> str:
-    """Return JSON that is safe in a script element, even if names contain markup."""
-    # JSON of ASCII characters has no U+2028, which ends a line in older scripts.
+    """Format content as JSON that is safe inside a script element, even if names contain markup."""
+    # The JSON is ASCII, so it does not contain U+2028, which ends a line in older scripts.
     text = json.dumps(_escape_texts(content), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _escape_texts(content: Any) -> Any:
-    """Return JSON content with control characters in texts escaped, see `escape_controls`."""
+    """Escape the control characters in all strings of JSON content; see `escape_controls`."""
     if isinstance(content, str):
         return escape_controls(content)
     if isinstance(content, dict):

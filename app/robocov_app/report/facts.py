@@ -1,4 +1,4 @@
-"""Titles and facts of results and of their runs, as text."""
+"""Titles of results and of their runs, and facts about them, as text."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,7 +25,7 @@ def format_title(result: ReportedResult) -> str:
 
 
 def _list_names(names: Sequence[str]) -> str:
-    """Return the first names as text, and the number of others."""
+    """Join names with commas; if there are many, only the first ones, followed by the number of others."""
     text = ", ".join(names[:_MAX_LISTED_NAMES])
     if len(names) > _MAX_LISTED_NAMES:
         text += f" and {len(names) - _MAX_LISTED_NAMES} more"
@@ -42,7 +42,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
     Returns
     -------
     list of (str, str)
-        Terms with their texts, such as ``("Duration", "60 s")``. Facts that are not known are left out.
+        Terms and texts, such as ``("Duration", "60 s")``. Unknown facts are left out.
     """
     starts = dict.fromkeys(run.start for run in result.runs)
     start_names = ["given positions" if start is None else start for start in starts]
@@ -72,7 +72,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
 
 
 def _format_run_counts(result: ReportedResult) -> str:
-    """Return the numbers of done, failed, unreadable and missing runs as text."""
+    """Describe how many runs are done, failed, unreadable and missing."""
     done = len(result.completed_runs)
     if done == result.expected_count:
         return str(done)
@@ -87,7 +87,7 @@ def _format_run_counts(result: ReportedResult) -> str:
 
 
 def _format_seeds(result: ReportedResult) -> str:
-    """Return the seeds as a range if they follow each other, otherwise as a list."""
+    """Format the seeds: as a range if they are consecutive, otherwise as a list."""
     seeds = sorted({run.seed for run in result.runs if run.seed is not None})
     if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
         return f"{seeds[0]} to {seeds[-1]}"
@@ -98,7 +98,7 @@ def _format_seeds(result: ReportedResult) -> str:
 
 
 def _format_team(result: ReportedResult) -> str:
-    """Return the parameters of the team: those of all runs, then those with several values."""
+    """Describe the team: parameters that all runs have in common, then those with several values."""
     texts = []
     team = result.facts.get("team")
     if isinstance(team, dict):
@@ -111,14 +111,14 @@ def _format_team(result: ReportedResult) -> str:
 
 
 def _format_team_parameter(key: str, value: Any) -> str:
-    """Return a parameter of a team as text; empty if it is unknown.
+    """Format a parameter of a team; the result is empty if the parameter is unknown.
 
     Parameters
     ----------
     key : str
-        Name of the parameter, which in the file of a run is followed by its unit.
+        Name of the parameter. In the file of a run, its unit follows after an underscore.
     value : str, float, None or list of these
-        A value for all robots, or one for each.
+        A value for all robots, or a list with one value for each.
     """
     name = next((name for name in UNITS if key == name or key.startswith(f"{name}_")), None)
     if name is None:
@@ -141,14 +141,14 @@ def _format_team_parameter(key: str, value: Any) -> str:
 
 
 def list_gain_meanings(result: ReportedResult) -> list[tuple[str, str]]:
-    """List the gains of the runs with their meanings, without those whose meaning is not known."""
+    """List the gains of the runs and their meanings, except for gains whose meaning is unknown."""
     used_names = {name for run in result.runs for name, _ in run.gains}
     meanings = result.gain_meanings.items()
     return [(name, meaning) for name, meaning in meanings if name in used_names and meaning]
 
 
 def format_densities(result: ReportedResult) -> str:
-    """Return the densities by which locations on the maps are weighted; empty if there are none."""
+    """Describe the densities by which locations on the maps are weighted; empty if there are none."""
     labels = {name: describe_density(environment) for name, environment in result.maps.items()}
     if len(labels) == 1:
         return "".join(labels.values())
@@ -163,7 +163,7 @@ def format_run_title(result: ReportedResult, run: ReportedRun, label: str) -> st
     result : ReportedResult
     run : ReportedRun
     label : str
-        Label of its variant.
+        Label of the run's variant.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def format_run_title(result: ReportedResult, run: ReportedRun, label: str) -> st
 
 
 def format_run_facts(result: ReportedResult, run: ReportedRun) -> str:
-    """Return the gains and the most important figures of a run as a sentence."""
+    """Describe the gains and the most important figures of a run in a sentence."""
     texts = []
     if run.gains:
         texts.append(f"Gains: {format_gains(run.gains, result.gain_units)}")

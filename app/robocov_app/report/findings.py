@@ -17,7 +17,7 @@ _MAX_LISTED_REASONS = 3
 
 
 def list_findings(result: ReportedResult, comparisons: Sequence[GroupComparison]) -> list[str]:
-    """List the main findings, one or a few sentences for the top of a section.
+    """List the main findings: one sentence or a few for the top of a section.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def list_findings(result: ReportedResult, comparisons: Sequence[GroupComparison]
 
 
 def _summarize_sweep(runs: Sequence[ReportedRun], comparisons: Sequence[GroupComparison]) -> list[str]:
-    """Return the outcomes of comparisons, or the median of all runs if there are none."""
+    """Return the outcomes of comparisons as sentences, or the median of all runs if there are none."""
     paired = [comparison for comparison in comparisons if comparison.pair_count > 1]
     if not paired:
         median = np.median([run.final_distance for run in runs])
@@ -51,7 +51,7 @@ def _summarize_sweep(runs: Sequence[ReportedRun], comparisons: Sequence[GroupCom
 
 
 def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
-    """Return the final mean distance of the only run, its gap, and whether it settled."""
+    """Describe the only run: final mean distance, gap to the best placement, and whether it settled."""
     text = f"At the end the nearest robot is {run.final_distance:.3f} m away on average"
     gap = result.compute_gap(run)
     if np.isfinite(gap):
@@ -63,7 +63,7 @@ def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
 
 
 def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -> str:
-    """Return the final mean distances of all runs, the lowest first."""
+    """List the final mean distances of all runs, the lowest first, in a sentence."""
     lowest = min(run.final_distance for run in runs)
     labels = label_runs(result)
     texts = []
@@ -79,7 +79,7 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
 
 
 def list_missing_runs(result: ReportedResult) -> list[str]:
-    """List the numbers of runs that failed, cannot be read, or are missing, one sentence each."""
+    """Describe how many runs failed, cannot be read, or are missing, in one sentence each."""
     sentences = []
     if result.failed_runs:
         sentences.append(_describe_failed_runs(result))
@@ -101,7 +101,7 @@ def _choose_verb(count: int) -> str:
 
 
 def _describe_failed_runs(result: ReportedResult) -> str:
-    """Return the number of failed runs of each controller, and the reasons."""
+    """Describe how many runs of each controller failed, and why."""
     run_counts = Counter(run.label for run in result.runs)
     failure_counts = Counter(run.label for run in result.failed_runs)
     controllers = ", ".join(
@@ -113,7 +113,7 @@ def _describe_failed_runs(result: ReportedResult) -> str:
 
 
 def _list_reasons(reasons: Sequence[str]) -> str:
-    """Return the first different reasons, and the number of others."""
+    """List the first distinct reasons, followed by the number of others."""
     different_reasons = list(dict.fromkeys(reasons))
     text = "; ".join(different_reasons[:_MAX_LISTED_REASONS])
     if len(different_reasons) > _MAX_LISTED_REASONS:
@@ -122,7 +122,7 @@ def _list_reasons(reasons: Sequence[str]) -> str:
 
 
 def list_problems(result: ReportedResult) -> list[str]:
-    """List the numbers of runs with contacts, with stuck robots, and with a team that had not settled."""
+    """Describe in how many runs there were contacts, stuck robots, and teams that had not settled."""
     runs = result.completed_runs
     counts = {
         "a robot touched a wall or another one": sum((run.figures.get("contacts") or 0) > 0 for run in runs),
@@ -136,5 +136,5 @@ def list_problems(result: ReportedResult) -> list[str]:
 
 
 def _is_unsettled(run: ReportedRun) -> bool:
-    """Return whether a team had not settled by the end of a run."""
+    """Return whether the team of a run had not settled by the end."""
     return run.has_figure("mean_distance_m") and not run.has_figure("settled_at_s")

@@ -1,8 +1,9 @@
 """Small pictures of maps and runs as SVG in a page, with the colors of the page: light, dark or paper.
 
-They are not drawn by matplotlib, as plots are. Its SVG of a run is four to five times as large (11 to 18 kB,
-and a page may have 60 of them) and takes 50 to 240 ms instead of 2 to 9. It also has nothing but color codes:
-the rings of robots and the background are both white in light, but only one of them is in dark.
+Unlike plots, they are not drawn with matplotlib, for two reasons. Its SVG of a run is four to five times as
+large (11 to 18 kB, and a page may have 60 of them) and takes 50 to 240 ms instead of 2 to 9. It also contains
+only color codes, which cannot be mapped to the dark theme: the rings of robots and the background are both
+white in the light theme, but differ in the dark one.
 """
 
 import base64
@@ -28,17 +29,17 @@ from robocov_app.report.descriptions import describe_map, describe_run
 from robocov_app.runs.saved_runs import build_roster
 
 MAX_ROBOTS = 400
-"""Robots up to which cells and trajectories are drawn. Those of more would make the page too large."""
+"""Maximum number of robots for which cells and trajectories are drawn. More would make the page too large."""
 MAX_TWO_FRAME_SPAN_S = 1.5
-"""Two recorded frames that are farther apart than this do not show where the robots went."""
+"""If a record has only two frames, and they are farther apart, it does not show where the robots went."""
 _SIZE_PX = (300.0, 220.0)
 _MARGIN_PX = 3.0
 _TOLERANCE_PX = 0.2
 """Maximum error of simplified lines."""
 _DENSITY_DOTS = 80
-"""Dots of the image of a density along its longer side."""
+"""Number of pixels along the longer side of the image of a density."""
 _NUMBER_SIZES = (1.35, 1.15, 0.9, 0.7)
-"""Text sizes of numbers of one, two, three and more digits, in radii of the robot."""
+"""Text sizes of numbers with one, two, three and more digits, in radii of the robot."""
 _MIN_NUMBER_PX = 6.0
 
 
@@ -48,9 +49,9 @@ class PictureFrame:
     Parameters
     ----------
     environment : Environment
-        Its region fills the picture.
+        Map whose region fills the picture.
     width, height : float, px
-        Maximum size.
+        Maximum size of the picture.
 
     Attributes
     ----------
@@ -71,7 +72,7 @@ class PictureFrame:
         self.height = round(self.zoom * (high_y - low_y) + 2 * _MARGIN_PX, 1)
 
     def to_pixels(self, points: Array) -> Array:
-        """Return (..., 2) points, m, as pixels from the upper left corner."""
+        """Convert points, (..., 2) m, to pixels from the upper left corner."""
         return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN_PX)
 
 
@@ -85,12 +86,12 @@ def build_density_image(environment: Environment) -> str:
     Returns
     -------
     str
-        Data URL, transparent outside the region; empty if the density is uniform.
+        Data URL of an image that is transparent outside the region; empty if the density is uniform.
     """
     if environment.density is None or environment.density.is_uniform:
         return ""
     pixels = shade_density(environment, _DENSITY_DOTS, LIGHT)
-    # An image has one color for both themes: between the two.
+    # The same image serves both themes, so its color is between those of the two.
     pixels[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
     x, y = np.meshgrid(*list_sample_coordinates(environment, _DENSITY_DOTS))
     is_inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))
@@ -101,19 +102,22 @@ def build_density_image(environment: Environment) -> str:
 
 
 def extract_rings(area: shapely.Geometry) -> list[Array]:
-    """Return the rings of polygons, (k, 2) m each, not closed; of each polygon the outer one first."""
+    """Return the rings of polygons, (k, 2) m each, without the repeated first vertex.
+
+    The outer ring of each polygon comes first.
+    """
     return [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(shapely.get_parts(area))]
 
 
 def has_path(record: Record) -> bool:
-    """Return whether a record shows where the robots went, not only its start and its end."""
+    """Return whether a record shows where the robots went between the start and the end."""
     if len(record) == 2:
         return float(record.time[1] - record.time[0]) <= MAX_TWO_FRAME_SPAN_S
     return len(record) > 2
 
 
 def draw_map(environment: Environment, width: float = _SIZE_PX[0], height: float = _SIZE_PX[1]) -> str:
-    """Draw a map as an SVG element of at most a width and a height, px."""
+    """Draw a map as an SVG element of at most the given width and height, px."""
     frame = PictureFrame(environment, width, height)
     return _build_svg(frame, _draw_map_shapes(environment, frame, 0.0), describe_map(environment))
 
@@ -133,13 +137,13 @@ def draw_run(
     ----------
     record : Record
     history : CostHistory or None
-        For the description.
+        Cost along the run, for the description.
     width, height : float, px
         Maximum size.
     has_numbers : bool
-        Whether robots are numbered.
+        Whether to number the robots.
     is_hidden : bool
-        Whether the picture is hidden from screen readers, since a text next to it says the same.
+        Whether to hide the picture from screen readers, because text next to it says the same.
 
     Returns
     -------
@@ -159,7 +163,7 @@ def draw_run(
 
 
 def _draw_cells(record: Record, frame: PictureFrame) -> str:
-    """Draw the final Voronoi cells."""
+    """Draw the final Voronoi cells, unless there are too many robots."""
     robots = len(record.team)
     if robots > MAX_ROBOTS:
         return ""
@@ -179,7 +183,7 @@ def _draw_cells(record: Record, frame: PictureFrame) -> str:
 
 
 def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
-    """Draw the trajectories as one path, each from where its robot joined."""
+    """Draw the trajectories as one path; each starts where its robot joined."""
     if not has_path(record) or len(record.team) > MAX_ROBOTS:
         return ""
     first_rows = np.argmax(record.present, axis=0)
@@ -236,17 +240,17 @@ def _draw_cross(x: float, y: float, radius: float) -> str:
 
 
 def _draw_number(number: int, x: float, y: float, radius: float) -> str:
-    """Draw the number of a robot, nothing if it would be too small to read."""
+    """Draw the number of a robot, unless it would be too small to read."""
     digits = min(len(str(number)), len(_NUMBER_SIZES))
     size = radius * _NUMBER_SIZES[digits - 1]
     if size < _MIN_NUMBER_PX:
         return ""
-    baseline = y + 0.36 * size
+    baseline = y + 0.36 * size  # digits are about 0.72 of the text size high
     return f'<text x="{x:.1f}" y="{baseline:.1f}" font-size="{size:.1f}">{number}</text>'
 
 
 def _build_svg(frame: PictureFrame, content: str, description: str | None) -> str:
-    """Build the SVG element. It has no size: the page gives it a width, and the view box the height."""
+    """Build the SVG element. It has no size of its own: the page sets the width, the view box the height."""
     if description is None:
         label = 'aria-hidden="true"'
     else:
@@ -256,7 +260,7 @@ def _build_svg(frame: PictureFrame, content: str, description: str | None) -> st
 
 
 def _draw_map_shapes(environment: Environment, frame: PictureFrame, time: float) -> str:
-    """Draw the density, obstacles, those that move, and the boundary of the region, at a time, s."""
+    """Draw a map at a time, s: density, obstacles, moving obstacles, and the boundary of the region."""
     shapes = [_draw_density(environment, frame)]
     obstacles = shapely.simplify(environment.at(time).blocked, _TOLERANCE_PX / frame.zoom)
     rings = [frame.to_pixels(ring) for ring in extract_rings(obstacles)]
@@ -270,7 +274,7 @@ def _draw_map_shapes(environment: Environment, frame: PictureFrame, time: float)
 
 
 def _draw_density(environment: Environment, frame: PictureFrame) -> str:
-    """Draw the density as an image."""
+    """Draw the density as an image, if it is not uniform."""
     address = build_density_image(environment)
     if not address:
         return ""
@@ -281,7 +285,7 @@ def _draw_density(environment: Environment, frame: PictureFrame) -> str:
 
 
 def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, frame: PictureFrame) -> str:
-    """Draw an obstacle that moves, its path, and an arrow in its direction."""
+    """Draw a moving obstacle, its path, and an arrow in the direction of its motion."""
     visible = shapely.intersection(obstacle.polygon, environment.region.polygon)
     rings = [frame.to_pixels(ring) for ring in extract_rings(visible)]
     middle = frame.to_pixels(obstacle.middle)
@@ -298,9 +302,9 @@ def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, fr
 
 
 def _format_path(lines: Iterable[Array], *, is_closed: bool = False) -> str:
-    """Return lines of (k, 2) px as SVG path data in relative steps, which are short.
+    """Format lines, (k, 2) px each, as SVG path data with relative steps, which are short.
 
-    Positions are rounded to tenths of a pixel before their differences are taken, so errors do not add up.
+    Positions are rounded to tenths of a pixel before steps are computed, so rounding errors do not add up.
     """
     pieces = []
     for line in lines:
@@ -313,7 +317,7 @@ def _format_path(lines: Iterable[Array], *, is_closed: bool = False) -> str:
             moves = " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps.tolist())
             piece += f"l{moves}"
         else:
-            # A line without length is drawn as a dot.
+            # A line without length appears as a dot.
             piece += "h0"
         if is_closed:
             piece += "z"

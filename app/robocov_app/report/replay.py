@@ -17,15 +17,15 @@ _STILL_SIZE_PX = (560, 460)
 
 
 def build_replay_html(runs: Sequence[ReplayRun]) -> str:
-    """Build a replay as a fragment of HTML with its own style and script.
+    """Build a replay as an HTML fragment with its own style and script.
 
-    It uses no network, defines no global name and has no ids of its own, so that a page can have several.
-    On paper, and where scripts are disabled, it shows pictures of the final positions.
+    It needs no network, defines no global names and has no ids, so a page can contain several replays. On
+    paper, and where scripts are disabled, it shows pictures of the final positions.
 
     Parameters
     ----------
     runs : sequence of ReplayRun
-        The first `MAX_PANES` are shown side by side; the reader can choose others.
+        Runs that the reader can choose. The first `MAX_PANES` are shown side by side at first.
 
     Returns
     -------
@@ -39,13 +39,13 @@ def build_replay_html(runs: Sequence[ReplayRun]) -> str:
 def build_replay_element(
     runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, max_bytes: int = MAX_BYTES
 ) -> str:
-    """Build a replay for a page that contains `read_replay_css` and `read_replay_js` once.
+    """Build a replay for a page that contains the results of `read_replay_css` and `read_replay_js` once.
 
     Parameters
     ----------
     runs : sequence of ReplayRun
     panes : sequence of int, optional
-        Runs that are shown first.
+        Indices of the runs that are shown at first.
     max_bytes : int
         Maximum size of the data of the runs.
 
@@ -64,7 +64,7 @@ def build_replay_element(
 
 
 def _choose_styles(runs: Sequence[ReplayRun]) -> list[CurveStyle]:
-    """Return the style of each run; runs of one controller with the same gains look the same."""
+    """Choose the style of each run; runs with the same controller and gains have the same style."""
     keys = [(run.record.controller, tuple(run.record.gains.items())) for run in runs]
     different_keys = list(dict.fromkeys(keys))
     different_styles = choose_curve_styles([controller for controller, _ in different_keys])
@@ -73,23 +73,23 @@ def _choose_styles(runs: Sequence[ReplayRun]) -> list[CurveStyle]:
 
 
 def _build_still(run: ReplayRun) -> str:
-    """Return a picture of the final positions of a run with its title."""
+    """Build a figure with the title of a run and a picture of its final positions."""
     picture = draw_run(run.record, run.history, *_STILL_SIZE_PX, has_numbers=True)
     return f"<figure><figcaption><strong>{escape(run.title)}</strong></figcaption>{picture}</figure>"
 
 
 def read_replay_css() -> str:
-    """Return the style of replays, without the colors, see `build_theme_rules`."""
+    """Return the style of replays without the colors, for which see `build_theme_rules`."""
     return read_asset("picture.css") + read_asset("replay.css")
 
 
 def read_replay_js() -> str:
-    """Return the definitions of the script of replays; ``startReplays()`` in a `wrap_script` runs it."""
+    """Return the definitions of the replay script; to run it, add ``startReplays()`` and `wrap_script`."""
     return "".join(read_asset(name) for name in _SCRIPTS)
 
 
 def wrap_script(content: str) -> str:
-    """Return a script whose names are not visible to the rest of the page."""
+    """Wrap a script so that its names are not visible to the rest of the page."""
     return f'(() => {{\n"use strict";\n{content}\n}})();'
 
 

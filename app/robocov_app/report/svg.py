@@ -1,4 +1,4 @@
-"""matplotlib figures as small SVG in a page: texts stay texts, and colors follow the theme of the page."""
+"""matplotlib figures as compact SVG in a page: text stays text, and colors follow the theme of the page."""
 
 import io
 import re
@@ -22,28 +22,28 @@ _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
 _COLOR = re.compile(r"#[0-9a-f]{6}")
 _CIRCLE_START = re.compile(r"M0 (\d*\.?\d+)C")
-"""Start of the path of a round mark: its radius, then the first curve."""
+"""Start of the path of a round mark, with its radius, up to the first curve."""
 _SHAPES = ("path", "text", "rect", "image")
 _COORDINATES = ("x", "y", "width", "height")
 _PATH_DECIMALS = 2
 _COORDINATE_DECIMALS = 1
 _MIN_DOTS = 8
-"""Number of equal round marks from which they become one dotted line."""
+"""Minimum number of equal round marks that are combined into one dotted line."""
 _PLOT_COLORS = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
-"""Names of the colors in plots. If two have the same value, the first name is used."""
+"""Names of the colors in plots. If two colors have the same value, the first name is used."""
 
 
 def inline_svg(figure: Figure, key: str, description: str) -> str:
-    """Turn a figure into an SVG element.
+    """Convert a figure to an SVG element.
 
     Parameters
     ----------
     figure : Figure
-        In the colors of the light theme, which become variables of the page.
+        Figure in the colors of the light theme, which are replaced by CSS variables of the page.
     key : str
         Start of all ids in the element.
     description : str
-        For readers who cannot see the plot.
+        Description for readers who cannot see the plot.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def inline_svg(figure: Figure, key: str, description: str) -> str:
 
 
 class _SmallCopy:
-    """Copy of the shapes in an SVG, without groups and ids that are not needed, and with short names.
+    """Copies the shapes of an SVG, without unnecessary groups and ids, and with short names.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class _SmallCopy:
     Attributes
     ----------
     definitions : Element
-        Shapes that others refer to.
+        Shapes to which other elements refer.
     """
 
     def __init__(self, key: str) -> None:
@@ -107,35 +107,35 @@ class _SmallCopy:
                 target.append(self._copy_element(child))
 
     def _copy_definitions(self, source: Element) -> None:
-        """Copy shapes that others refer to."""
+        """Copy shapes to which other elements refer."""
         for shape in source:
             if "id" not in shape.attrib:
                 continue
             element = self._copy_element(shape)
             element.extend([self._copy_element(child) for child in shape])
             element.set("id", self._shorten_name(shape.attrib["id"]))
-            # Each use of the shape has its own style.
+            # The style is dropped, because each use of the shape has its own.
             element.attrib.pop("style", None)
             self.definitions.append(element)
 
     def _copy_group(self, source: Element, target: Element) -> None:
-        """Copy the shapes in a group. The group itself is only needed if it clips them."""
+        """Copy the shapes in a group. The group itself is copied only if it clips them."""
         clip = source.get("clip-path")
         if clip is not None:
             target = SubElement(target, "g", {"clip-path": self._shorten_reference(clip)})
         self.copy_children(source, target)
 
     def _shorten_name(self, name: str) -> str:
-        """Return the short name of an id."""
+        """Return the short name that replaces an id."""
         return self._names.setdefault(name, f"{self._key}-{len(self._names)}")
 
     def _shorten_reference(self, reference: str) -> str:
-        """Return a reference, ``url(#name)``, with the short name."""
+        """Shorten the name in a reference, ``url(#name)``."""
         name = reference.removeprefix("url(#").removesuffix(")")
         return f"url(#{self._shorten_name(name)})"
 
     def _copy_element(self, source: Element) -> Element:
-        """Return an element with short numbers and the colors of the page, without its children."""
+        """Copy an element without its children, with short numbers and the colors of the page."""
         element = Element(source.tag.removeprefix(_NAMESPACE))
         if element.tag == "text":
             element.text = source.text
@@ -155,7 +155,10 @@ class _SmallCopy:
         return element
 
     def _build_dotted_line(self, uses: Sequence[Element]) -> Element | None:
-        """Return equal round marks as one path, the dots of a round pen; None if they are few or differ."""
+        """Combine equal round marks into one path, whose points a round pen draws as dots.
+
+        None is returned if there are few marks, or if they are not round or differ.
+        """
         if len(uses) < _MIN_DOTS:
             return None
         first = uses[0]
@@ -183,7 +186,7 @@ class _SmallCopy:
 
 
 def _shorten_path(path: str) -> str:
-    """Return path data with rounded numbers, and without spaces next to commands."""
+    """Shorten path data: round numbers, and remove spaces next to commands."""
     words = []
     for word in path.split():
         if _NUMBER.fullmatch(word) is not None:
@@ -193,14 +196,14 @@ def _shorten_path(path: str) -> str:
 
 
 def _shorten_number(number: str, decimals: int) -> str:
-    """Return a number with at most some decimals, without zeros at its end."""
+    """Round a number to a number of decimals, without trailing zeros."""
     if "." not in number:
         return number
     return f"{float(number):.{decimals}f}".rstrip("0").rstrip(".")
 
 
 def _replace_colors(style: str) -> str:
-    """Return a style without spaces and fonts, and with variables instead of colors."""
+    """Shorten a style: remove spaces and fonts, and replace colors by CSS variables."""
     declarations = [part for part in style.split("; ") if not part.startswith("font-family:")]
     text = ";".join(declaration.replace(": ", ":") for declaration in declarations)
     return _COLOR.sub(lambda match: _map_colors_to_variables()[match[0]], text)
@@ -211,5 +214,5 @@ def _map_colors_to_variables() -> dict[str, str]:
     """Return the CSS variable of each color of the light theme that occurs in plots."""
     colors = list_css_colors(LIGHT)
     names = [*_PLOT_COLORS, *(name for name in colors if name.startswith(("other-", "heat-")))]
-    # The first name of a color comes last, and replaces the others.
+    # In reverse, so that the first name of a color comes last and replaces the others.
     return {format_hex_color(colors[name]): f"var(--rc-{name})" for name in reversed(names)}

@@ -1,17 +1,17 @@
-"""The themes as CSS variables, for pages that follow the reader's preference.
+"""The themes as CSS variables, for pages that follow the reader's preferred theme.
 
-A color has the same name in both themes, so whatever is drawn with names is right in light and in dark.
+A color has the same name in both themes, so everything drawn with these names is right in both.
 """
 
 from robocov_app.look.colors import Color, choose_text_color, format_hex_color, mix
 from robocov_app.look.theme import DARK, LIGHT, Theme, get_theme
 
 _LINE_FADE = 0.45
-"""Fraction of the background in lines that separate rows of tables."""
+"""Fraction of the background color in the lines that separate rows of tables."""
 
 
 def list_css_colors(theme: Theme) -> dict[str, Color]:
-    """Return the colors of a theme by the names of their CSS variables, without ``--rc-``."""
+    """Return the colors of a theme, keyed by the names of their CSS variables without ``--rc-``."""
     accent = theme.get_controller_color("rapf")
     colors = {
         "background": theme.background,
@@ -42,19 +42,19 @@ def list_css_colors(theme: Theme) -> dict[str, Color]:
 
 
 def format_variables(theme: Theme) -> str:
-    """Return CSS declarations of the colors of a theme."""
+    """Format the colors of a theme as CSS declarations."""
     colors = list_css_colors(theme).items()
     declarations = "".join(f"--rc-{name}:{format_hex_color(color)};" for name, color in colors)
     return f"color-scheme:{theme.name};{declarations}"
 
 
 def build_theme_rules(scope: str, theme: str = "auto") -> str:
-    """Build the CSS that gives a selector its colors.
+    """Build the CSS rules that define the color variables for a selector.
 
     Parameters
     ----------
     scope : str
-        A selector.
+        The selector.
     theme : str
         Name of a theme, or "auto" to follow the notebook or the browser. On paper it is always light.
 
@@ -72,6 +72,6 @@ def build_theme_rules(scope: str, theme: str = "auto") -> str:
         f"@media (prefers-color-scheme:dark){{{scope}{{{dark}}}}}"
         f"{notebook.format('true', 'light')}{{{light}}}"
         f"{notebook.format('false', 'dark')}{{{dark}}}"
-        # These are as specific as the rules for notebooks, and follow them, so that they win.
+        # These rules win, because they are as specific as the rules for notebooks and follow them.
         f"@media print{{{scope},:is([data-jp-theme-light],[data-vscode-theme-kind]) {scope}{{{light}}}}}\n"
     )

@@ -1,4 +1,4 @@
-"""Folders of results: the numbers, figures and video of one run, or of several side by side."""
+"""Result folders: the numbers, figures and video of one run, or of several runs side by side."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ _SUMMARY_COLUMNS = (
     "min_clearance_m",
     "mean_time_s",  # only if some robots are faster than others
 )
-"""Entries of a summary that are columns of a comparison."""
+"""Entries of a run's summary that become columns of a comparison."""
 _JSON_ONLY_COLUMNS = ("label", "gains", "notes")
-"""Columns of ``comparison.json`` that ``comparison.csv`` does not have."""
+"""Columns that are only in ``comparison.json``, not in ``comparison.csv``."""
 
 
 def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tuple[Run, bool]:
-    """Execute one scenario, and write the folder of its results.
+    """Execute one scenario, and write its results to a folder.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     -------
     run : Run
     is_interrupted : bool
-        Whether Ctrl-C ended it early.
+        Whether Ctrl-C ended the run early.
 
     Raises
     ------
     RobocovError
         If the run fails, or the folder cannot be written.
     """
-    # A folder that cannot be used is reported before the long computations.
+    # The folder is created first, so that an unusable one is reported before the long computations.
     with create_result(out, "run", overwrite=settings.overwrite) as result:
         compile_kernels()
         cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
@@ -83,7 +83,7 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
 def execute_comparison(
     scenarios: Mapping[str, Scenario], out: Path, settings: OutputSettings
 ) -> tuple[dict[str, Run], bool]:
-    """Execute scenarios on one map, and write a folder with a subfolder for each.
+    """Execute scenarios on one map, and write their results to a folder with a subfolder for each.
 
     Parameters
     ----------
@@ -96,8 +96,9 @@ def execute_comparison(
     Returns
     -------
     runs : dict of str to Run
-        If Ctrl-C ended the comparison early, only those that were started.
+        The runs, keyed like `scenarios`. If Ctrl-C ended the comparison early, only runs that were started.
     is_interrupted : bool
+        Whether Ctrl-C ended the comparison early.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def _save_videos(
     settings: OutputSettings,
     interruption: Interruption,
 ) -> None:
-    """Save frames and videos if they were requested, after all other results are on the disk."""
+    """Save all other results, then the frames and videos if they were requested."""
     result.save_progress()
     if settings.video.is_wanted:
         from robocov_app.runs.video import save_videos
@@ -141,13 +142,13 @@ def build_comparison_rows(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
     Parameters
     ----------
     runs : mapping of str to Run
-        By the names of the controllers' folders.
+        Runs, keyed by the names of the controllers' folders.
 
     Returns
     -------
     list of dict
-        One row for each run: its results, and ``above_best``, the relative excess of its mean distance over
-        the lowest one.
+        One row for each run: its results, and ``above_best``, the relative difference between its mean
+        distance and the lowest one.
     """
     lowest = min(run.summary["mean_distance_m"] for run in runs.values())
     rows = []
@@ -289,7 +290,7 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
 
 
 def _build_curves(runs: Sequence[Run], quantity: str) -> list[TimeCurve]:
-    """Return the curves of ``mean_distance``, or of ``mean_time``, which not every run has."""
+    """Return the curves of a quantity, ``mean_distance`` or ``mean_time``; runs without it are left out."""
     from robocov_app.figures.curves import TimeCurve
 
     curves = []
@@ -302,19 +303,19 @@ def _build_curves(runs: Sequence[Run], quantity: str) -> list[TimeCurve]:
 
 
 def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[DistanceSnapshot]:
-    """Return the final states of runs for figures of the coverage cost.
+    """Compute the distances at the end of each run, for figures of the coverage cost.
 
     Parameters
     ----------
     runs : sequence of Run
-        On one map, except that robots may have failed at different positions.
+        Runs on one map, which may differ in failed robots, because these are obstacles.
     cost : CoverageCost
         Cost of the map of the first run.
 
     Returns
     -------
     list of DistanceSnapshot
-        Those in which a robot works.
+        Snapshots of the runs in which at least one robot works at the end.
     """
     from robocov_app.figures.coverage import DistanceSnapshot
     from robocov_app.render.distance_map.field import DistanceField

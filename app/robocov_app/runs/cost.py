@@ -1,4 +1,4 @@
-"""The coverage cost of a map, with progress; and a figure of it."""
+"""The coverage cost of a map, computed with a progress display, and a figure of it."""
 
 from pathlib import Path
 
@@ -13,15 +13,15 @@ from robocov.team import Team
 from robocov_app.terminal.progress import show_late_progress
 
 MIN_FIGURE_LATTICE = 256
-"""Coarsest lattice of figures of distances: its cells should be narrower than walls."""
+"""Minimum lattice size of figures of distances, so that its cells are narrower than most walls."""
 MIN_VIDEO_LATTICE = 128
-"""Coarsest lattice of videos, in which every frame is computed."""
+"""Minimum lattice size of videos. It is smaller because distances are computed for every frame."""
 
 
 def build_cost(
     environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
 ) -> CoverageCost:
-    """Build the coverage cost of a map, and show progress if that takes over a second.
+    """Build the coverage cost of a map, and show progress if it takes more than a second.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def build_cost(
     lattice : int
         Number of sites along each side of the map.
     quiet : bool
-        Whether progress is not shown.
+        Whether to hide progress.
     geodesics : Geodesics or None
         Shortest paths of the map, if they have been computed already.
 
@@ -44,16 +44,16 @@ def build_cost(
 def refine_cost_for_figures(
     environment: Environment, cost: CoverageCost, lattice: int | None = None
 ) -> CoverageCost:
-    """Return a cost that is fine enough to be drawn.
+    """Return a cost on a lattice that is fine enough for a figure.
 
     Parameters
     ----------
     environment : Environment
     cost : CoverageCost
-        Cost of this map. It is returned if it is fine enough, or if a finer one would take too long because
-        the map has too many vertices.
+        Cost of this map. It is returned unchanged if it is fine enough, or if the map has so many vertices
+        that a finer cost would take too long.
     lattice : int or None
-        Coarsest lattice; `MIN_FIGURE_LATTICE` by default.
+        Minimum lattice size. None stands for `MIN_FIGURE_LATTICE`.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def save_distance_figure(
     speeds: Array | None = None,
     radius: float = DEFAULT_RADIUS_M,
 ) -> None:
-    """Draw a map of the distances to the nearest robot.
+    """Draw a map of the distances to the nearest robot, and save it.
 
     Parameters
     ----------
@@ -86,12 +86,12 @@ def save_distance_figure(
     cost : CoverageCost
     positions : (n, 2) array, m
     mean : str
-        Text about the mean distance.
+        Text about the mean distance, for the caption.
     title : str
     theme : str
         ``light`` or ``dark``.
     speeds : (n,) array or None, m/s
-        Speeds, if the nearest robot is the one that arrives first.
+        Speeds of the robots. If given, the nearest robot is the one that arrives first.
     radius : float, m
         Radius of the robots.
 

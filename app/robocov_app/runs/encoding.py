@@ -1,4 +1,4 @@
-"""Files of frames and videos."""
+"""Writing of frames as PNG files, and of videos."""
 
 import contextlib
 import io
@@ -20,12 +20,12 @@ from robocov.files.writing import replace_file
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB image, (height, width, 3), from 0 to 255."""
 _PNG_COMPRESSION_LEVEL = 2
-"""Low levels are several times as fast, and drawings of flat colors stay small."""
+"""A low level, which is several times as fast. Drawings with flat colors stay small even so."""
 _SECONDS_PER_KEYFRAME = 2
 
 
 def encode_png(frame: Frame) -> bytes:
-    """Encode a frame as a PNG file. The same pixels give the same bytes.
+    """Encode a frame as a PNG file; the same pixels always give the same bytes.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def save_frames_and_video(
     Parameters
     ----------
     frames : iterable of Frame
-        At least one for a video, all of one size.
+        Frames, all of the same size. A video needs at least one.
     folder : Path or None
-        Folder of ``000000.png``, ``000001.png`` and so on.
+        Folder for the files ``000000.png``, ``000001.png`` and so on.
     video : Path or None
         MP4 file.
     fps : float
@@ -68,7 +68,7 @@ def save_frames_and_video(
     if video is not None:
         save_video(video, frames, fps=fps)
     else:
-        deque(frames, maxlen=0)  # consumes the frames, which writes them
+        deque(frames, maxlen=0)  # consumes the iterator, which writes the frames
 
 
 def _save_each_frame(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
@@ -90,14 +90,14 @@ def save_video(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> Non
     ----------
     path : Path
     frames : iterable of Frame
-        At least one, all of one size.
+        At least one frame, all of the same size.
     fps : float
         Frames per second.
 
     Raises
     ------
     ParameterError
-        If there is no frame, or they have different sizes.
+        If there is no frame, or if frames have different sizes.
     OutputError
         If the file cannot be written, or there is no encoder.
     """
@@ -120,7 +120,7 @@ def save_video(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> Non
 
 
 def _pad_to_even_size(frame: Frame) -> Frame:
-    """Repeat the last row or column of a frame whose height or width is odd, as encoders need even ones."""
+    """Make the height and width of a frame even, as encoders require, by repeating the last row or column."""
     height, width, _ = frame.shape
     if height % 2 == width % 2 == 0:
         return frame
@@ -129,11 +129,11 @@ def _pad_to_even_size(frame: Frame) -> Frame:
 
 @contextlib.contextmanager
 def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float) -> Iterator[BinaryIO]:
-    """Run the encoder, and yield the pipe that takes raw frames."""
+    """Run the encoder, and yield the pipe for raw frames; raise OutputError if the encoder fails."""
     command = build_encoder_command(temporary, size, fps)
     with tempfile.TemporaryFile() as error_output:
-        # In a session of its own, the encoder does not get the Ctrl-C of a terminal, and the video is
-        # completed.
+        # In a session of its own, the encoder does not receive Ctrl-C from the terminal, so that it can
+        # complete the video.
         process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -163,7 +163,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
 
 
 def find_encoder() -> str:
-    """Find ffmpeg: that of the extra "film", or one on the path.
+    """Find ffmpeg: the one installed by the extra "film", or else one on the PATH.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def find_encoder() -> str:
     Raises
     ------
     OutputError
-        If ffmpeg was not found.
+        If ffmpeg is not found.
     """
     with contextlib.suppress(ModuleNotFoundError, RuntimeError):
         from imageio_ffmpeg import get_ffmpeg_exe
@@ -197,11 +197,11 @@ def build_encoder_command(
     path : Path
         File of the video.
     size : (width, height), px
-        Both even.
+        Size of the frames; both numbers must be even.
     fps : float
         Frames per second.
     streamed : bool
-        Whether the video can be played while it is being written.
+        Whether it must be possible to play the video while it is being written.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def build_encoder_command(
     command = [find_encoder(), "-y", "-nostdin", "-loglevel", "error"]
     command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-"]
     command += ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"]
-    # Without these, players assume bt709 for high definition and bt601 otherwise.
+    # Without these options, players assume bt709 for high definition and bt601 otherwise.
     command += ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"]
     command += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
     command += ["-color_range", "tv"]
@@ -220,6 +220,6 @@ def build_encoder_command(
         command += ["-g", f"{round(_SECONDS_PER_KEYFRAME * fps)}"]
         flags = "+frag_keyframe+empty_moov+default_base_moof"
     command += ["-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"]
-    # With "file:", no path is taken for an option or an address.
+    # "file:" prevents a path from being taken for an option or a URL.
     command.append(f"file:{path.absolute()}")
     return command

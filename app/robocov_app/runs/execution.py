@@ -1,4 +1,4 @@
-"""Execution of one scenario: simulate, evaluate, and save the numbers."""
+"""Execution of one scenario: simulation, evaluation, and saving of the numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robocov_app.terminal.output import replace_non_finite, write_csv
 from robocov_app.terminal.progress import make_counter, show_progress
 
 MAX_SAMPLES_AFTER_INTERRUPTION = 200
-"""Maximum number of samples of the coverage cost of a run that was interrupted."""
+"""Maximum number of samples of the coverage cost of an interrupted run, so that it ends soon."""
 _STEPS_PER_PROGRESS_UPDATE = 10
 
 
@@ -44,7 +44,7 @@ class Run:
 
     @property
     def final_time(self) -> float | None:
-        """Mean time until the first robot arrives, at the end of the run, s; None if speeds are equal."""
+        """Mean travel time of the first to arrive, at the end of the run, s; None if speeds are equal."""
         return None if self.history.mean_time is None else float(self.history.mean_time[-1])
 
 
@@ -65,10 +65,10 @@ def execute_scenario(
         Cost of the scenario's map.
     result : ResultFolder
     subfolder : str
-        Name of the folder in the result; empty for the result itself.
+        Name of a subfolder of the result; empty for the result folder itself.
     settings : OutputSettings
     interruption : Interruption
-        The run ends early if it is requested.
+        The run ends early if an interruption is requested.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def execute_scenario(
     """
     record = _simulate(scenario, settings, interruption)
     record.save(result.staging / subfolder)
-    # The simulation took the longest, so the record is saved before the evaluation starts.
+    # The simulation takes longest, so its record is saved before the evaluation starts.
     result.save_progress()
     run = evaluate_record(record, cost, interruption, quiet=settings.quiet)
     save_numbers(run, result.staging / subfolder, settings.lattice)
@@ -89,7 +89,7 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
     simulation = scenario.build_simulation()
     redirected: AbstractContextManager[Any] = nullcontext()
     if settings.quiet:
-        # Output of a user's controller must not be mixed with the JSON answer.
+        # What a user's controller prints must not be mixed with the JSON on standard output.
         redirected = redirect_stdout(sys.stderr)
     title = f"simulating {simulation.controller.label}"
     with redirected, show_progress(title, scenario.steps, quiet=settings.quiet) as update:
@@ -112,9 +112,9 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     cost : CoverageCost
         Cost of the record's map.
     interruption : Interruption
-        After an interruption, fewer steps are evaluated.
+        If an interruption was requested, fewer steps are evaluated.
     quiet : bool
-        Whether progress is not shown.
+        Whether to hide progress.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def build_cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, .
     Returns
     -------
     header : str
-        It contains a column of times only if some robots are faster than others.
+        Names of the columns, with a column of mean times only if some robots are faster than others.
     rows : iterator of tuple of float
     """
     columns = {

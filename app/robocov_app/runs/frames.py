@@ -20,7 +20,7 @@ from robocov_app.runs.encoding import Frame
 from robocov_app.runs.settings import VideoSettings
 
 _TIME_TOLERANCE_S = 5e-7
-"""Times are sums of steps; this covers their rounding errors."""
+"""Tolerance for the rounding errors of times, which are sums of steps."""
 
 
 def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
@@ -40,7 +40,7 @@ def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float =
     Returns
     -------
     (k,) int array
-        Numbers of the steps.
+        Index of the recorded step in each frame.
     """
     duration = float(time[-1] - time[0])
     count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
@@ -68,13 +68,13 @@ def draw_frames(
     settings : VideoSettings
     size : (width, height), px
     layers : sequence of Layer or None
-        The standard layers by default.
+        Layers to draw. By default, the standard layers.
     scale : float or None
-        Scale of texts and lines; by default one that suits the size.
+        Scale of text and lines. By default, one that suits the size.
     cost : CostHistory or None
-        The coverage cost along the run. Each frame shows the latest value.
+        The coverage cost along the run. Each frame shows its latest value.
     rows : (k,) int array or None
-        Numbers of the steps that the frames show; those of `select_frame_rows` by default.
+        Indices of the recorded steps that the frames show. By default, the result of `select_frame_rows`.
     fields : DistanceFields or None
         Distances to the nearest robot, if a layer shows them.
 
@@ -125,7 +125,7 @@ def build_painter(
 
 
 def _describe_cost(record: Record, cost: CostHistory | None, time: float) -> str:
-    """Return a text with the latest known cost at a time; empty if there is none."""
+    """Format the latest cost that is known at a given time, s; empty if there is none."""
     if cost is None:
         return ""
     known_count = int(np.searchsorted(cost.time, time + _TIME_TOLERANCE_S, side="right"))

@@ -1,4 +1,4 @@
-"""Layout of videos of several runs side by side, under a legend that they share."""
+"""Layout of videos that show several runs side by side, below a common legend."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from robocov_app.runs.frames import build_painter
 from robocov_app.runs.settings import VideoSettings
 
 MAX_DEFAULT_SIZE_PX = (1920, 1080)
-"""Maximum size of a video of several panes whose size is not given."""
+"""Maximum size of a video with several panes if the user gives no size."""
 PANE_GAP_PX = 2
 """Width of the line between two panes."""
 _MIN_PANE_WIDTH_PX = 360
-"""Minimum width of a pane at scale 1, in which its caption fits."""
+"""Minimum width of a pane at scale 1, so that its caption fits."""
 _MIN_PANE_HEIGHT_PX = 40
 _MIN_SCALE = 0.75
 _HEADER_PADDING_PX = 6
@@ -37,7 +37,7 @@ _PANE_PADDING_PX = 4
 
 
 class PaneLayout(NamedTuple):
-    """Layout of a video of several panes.
+    """Layout of a video with several panes.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class PaneLayout(NamedTuple):
     pane : (width, height), px
         Size of each pane.
     scale : float
-        Scale of texts and lines.
+        Scale of text and lines.
     header : Frame
         The legend, as wide as the video.
     size : (width, height), px
@@ -65,7 +65,7 @@ class PaneLayout(NamedTuple):
         Parameters
         ----------
         panes : sequence of Frame
-            One for each pane.
+            The frame of each pane.
         theme : Theme
 
         Returns
@@ -83,7 +83,7 @@ class PaneLayout(NamedTuple):
 
 
 class _PaneSpace(NamedTuple):
-    """Space around the map of a pane, px."""
+    """Total space around the map in a pane, px."""
 
     horizontal: float
     vertical: float
@@ -96,7 +96,7 @@ def build_pane_layout(
     fields: DistanceFields | None = None,
     legend_scenes: Sequence[Scene] | None = None,
 ) -> PaneLayout:
-    """Lay out panes so that the maps are as large as possible: wide maps one below the other.
+    """Lay out panes so that the maps are as large as possible; for example, wide maps are stacked.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ def build_pane_layout(
         One for each pane.
     settings : VideoSettings
     size : (width, height) or None, px
-        Size of the video. By default one that suits the map, up to `MAX_DEFAULT_SIZE_PX`.
+        Size of the video. By default, one that suits the map, up to `MAX_DEFAULT_SIZE_PX`.
     fields : DistanceFields or None
         Distances to the nearest robot, if a layer shows them.
     legend_scenes : sequence of Scene or None
-        The scenes that the legend explains. By default the first steps of the records, and the last ones
-        of those in which robots fail.
+        Scenes that the legend explains. By default, the first step of each record, and the last step of
+        records in which robots may fail.
 
     Returns
     -------
@@ -147,6 +147,7 @@ def _compute_aspect(record: Record) -> float:
 
 
 def _count_columns(panes: int, aspect: float, size: tuple[int, int]) -> int:
+    """Choose the number of panes in a row; `aspect` is the width of the map divided by its height."""
     width, height = size
     scale = choose_scale(size)
     caption_height = (_HEADER_PADDING_PX + ROW_HEIGHT_PX + _HEADER_PADDING_PX + STRIP_HEIGHT_PX) * scale
@@ -156,7 +157,7 @@ def _count_columns(panes: int, aspect: float, size: tuple[int, int]) -> int:
 
 
 def _fit_pane(aspect: float, max_width: int, max_height: float, scale: float) -> tuple[int, int]:
-    """Return the width and height of a pane that suit the map, px."""
+    """Choose the width and height of a pane, px, that suit a map of a given aspect."""
     space = _PaneSpace(
         horizontal=(2 * MARGIN_PX + _PANE_PADDING_PX) * scale,
         vertical=(
@@ -178,12 +179,12 @@ def _draw_legend(
     fields: DistanceFields | None,
     scenes: Sequence[Scene] | None,
 ) -> Frame:
-    """Draw the legend of everything that the panes show."""
+    """Draw the common legend, with entries for everything that the panes show."""
     painter = build_painter(records[0], settings, (64, 64), build_pane_layers(settings.colors), scale)
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.list_legend_entries(scene) for scene in scenes]
-    # The longest legend determines the order, because it usually contains all entries.
+    # The longest legend comes first and determines the order, because it usually contains all entries.
     entries.sort(key=len)
     entries.reverse()
     merged = merge_legends(entries, lambda entry: entry.key)
@@ -203,7 +204,7 @@ def _select_legend_scenes(
 
 
 def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, background: Color) -> Frame:
-    """Join frames of one size in rows.
+    """Arrange frames of the same size in rows.
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
     gap : int, px
         Width of the lines between frames.
     line, background : Color
-        Colors of these lines, and of areas without a frame.
+        Color of these lines, and color of areas without a frame.
 
     Returns
     -------

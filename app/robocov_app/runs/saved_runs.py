@@ -1,4 +1,4 @@
-"""Saved runs and comparisons, read back; names of their folders."""
+"""Loading of saved runs and comparisons, and names for their folders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_FOLDER_NAME_CHARS = 64
 
 
 class ComparisonDocument(Document):
-    """The content of ``comparison.json``. It has no `runs` until the comparison has ended."""
+    """The content of ``comparison.json``; the list `runs` stays empty until the comparison has ended."""
 
     folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), expect("the name of a folder")]]
     runs: list[dict[str, Any]] = Field([])
@@ -46,16 +46,16 @@ class SavedRun(NamedTuple):
 
 
 class Roster(NamedTuple):
-    """The robots of a record from the window, in which robots fail and keep their numbers.
+    """The numbers of the robots in a record; in the window, robots can fail, and others keep their numbers.
 
     Attributes
     ----------
     environment : Environment
-        The map without the robots that failed.
+        The map without failed robots, which are obstacles in the record.
     numbers : tuple of int
-        Numbers of the robots of the record.
+        Number of each robot in the record.
     failed : dict of int to (x, y), m
-        Positions of the robots that failed, by number.
+        Positions of the failed robots, keyed by number.
     """
 
     environment: Environment
@@ -74,12 +74,12 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
     Returns
     -------
     list of SavedRun
-        If a comparison was killed, the runs that were saved before.
+        The runs. If the program was killed during a comparison, only the runs saved before.
 
     Raises
     ------
     InputError
-        If it is not the folder of a run or a comparison, or a file in it cannot be used.
+        If it is not the folder of a run or a comparison, or if a file in it is invalid.
     """
     is_file = path.name in (RUN_FILE, COMPARISON_FILE) and not path.is_dir()
     folder = path.parent if is_file else path
@@ -95,7 +95,7 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
 
 
 def _load_comparison(path: Path) -> list[SavedRun]:
-    """Load the runs of a comparison, which must have the same map."""
+    """Load the runs of a comparison; raise InputError if they do not have the same map."""
     content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
     folders = [path.parent / name for name in content.folders]
     for folder in folders:
@@ -114,7 +114,7 @@ def _load_comparison(path: Path) -> list[SavedRun]:
 
 
 def build_roster(record: Record) -> Roster:
-    """Find the numbers of the robots in a record, and the robots that failed.
+    """Determine the numbers of the robots in a record, and the robots that failed.
 
     Parameters
     ----------
@@ -123,7 +123,8 @@ def build_roster(record: Record) -> Roster:
     Returns
     -------
     Roster
-        Unless the record is part of a session in the window, robots are numbered from 1 and none has failed.
+        If the record does not come from a session in the window, or is inconsistent with it, robots are
+        numbered from 1 and none has failed.
     """
     environment = record.environment
     default_numbers = tuple(range(1, len(record.team) + 1))
@@ -161,7 +162,7 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        Different names that are valid for folders.
+        A different, valid folder name for each controller.
 
     Examples
     --------

@@ -16,12 +16,12 @@ DEFAULT_VIDEO_SIZE_PX = (1280, 720)
 
 @dataclass(frozen=True)
 class VideoSettings:
-    """Frames and videos, and the look of figures.
+    """Settings of frames and videos, and of the look of figures.
 
     Attributes
     ----------
     frames, video : bool
-        Whether frames are saved as PNG files, and whether a video is saved.
+        Whether to save frames as PNG files, and whether to save a video.
     fps : float
         Frames per second of the video.
     speed : float
@@ -31,9 +31,9 @@ class VideoSettings:
     colors : {"paper", "robots"}
         Trajectories in the paper's red, or in a color for each robot.
     size : (width, height) or None, px
-        By default, a size that suits the content.
+        Size of frames and figures. By default, one that suits the content.
     shown_layers, hidden_layers : frozenset of str
-        Layers that are shown in addition to the standard ones, and standard ones that are not shown.
+        Layers to show in addition to the standard ones, and standard layers to hide.
     """
 
     frames: bool = False
@@ -48,7 +48,7 @@ class VideoSettings:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether there is anything to save."""
+        """Whether frames or a video are to be saved."""
         return self.frames or self.video
 
     @property
@@ -63,7 +63,7 @@ class VideoSettings:
         Raises
         ------
         ParameterError
-            If there is none with this name.
+            If no theme has this name.
         """
         from robocov_app.look.theme import get_theme
 
@@ -77,15 +77,15 @@ class OutputSettings:
     Attributes
     ----------
     lattice : int
-        The coverage cost is computed on this number of sites along each side of the map.
+        Number of sites along each side of the map on which the coverage cost is computed.
     record_every : int
-        The record contains one step in `record_every`.
+        Number of steps from one recorded step to the next.
     overwrite : bool
-        Whether an earlier result in the folder is replaced.
+        Whether to replace an earlier result in the folder.
     figures : bool
-        Whether figures are saved.
+        Whether to save figures.
     quiet : bool
-        Whether progress is not shown, because the output is read by a program.
+        Whether to hide progress, because a program reads the output.
     video : VideoSettings
     """
 

@@ -27,11 +27,11 @@ from robocov_app.terminal.progress import show_progress
 VIDEO_HOLD_S = 1.0
 """Duration for which a video shows its last step."""
 _COLOR_SCALE_FACTOR = 1.3
-"""Upper end of the color scale of a video divided by the largest distance at its end."""
+"""Upper end of the color scale of a video, divided by the largest distance at the end of the runs."""
 
 
 def get_video_name(runs: int) -> str:
-    """Return the file name of the video of a number of runs."""
+    """Return the file name of a video that shows a given number of runs."""
     return COMPARISON_VIDEO_FILE if runs > 1 else RUN_VIDEO_FILE
 
 
@@ -49,9 +49,9 @@ def draw_comparison_frames(
     Parameters
     ----------
     records : sequence of Record
-        One for each pane. Panes of shorter runs stay at their last step.
+        The record of each pane. Panes of shorter runs stay at their last step.
     costs : sequence of CostHistory
-        Their costs.
+        The cost along each run.
     layout : PaneLayout
     settings : VideoSettings
     hold : float, s
@@ -67,7 +67,7 @@ def draw_comparison_frames(
         draw_frames(
             record,
             settings,
-            # Layers cache drawings, so each pane needs its own.
+            # Layers cache drawings, so each pane needs layers of its own.
             layers=build_pane_layers(settings.colors),
             cost=cost,
             rows=select_frame_rows(record.time, settings.fps, settings.speed, hold),
@@ -79,6 +79,7 @@ def draw_comparison_frames(
     ]
     panes: list[Frame] = []
     for new_panes in zip_longest(*pane_videos):
+        # None stands for a video that has ended; its pane keeps the last frame.
         panes = [old if new is None else new for new, old in zip_longest(new_panes, panes)]
         yield layout.compose_page(panes, settings.color_theme)
 
@@ -93,23 +94,23 @@ def save_videos(
     quiet: bool,
     runs_on_one_map: Sequence[Run] | None = None,
 ) -> None:
-    """Write frames and a video of runs to a folder.
+    """Write frames and a video of runs to a folder, as requested by the settings.
 
     Parameters
     ----------
     runs : sequence of Run
-        More than one are shown side by side.
+        Runs to show; several runs are shown side by side.
     cost : CoverageCost or None
-        Cost of their map, if it is known.
+        Cost of the runs' map, if it has been computed already.
     folder : Path
     settings : VideoSettings
     interruption : Interruption
-        Both end early if it is requested.
+        Writing ends early if an interruption is requested.
     quiet : bool
-        Whether progress is not shown.
+        Whether to hide progress.
     runs_on_one_map : sequence of Run or None
-        The same runs on a map without failed robots, if those are obstacles of the maps of `runs`. Distances
-        are computed on that map.
+        The same runs on the map without failed robots, which are obstacles of the maps of `runs`. If given,
+        distances are computed on that map.
 
     Raises
     ------
@@ -135,7 +136,7 @@ def save_videos(
 def _build_fields(
     runs: Sequence[Run], cost: CoverageCost | None, settings: VideoSettings, *, quiet: bool
 ) -> DistanceFields | None:
-    """Return the distances that videos show, on one scale of colors; None if no layer shows any."""
+    """Prepare the distances that videos show, with a common color scale; None if no layer shows distances."""
     if not settings.shown_layers & {"distances", "geodesic_cells"}:
         return None
     environment = runs[0].record.environment
@@ -174,9 +175,9 @@ def write_frames_and_video(
     settings : VideoSettings
         Which of the two are written.
     interruption : Interruption
-        Both end early if it is requested.
+        Writing ends early if an interruption is requested.
     quiet : bool
-        Whether progress is not shown.
+        Whether to hide progress.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Runs of a result grouped by controller and gains, scaled, compared in pairs, and selected for display."""
+"""Analysis of the runs of a result: grouping by controller and gains, scaling, comparison and selection."""

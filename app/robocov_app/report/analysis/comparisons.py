@@ -1,4 +1,4 @@
-"""Comparison of groups in pairs of runs: ratios of final mean distances, with 95 % intervals."""
+"""Comparison of two groups by pairs of runs: ratios of final mean distances, with 95 % intervals."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,16 +19,16 @@ from robocov_app.report.analysis.groups import RunGroup
 from robocov_app.report.results.result import ReportedRun
 
 MAX_COMPARED_GROUPS = 4
-"""Maximum number of groups that are all compared with each other. More are compared with the first."""
+"""Up to this number of groups, all are compared with each other; otherwise, all with the first."""
 NEGLIGIBLE_DIFFERENCE = 0.001
-"""Fraction by which a cost must differ to be called better or worse."""
+"""Smaller relative differences of a cost do not count as better or worse."""
 
 PairVerdict: TypeAlias = Literal["better", "worse", "undecided"]
 _VERDICTS: tuple[PairVerdict, ...] = ("better", "worse", "undecided")
 
 
 class MapPairs(NamedTuple):
-    """The pairs of runs on one map.
+    """The pairs of runs of two groups on one map.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class MapPairs(NamedTuple):
     first_distances, second_distances : (m,) array, m
         Final mean distances of the runs in each pair.
     ratio : Interval
-        Geometric mean of the ratios over starts and seeds.
+        Geometric mean of the ratios first / second, over starts and seeds.
     """
 
     map_name: str
@@ -46,7 +46,7 @@ class MapPairs(NamedTuple):
 
     @property
     def verdict(self) -> PairVerdict:
-        """Whether the first group is better, by an interval without negligible differences."""
+        """Whether the first group is better: "undecided" if the interval includes negligible differences."""
         if self.ratio.high < 1.0 - NEGLIGIBLE_DIFFERENCE:
             return "better"
         if self.ratio.low > 1.0 + NEGLIGIBLE_DIFFERENCE:
@@ -66,16 +66,16 @@ class MapPairs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GroupComparison:
-    """Two groups compared on the cases that both have.
+    """A comparison of two groups on the cases that both have.
 
     Attributes
     ----------
     first, second : RunGroup
     maps : tuple of MapPairs
     ratio : Interval
-        Ratio of the first to the second: over maps, or over seeds if there is only one map.
+        Ratio of the first group to the second: a mean over maps, or over seeds if there is only one map.
     unpaired_count : int
-        Number of cases of only one group.
+        Number of cases that only one of the groups has.
     """
 
     first: RunGroup
@@ -95,7 +95,7 @@ class GroupComparison:
         return sum(pairs.pair_count for pairs in self.maps)
 
     def format_verdicts(self) -> str:
-        """Return as text on how many maps the first group is better, worse or neither."""
+        """Describe on how many maps the first group is better, worse or neither."""
         counts = Counter(pairs.verdict for pairs in self.maps)
         map_count = len(self.maps)
         if len(counts) == 1:
@@ -110,7 +110,7 @@ class GroupComparison:
         map_count = len(self.maps)
         if map_count > 1:
             if map_count < MIN_BOOTSTRAP_MAPS:
-                # The interval is left out: it would be narrow if the few maps happen to agree.
+                # No interval: it would be misleadingly narrow if the few maps happen to agree.
                 ratio = f"{self.ratio.estimate:.3f} over {map_count} maps only"
             else:
                 ratio = f"{format_ratio(self.ratio)} over {map_count} maps"
@@ -122,7 +122,7 @@ class GroupComparison:
 
 
 def format_ratio(ratio: Interval) -> str:
-    """Return a ratio with its interval, if it has one."""
+    """Format a ratio, followed by its interval if there is one."""
     text = f"{ratio.estimate:.3f}"
     if np.isfinite(ratio.low):
         text += f" ({ratio.low:.3f} to {ratio.high:.3f})"
@@ -139,7 +139,7 @@ def compare_groups(groups: Sequence[RunGroup]) -> list[GroupComparison]:
     Returns
     -------
     list of GroupComparison
-        All pairs of groups; if there are many groups, only those with the first one.
+        Comparisons of all pairs of groups; if there are many groups, of the first one with all others.
     """
     first_groups = groups
     if len(groups) > MAX_COMPARED_GROUPS:
@@ -154,7 +154,7 @@ def compare_groups(groups: Sequence[RunGroup]) -> list[GroupComparison]:
 
 
 def compare_pair(first: RunGroup, second: RunGroup) -> GroupComparison | None:
-    """Compare two groups; None if they have no case in common."""
+    """Compare two groups; return None if they have no case in common."""
     first_runs = _index_by_case(first)
     second_runs = _index_by_case(second)
     paired_runs = [run for case, run in first_runs.items() if case in second_runs]
@@ -170,19 +170,19 @@ def compare_pair(first: RunGroup, second: RunGroup) -> GroupComparison | None:
     if len(maps) > 1:
         logarithms = [float(np.log(pairs.ratio.estimate)) for pairs in maps]
         ratio = _exponentiate(bootstrap(logarithms, "mean"))
-    unpaired_cases = first_runs.keys() ^ second_runs.keys()
+    unpaired_cases = first_runs.keys() ^ second_runs.keys()  # in only one of them
     return GroupComparison(first, second, tuple(maps), ratio, len(unpaired_cases))
 
 
 def _index_by_case(group: RunGroup) -> dict[tuple[object, ...], ReportedRun]:
-    """Return the runs of a group whose distances have a ratio, by their cases."""
+    """Return the runs of a group with positive, finite distances, keyed by their cases."""
     return {run.case: run for run in group.runs if 0.0 < run.final_distance < np.inf}
 
 
 def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
-    """Return the geometric mean of the ratios of runs on one map.
+    """Estimate the geometric mean of the ratios of runs on one map.
 
-    Runs of different teams from the same start and seed count once: they are no independent evidence.
+    Runs of different teams with the same start and seed are averaged first, because they are not independent.
     """
     effects: dict[tuple[str | None, int | None], list[float]] = {}
     for run, effect in zip(runs, np.log(ratios).tolist(), strict=True):
@@ -192,7 +192,7 @@ def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
 
 
 def _exponentiate(effect: Interval) -> Interval:
-    """Turn an interval of logarithms into one of ratios."""
+    """Convert an interval of logarithms to an interval of ratios."""
     with np.errstate(over="ignore"):
         estimate, low, high = np.exp([effect.estimate, effect.low, effect.high]).tolist()
     return Interval(estimate, low, high)

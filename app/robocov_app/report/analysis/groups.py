@@ -13,12 +13,12 @@ from robocov_app.report.results.result import Gains, ReportedResult, ReportedRun
 from robocov_app.sweep.parameters import format_parameter
 
 MAX_VARIANTS = 8
-"""Maximum number of variants that are shown apart. If there are more, each controller is one group."""
+"""Maximum number of variants that are shown separately. If there are more, each controller is one group."""
 TUNED_SUFFIX = " (tuned)"
-"""Follows the label of a controller whose gains were chosen on other runs than those in the group."""
+"""Suffix of the label of a controller whose gains were chosen on runs other than those in the group."""
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _MAX_GAIN_SUFFIX_CHARS = 12
-"""Maximum length of a suffix that is the name and the value of a gain. A longer one becomes a letter."""
+"""Maximum length of a suffix with the name and value of a gain. If it is longer, letters are used instead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class RunGroup:
     label : str
     controller : str
     gains : Gains or None
-        Gains of all runs; None if these have different ones.
+        Gains of all runs. None if the runs have different gains.
     runs : tuple of ReportedRun
     """
 
@@ -45,7 +45,7 @@ class RunGroup:
 
 
 def list_variants(result: ReportedResult) -> list[RunGroup]:
-    """List the variants in a result: groups with the same controller and the same gains."""
+    """List the variants in a result: groups of runs with the same controller and the same gains."""
     runs_by_variant = group_by(result.completed_runs, lambda run: (run.controller, run.gains))
     suffixes: dict[tuple[str, Gains], str] = {}
     for variants in group_by(runs_by_variant, itemgetter(0)).values():
@@ -61,7 +61,8 @@ def list_variants(result: ReportedResult) -> list[RunGroup]:
 def _choose_suffixes(gain_sets: Sequence[Gains]) -> list[str]:
     """Return suffixes that distinguish sets of gains of one controller.
 
-    They are the value of the only gain that differs, or A, B, ..., Z, A2, B2, ...
+    They contain the name and value of the only gain that differs. If several differ, or if the text would be
+    too long, they are A, B, ..., Z, A2, B2, ...
     """
     if len(gain_sets) == 1:
         return [""]
@@ -83,12 +84,12 @@ def _choose_suffixes(gain_sets: Sequence[Gains]) -> list[str]:
 
 
 def label_runs(result: ReportedResult) -> dict[ReportedRun, str]:
-    """Return the label of the variant of each completed run."""
+    """Return, for each completed run, the label of its variant."""
     return {run: group.label for group in list_variants(result) for run in group.runs}
 
 
 def group_by_controller(result: ReportedResult) -> list[RunGroup]:
-    """List the groups of all completed runs of a controller, with any gains."""
+    """List one group for each controller, with all of its completed runs regardless of their gains."""
     groups = []
     for controller, runs in group_by(result.completed_runs, lambda run: run.controller).items():
         has_same_gains = len({run.gains for run in runs}) == 1
@@ -106,7 +107,7 @@ def list_displayed_groups(result: ReportedResult) -> list[RunGroup]:
 
 
 def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
-    """Choose the style of each label in a report, the same in all of its plots and tables.
+    """Choose a style for each label in a report, which all of its plots and tables use.
 
     Parameters
     ----------
@@ -115,7 +116,8 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
     Returns
     -------
     dict of str to CurveStyle
-        Styles of displayed groups differ. Other variants look like their controllers, as do tuned ones.
+        Displayed groups have different styles. Other variants, and tuned controllers, have the style of their
+        controller.
     """
     groups = list_displayed_groups(result)
     displayed_controllers = [group.controller for group in groups]
@@ -141,7 +143,7 @@ def list_settings(result: ReportedResult) -> list[Setting]:
 
 
 def format_setting(result: ReportedResult, setting: Setting) -> str:
-    """Return a setting as text: its map, and what else distinguishes it from others of the result."""
+    """Format a setting: its map, and what else distinguishes it from other settings of the result."""
     map_name, robots, team = setting
     texts = [map_name]
     if len({size for _, size, _ in list_settings(result)}) > 1:
@@ -151,7 +153,7 @@ def format_setting(result: ReportedResult, setting: Setting) -> str:
 
 
 def find_varying_gains(result: ReportedResult) -> dict[str, list[str]]:
-    """Return the gains with several values, each with the controllers in which it varies."""
+    """Return the gains that have several values, each with the controllers in which it varies."""
     values: dict[tuple[str, str], set[Value]] = {}
     for run in result.completed_runs:
         for name, value in run.gains:
@@ -164,7 +166,7 @@ def find_varying_gains(result: ReportedResult) -> dict[str, list[str]]:
 
 
 def format_gains(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> str:
-    """Return gains as a line of text.
+    """Format gains and their units as a line of text.
 
     Examples
     --------

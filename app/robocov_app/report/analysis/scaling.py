@@ -17,18 +17,18 @@ Scales: TypeAlias = Mapping[ReportedRun, float]
 def compute_medians(
     result: ReportedResult, key: Callable[[ReportedRun], object] = attrgetter("setting")
 ) -> Scales:
-    """Compute for each run the median final mean distance of all runs with the same key.
+    """Compute, for each run, the median final mean distance of all runs with the same key.
 
     Parameters
     ----------
     result : ReportedResult
     key : callable
-        Returns the key of a run; by default its setting.
+        Returns the key of a run. By default, the key is the run's setting.
 
     Returns
     -------
     mapping of ReportedRun to float, m
-        Without runs whose final mean distance is not known.
+        Medians. Runs whose final mean distance is unknown are left out.
     """
     known_runs = [run for run in result.completed_runs if np.isfinite(run.final_distance)]
     medians: dict[ReportedRun, float] = {}
@@ -39,7 +39,7 @@ def compute_medians(
 
 
 def scale_distance(run: ReportedRun, scales: Scales) -> float:
-    """Return the final mean distance of a run divided by its scale; infinite if that is not known."""
+    """Return the final mean distance of a run divided by its scale; infinite if either is unknown."""
     scale = scales.get(run, 0.0)
     if not np.isfinite(run.final_distance) or scale <= 0.0:
         return np.inf
@@ -47,6 +47,6 @@ def scale_distance(run: ReportedRun, scales: Scales) -> float:
 
 
 def scale_distances(runs: Iterable[ReportedRun], scales: Scales) -> Array:
-    """Return the finite values of `scale_distance` of some runs, (m,)."""
+    """Return the finite scaled distances of runs, (m,); see `scale_distance`."""
     distances = np.array([scale_distance(run, scales) for run in runs])
     return np.asarray(distances[np.isfinite(distances)])

@@ -26,11 +26,11 @@ class RunSelection(NamedTuple):
     Attributes
     ----------
     runs : tuple of ReportedRun
-        In the order of the result.
+        Selected runs, in the order of the result.
     note : str
-        How they were selected.
+        Description of how they were selected.
     panes : tuple of int
-        Indices of the runs that are side by side at first.
+        Indices in `runs` of those that are shown side by side at first.
     """
 
     runs: tuple[ReportedRun, ...]
@@ -41,8 +41,8 @@ class RunSelection(NamedTuple):
 def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_panes: int = 4) -> RunSelection:
     """Select the runs to show.
 
-    These are all runs if there are few, else the best, worst and middle ones of each map, or of all maps
-    together if those are still too many.
+    If there are few runs, all are selected. Otherwise, they are the best, worst and middle runs of each map;
+    if these are still too many, they are those of all maps together.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_pane
     Returns
     -------
     RunSelection
-        The panes have as many different controllers as possible, from the same start if possible.
+        The panes show as many different controllers as possible, from the same start if possible.
     """
     runs = result.completed_runs
     note = "All runs."
@@ -67,7 +67,7 @@ def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_pane
 
 
 def _select_extremes(result: ReportedResult, max_runs: int) -> tuple[tuple[ReportedRun, ...], str]:
-    """Return the best, worst and middle runs, and how they were selected."""
+    """Return the best, worst and middle runs, and a note on how they were selected."""
     all_runs = result.completed_runs
     selected: set[ReportedRun] = set()
     for map_runs in group_by(all_runs, lambda run: run.map).values():
@@ -98,7 +98,7 @@ def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> set[R
 def _select_groups(
     result: ReportedResult, runs: Iterable[ReportedRun], max_variants: int = 0
 ) -> list[RunGroup]:
-    """Return all variants, or only the compared groups if there are many, with only some of their runs."""
+    """Return all variants, reduced to given runs; if there are many variants, only the compared groups."""
     selected = set(runs)
     groups = list_variants(result)
     if len(groups) > max_variants:
@@ -107,12 +107,16 @@ def _select_groups(
 
 
 def _keep_runs(group: RunGroup, runs: Collection[ReportedRun]) -> RunGroup:
-    """Return a group with only some of its runs."""
+    """Return a group reduced to its runs that are in `runs`."""
     return replace(group, runs=tuple(run for run in group.runs if run in runs))
 
 
 def _find_middle_case(groups: Sequence[RunGroup], scales: Scales) -> tuple[ReportedRun, ...]:
-    """Return the runs of the case whose ranks are nearest to the middle, if most groups have it."""
+    """Return the runs of the case that is most typical for all groups.
+
+    It is a case that the largest number of groups have. Among these, it is the one whose ranks, by distance,
+    are nearest to the middle of each group.
+    """
     offsets: list[tuple[float, ReportedRun]] = []
     for group in groups:
         known_runs = [run for run in group.runs if np.isfinite(scale_distance(run, scales))]
@@ -126,5 +130,5 @@ def _find_middle_case(groups: Sequence[RunGroup], scales: Scales) -> tuple[Repor
 
 
 def _rate_case(case: Sequence[tuple[float, ReportedRun]]) -> tuple[int, float]:
-    """Return a sort key: cases of many groups first, then those nearest to the middle."""
+    """Return a sort key of a case, a list of (distance from the middle rank, run): the most runs first."""
     return -len(case), sum(offset for offset, _ in case)

@@ -1,4 +1,4 @@
-"""Choice of the groups that are compared: controllers with several sets of gains are tuned fairly."""
+"""Choice of the groups to compare. Controllers with several sets of gains are tuned fairly."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ _MAX_LISTED_GAINS = 3
 """Maximum number of sets of gains that are listed for a tuned controller."""
 
 _Fold: TypeAlias = object
-"""A map, or a start and seed: gains for its runs are chosen on the runs of all other folds."""
+"""A map, or a start and seed. The gains for the runs of a fold are chosen on the runs of all other folds."""
 
 
 class ComparedGroups(NamedTuple):
@@ -27,7 +27,7 @@ class ComparedGroups(NamedTuple):
     groups : list of RunGroup
         Variants, or controllers with tuned gains.
     note : str
-        How gains were chosen; empty if no controller has several sets of gains.
+        Description of how gains were chosen; empty if no controller has several sets of gains.
     """
 
     groups: list[RunGroup]
@@ -44,7 +44,7 @@ class _Tuning(NamedTuple):
         Returns the fold of a run.
     scales : Scales
     runs : dict of (controller, gains) to list of ReportedRun
-        All runs, including failed ones.
+        All runs of each variant, including failed ones.
     """
 
     folds: list[_Fold]
@@ -56,9 +56,9 @@ class _Tuning(NamedTuple):
 def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
     """Choose the groups to compare.
 
-    If several controllers have been run, and some with several sets of gains, these are tuned: the gains for
-    each map are those with the lowest median on all other maps (for each start and seed if there is only one
-    map). So gains are never compared on the runs on which they were chosen.
+    If there are several controllers, those with several sets of gains are tuned: the gains for each map are
+    those with the lowest median on all other maps. With only one map, this applies to each start and seed
+    instead. So gains are never compared on the runs on which they were chosen.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _get_start_and_seed(run: ReportedRun) -> _Fold:
 
 
 def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]:
-    """Return the runs of a controller with tuned gains, and a description of the chosen gains."""
+    """Return a group of a controller's runs with tuned gains, and a description of the chosen gains."""
     runs: list[ReportedRun] = []
     labels = []
     for fold in tuning.folds:
@@ -125,7 +125,7 @@ def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]
 
 
 def _rate_elsewhere(variant: RunGroup, fold: _Fold, tuning: _Tuning) -> tuple[float, ...]:
-    """Return the median and the mean of a variant's distances on all other folds; the lower the better."""
+    """Return a sort key, the lowest for the best variant: median and mean distance on all other folds."""
     assert variant.gains is not None
     distances = [
         scale_distance(run, tuning.scales)
@@ -138,7 +138,7 @@ def _rate_elsewhere(variant: RunGroup, fold: _Fold, tuning: _Tuning) -> tuple[fl
 
 
 def _describe_tuning(choices: Sequence[str], *, has_several_maps: bool) -> str:
-    """Return a note on the choice of the gains."""
+    """Return the note on how gains were chosen."""
     if has_several_maps:
         fold = "map"
         other_folds = "on the other maps"

@@ -1,1 +1,1 @@
-"""The plots of a report, drawn by matplotlib and embedded as SVG."""
+"""The plots of a report, drawn with matplotlib and embedded as SVG."""

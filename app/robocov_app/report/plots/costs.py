@@ -39,8 +39,8 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
     Returns
     -------
     list of PagePlot
-        All settings together, as fractions of the first values, then each setting. Panels without any known
-        cost are left out.
+        First all settings together, as fractions of the values at the start, then each setting. Panels
+        without any known cost are left out.
     """
     times, distances = _sample_histories(result)
     plots = []
@@ -58,9 +58,10 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
 
 
 def _sample_histories(result: ReportedResult) -> tuple[Array, dict[ReportedRun, Array]]:
-    """Return times since the start, (T,) s, and the mean distances of runs at these, (T,) m.
+    """Sample the mean distances of all runs at the same times.
 
-    After the end of a run the values are nan.
+    Returned are the times since the start, (T,) s, and the mean distances of each run, (T,) m, which are nan
+    after the end of the run.
     """
     histories = {}
     for run in result.completed_runs:
@@ -87,13 +88,13 @@ def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
         unit = " m"
     texts = "; ".join(_describe_band(band, unit) for band in bands)
     description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
-    # The label of the axis has the unit, since the names of the curves have little space.
+    # The unit is in the label of the axis, because there is little space for the names of the curves.
     draw = partial(plot_cost_bands, bands, label=label, unit="")
     return build_panel_plot(panel, description, draw)
 
 
 def _describe_band(band: Band, unit: str) -> str:
-    """Return the last values of a band as text."""
+    """Describe the last values of a band: the median and, for several runs, the quartiles."""
     low, middle, high = (row[np.isfinite(row)][-1] for row in compute_quartiles(band.values))
     text = f"{band.label}: {middle:.3f}{unit}"
     if len(band.values) > 1:
@@ -115,8 +116,8 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
     Returns
     -------
     list of PagePlot
-        All settings together, divided by their medians, then each setting. Panels in which no group has
-        several runs are left out.
+        First all settings together, divided by their medians, then each setting. Panels in which no group
+        has several runs are left out.
     """
     medians = compute_medians(result)
     meters = dict.fromkeys(result.completed_runs, 1.0)
@@ -151,7 +152,7 @@ def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
 
 
 def _describe_sample(sample: Sample, unit: str) -> str:
-    """Return the median and the quartiles of a sample as text."""
+    """Describe the median and the quartiles of a sample."""
     low, middle, high = np.percentile(sample.values, [25, 50, 75])
     text = f"{sample.label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
     return f"{text}, {format_count(len(sample.values), 'run')}"

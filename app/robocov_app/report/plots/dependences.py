@@ -24,7 +24,7 @@ from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
 
 _MAX_MISSING_FRACTION = 0.5
-"""Two gains with more missing combinations were sampled from ranges, not tried on a grid."""
+"""If a larger fraction of the combinations of two gains is missing, they were not tried on a grid."""
 
 
 class _Parameter(NamedTuple):
@@ -34,11 +34,11 @@ class _Parameter(NamedTuple):
     ----------
     name : str
     title : str
-        Name with unit.
+        Name and unit.
     get_value : callable
-        Returns the value of a run.
+        Returns the value of the parameter in a run.
     choices : tuple of str
-        Values of a parameter that is a text.
+        Values of the parameter if they are words.
     """
 
     name: str
@@ -47,7 +47,7 @@ class _Parameter(NamedTuple):
     choices: tuple[str, ...] = ()
 
     def to_coordinate(self, value: Value) -> float:
-        """Return the coordinate of a value on an axis: nan for no limit, the index of a text."""
+        """Return the coordinate of a value on an axis: nan for no limit, the index for a word."""
         if value is None:
             return np.nan
         if isinstance(value, str):
@@ -55,7 +55,7 @@ class _Parameter(NamedTuple):
         return float(value)
 
     def to_value(self, coordinate: float) -> Value:
-        """Return the value at a coordinate, see `to_coordinate`."""
+        """Return the value at a coordinate; the inverse of `to_coordinate`."""
         if np.isnan(coordinate):
             return None
         if self.choices:
@@ -63,7 +63,7 @@ class _Parameter(NamedTuple):
         return coordinate
 
     def format_coordinate(self, coordinate: float) -> str:
-        """Return the value at a coordinate as text."""
+        """Format the value at a coordinate."""
         return format_value(self.to_value(coordinate), digits=4)
 
 
@@ -92,7 +92,8 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     Returns
     -------
     list of PagePlot
-        Each gain that varies, then each parameter of the team, then grids of two gains of a controller.
+        A plot for each gain that varies, then for each parameter of the team that varies, then grids of two
+        gains of a controller.
     """
     groups = group_by_controller(result)
     styles = choose_controller_styles(group.controller for group in groups)
@@ -103,7 +104,7 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     for number, (name, controllers) in enumerate(varying_gains.items()):
         gain_groups = [group for group in groups if group.controller in controllers]
         plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}"))
-    # Settings include the team, which varies here, so these distances are divided by medians of maps.
+    # A setting includes the team, which varies here, so distances are divided by the median of the map.
     map_axis = _choose_axis(result, "final distance / median of map", attrgetter("map"))
     for number, parameter in enumerate(_list_team_parameters(result)):
         if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
@@ -122,7 +123,11 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
 def _choose_axis(
     result: ReportedResult, label: str, get_key: Callable[[ReportedRun], object]
 ) -> _DistanceAxis:
-    """Return an axis of distances divided by the median of runs with the same key; in m if all have it."""
+    """Return the axis of final distances.
+
+    Distances are divided by the median of all runs with the same key. If all runs have the same key, they are
+    in meters.
+    """
     if len({get_key(run) for run in result.completed_runs}) == 1:
         return _DistanceAxis(FINAL_DISTANCE_LABEL, dict.fromkeys(result.completed_runs, 1.0))
     return _DistanceAxis(label, compute_medians(result, get_key))
@@ -144,7 +149,7 @@ def _describe_gain(result: ReportedResult, name: str) -> _Parameter:
 
 
 def _list_team_parameters(result: ReportedResult) -> list[_Parameter]:
-    """Return the number of robots, and the numbers among the team parameters that vary."""
+    """Return the number of robots, and the numeric parameters of the team, as parameters."""
     parameters = [_Parameter("robots", "robots", lambda run: run.robots)]
     if result.completed_runs:
         names = [name for name, _ in result.completed_runs[0].team if name not in TEXT_PARAMETERS]
@@ -166,7 +171,7 @@ def _build_plot(
     *,
     key: str,
 ) -> PagePlot | None:
-    """Build the plot of distances against a parameter; None if no distance is known."""
+    """Build the plot of distances against a parameter; return None if no distance is known."""
     dependences = []
     for group in groups:
         dependence = _collect_dependence(parameter, group, axis.scales, styles[group.controller])
@@ -183,7 +188,7 @@ def _build_plot(
 def _collect_dependence(
     parameter: _Parameter, group: RunGroup, scales: Scales, style: CurveStyle
 ) -> Dependence:
-    """Return the finite scaled distances of the runs of a group, and their coordinates."""
+    """Collect the finite scaled distances of the runs of a group, and the coordinates of the parameter."""
     coordinates = []
     distances = []
     for run in group.runs:
@@ -195,7 +200,7 @@ def _collect_dependence(
 
 
 def _describe_dependence(dependence: Dependence, parameter: _Parameter) -> str:
-    """Return the median at each value as text; the range if there are many values."""
+    """Describe a dependence: the median at each value or, with many values, their range and the best one."""
     coordinates = np.unique(dependence.gains)
     if len(coordinates) > MAX_LEVELS:
         low = np.nanmin(dependence.gains)
@@ -216,7 +221,7 @@ def _describe_dependence(dependence: Dependence, parameter: _Parameter) -> str:
 def _build_grid_plot(
     group: RunGroup, first: _Parameter, second: _Parameter, axis: _DistanceAxis, *, key: str
 ) -> PagePlot | None:
-    """Build the plot of medians over two gains of a controller; None if they were not tried on a grid."""
+    """Build the plot of medians over two gains of a controller; return None if they were not on a grid."""
     known_runs = [run for run in group.runs if np.isfinite(scale_distance(run, axis.scales))]
     distances = np.array([scale_distance(run, axis.scales) for run in known_runs])
     first_values = [first.to_coordinate(first.get_value(run)) for run in known_runs]
@@ -248,7 +253,7 @@ def _build_grid_plot(
 
 
 def _describe_grid(medians: Array, first: _Parameter, second: _Parameter, columns: Array, rows: Array) -> str:
-    """Return the lowest median with its gains, and the highest, as text."""
+    """Describe the lowest median and its gains, and the highest median."""
     row, column = np.unravel_index(int(np.nanargmin(medians)), medians.shape)
     first_text = f"{first.title} {first.format_coordinate(columns[column])}"
     second_text = f"{second.title} {second.format_coordinate(rows[row])}"

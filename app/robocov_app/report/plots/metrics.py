@@ -18,13 +18,13 @@ from robocov_app.report.svg import inline_svg
 
 MAX_MEASURED_RUNS = 4
 MAX_MEASURED_ROBOTS = 60
-"""Maximum number of robots in a run that is measured. Their visible areas take some time to compute."""
+"""Maximum number of robots of a measured run, because computing their visible areas takes time."""
 _SAMPLES_PER_RUN = 30
-"""Number of times at which a run is measured, after its start."""
+"""Number of times after its start at which a run is measured."""
 
 
 class _Metric(NamedTuple):
-    """A metric that has a plot.
+    """A metric that is plotted.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class _Metric(NamedTuple):
         Label of the axis.
     unit : str
     get_values : callable
-        Returns the values over time.
+        Returns the values of the metric over time.
     """
 
     title: str
@@ -60,7 +60,7 @@ class _MetricCurves(NamedTuple):
 
 
 def _round_to_millimeters(gaps: Array) -> Array:
-    """Return gaps rounded to 1 mm, without negative zeros. Smaller overlaps are tolerated by the solver."""
+    """Round gaps to 1 mm, without negative zeros, because the solver tolerates smaller overlaps."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 
@@ -126,8 +126,8 @@ def build_metric_plots(
     Returns
     -------
     list of PagePlot
-        Empty for a sweep, or if there are too many runs or robots, or trajectories are not known. Mean times
-        are plotted if they are known, and connectivity if it changes.
+        Empty for a sweep, if there are too many runs or robots, or if trajectories are unknown. Mean times
+        are plotted only if they are known, and connectivity only if it changes.
     """
     if result.kind == "sweep" or not _are_measurable(runs):
         return []
@@ -140,7 +140,7 @@ def build_metric_plots(
 
 
 def _are_measurable(runs: Sequence[ReplayRun]) -> bool:
-    """Return whether the metrics of runs can be computed quickly, from known trajectories."""
+    """Return whether the metrics of runs can be computed: trajectories are known, and it is not too slow."""
     if not 0 < len(runs) <= MAX_MEASURED_RUNS:
         return False
     return all(len(run.record.team) <= MAX_MEASURED_ROBOTS and has_path(run.record) for run in runs)
@@ -167,14 +167,14 @@ def _list_metric_curves(runs: Sequence[ReplayRun]) -> list[_MetricCurves]:
 
 
 def _measure(run: ReplayRun) -> RunMetrics:
-    """Compute the metrics of a run at even times."""
+    """Compute the metrics of a run at equal time steps."""
     duration = float(run.record.time[-1] - run.record.time[0])
     rate = _SAMPLES_PER_RUN / duration if duration > 0.0 else 0.0
     return compute_run_metrics(run.record, rate)
 
 
 def _build_bands(metric_curves: _MetricCurves, runs: Sequence[ReplayRun], styles: GroupStyles) -> list[Band]:
-    """Build the bands of runs with any finite value, each a single line."""
+    """Build a band, which is a single line, for each run with any finite value."""
     bands = []
     for run, (times, values) in zip(runs, metric_curves.curves, strict=True):
         is_finite = np.isfinite(values)

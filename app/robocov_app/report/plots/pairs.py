@@ -1,4 +1,4 @@
-"""Plots of ratios in pairs of runs."""
+"""Plots of the ratios of pairs of runs."""
 
 from collections.abc import Sequence
 
@@ -37,7 +37,7 @@ def build_pair_plots(comparisons: Sequence[GroupComparison], styles: GroupStyles
 
 
 def _list_rows(comparison: GroupComparison, styles: GroupStyles) -> list[Pairs]:
-    """Return the rows of the plot of a comparison."""
+    """Return the rows of a comparison's plot: one for each map, unless there are many, and one for all."""
     style = styles[comparison.first.label]
     maps = comparison.maps
     if len(maps) == 1:

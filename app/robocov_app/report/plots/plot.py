@@ -1,4 +1,4 @@
-"""A plot of a page, and the panels of several settings."""
+"""The plots of a page, and their panels for several settings."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
@@ -16,12 +16,12 @@ from robocov_app.report.results.result import ReportedResult
 from robocov_app.report.svg import inline_svg
 
 GroupStyles: TypeAlias = Mapping[str, CurveStyle]
-"""Style of each label, see `robocov_app.report.analysis.groups.choose_group_styles`."""
+"""Style of each label; see `robocov_app.report.analysis.groups.choose_group_styles`."""
 
 MAX_PANELS = 24
-"""Maximum number of settings, or maps, with a panel each."""
+"""Maximum number of settings, or of maps, that get a panel each."""
 PANEL_SIZE_PX = (420, 290)
-"""Size of a panel. On a telephone it is displayed a little smaller."""
+"""Size of a panel. On a phone it is displayed a little smaller."""
 WIDE_SIZE_PX = (860, 360)
 """Size of a plot that is alone in its row, if the screen is wide enough."""
 TOGETHER_TITLE = "All maps and teams together"
@@ -35,10 +35,10 @@ class PagePlot(NamedTuple):
     Attributes
     ----------
     title : str
-        Above the plot; may be empty.
+        Title above the plot; may be empty.
     svg : str
     narrow : str
-        SVG for small screens; empty if the plot fits on these.
+        SVG for small screens; empty if `svg` fits on them.
     """
 
     title: str
@@ -52,11 +52,11 @@ class Panel(NamedTuple):
     Attributes
     ----------
     title : str
-        Empty if there is only one panel.
+        Title; empty if there is only one panel.
     key : str
-        Start of the ids in its SVG.
+        Start of the ids in the SVG of the panel.
     groups : list of RunGroup
-        With the runs of the panel only.
+        Groups reduced to the runs of the panel.
     is_together : bool
         Whether the panel shows several settings together.
     """
@@ -68,7 +68,7 @@ class Panel(NamedTuple):
 
 
 def list_panels(result: ReportedResult, key: str) -> list[Panel]:
-    """List the panels of a result: all settings together, then each, if there are not too many."""
+    """List the panels of a result: one for all settings together, then one for each if there are not many."""
     groups = list_displayed_groups(result)
     settings = list_settings(result)
     panels = []
@@ -91,9 +91,9 @@ def build_panel_plot(panel: Panel, description: str, draw: Callable[[tuple[int, 
     ----------
     panel : Panel
     description : str
-        For readers who cannot see the plot.
+        Description for readers who cannot see the plot.
     draw : callable
-        Draws the figure in a size, px.
+        Draws the figure at a given size, px.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Results of runs, comparisons and sweeps: their runs, how folders are read, and reference placements."""
+"""Results of runs, comparisons and sweeps: their content, how folders are read, and reference placements."""

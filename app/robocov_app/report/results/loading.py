@@ -52,7 +52,7 @@ def load_result(folder: Path) -> ReportedResult:
     Raises
     ------
     InputError
-        If there is no result in the folder, or it cannot be read.
+        If the folder contains no result, or if the result cannot be read.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found, expected the folder of a run, comparison or sweep")
@@ -66,7 +66,7 @@ def load_result(folder: Path) -> ReportedResult:
 
 
 def _load_runs(folder: Path) -> ReportedResult:
-    """Load a run, or the runs of a comparison."""
+    """Load a run, or the runs of a comparison; runs that cannot be read are listed as damaged."""
     kind: ResultKind = "run"
     run_folders = [folder]
     is_unfinished = False
@@ -116,7 +116,7 @@ def _load_runs(folder: Path) -> ReportedResult:
 
 
 def _check_same_map(saved_run: SavedRun, first_run: SavedRun) -> None:
-    """Check that a run has the map of the first run of its comparison."""
+    """Raise InputError if a run does not have the same map as the first run of its comparison."""
     environment = build_roster(saved_run.record).environment
     first_environment = build_roster(first_run.record).environment
     is_same_boundary = environment.boundary == first_environment.boundary
@@ -144,7 +144,7 @@ def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:
 
 
 def _collect_run_facts(saved_run: SavedRun, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the facts about all runs of a comparison, read from one of them."""
+    """Return the facts that all runs of a comparison have in common, from one of them."""
     facts: dict[str, Any] = {
         "duration_s": float(saved_run.record.time[-1]),
         "dt_s": saved_run.record.dt,
@@ -164,7 +164,7 @@ class _SweepStudy:
     gain_names : dict of str to list of str
         Names of the gains of each controller.
     teams : list of dict
-        Parameters of each team by name.
+        Parameters of each team, keyed by name.
     run_count : int
     facts : dict
         See `ReportedResult`.
@@ -273,7 +273,7 @@ def _read_versions(runs: Iterable[ReportedRun]) -> Any:
 
 
 def _read_gain_columns(content: Mapping[str, Any], study: _SweepStudy) -> dict[str, tuple[str, str]]:
-    """Return the unit and the meaning of each gain in the table of a sweep."""
+    """Return the unit and the meaning of each gain, from the column descriptions of a sweep."""
     columns = {}
     for column in content.get("columns", ()):
         columns[column["name"]] = (column["unit"], column["meaning"])
@@ -285,7 +285,7 @@ def _read_gain_columns(content: Mapping[str, Any], study: _SweepStudy) -> dict[s
 
 
 def _number_labels(runs: Sequence[ReportedRun]) -> tuple[ReportedRun, ...]:
-    """Distinguish controllers with the same label: "Mine", "Mine #2", ..."""
+    """Distinguish controllers with the same label by numbers: "Mine", "Mine #2", ..."""
     labels: dict[str, str] = {}
     for run in runs:
         if run.controller in labels:
@@ -299,7 +299,7 @@ def _number_labels(runs: Sequence[ReportedRun]) -> tuple[ReportedRun, ...]:
 
 
 def _list_gains(gains: Mapping[str, Value]) -> Gains:
-    """Return gains with names and texts that can be displayed."""
+    """Return gains as pairs of name and value, with unprintable characters replaced."""
     pairs: list[tuple[str, Value]] = []
     for name, value in gains.items():
         if isinstance(value, str):
@@ -311,7 +311,10 @@ def _list_gains(gains: Mapping[str, Value]) -> Gains:
 def _collect_gain_texts(
     runs: Sequence[ReportedRun], columns: Mapping[str, tuple[str, str]]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the units and the meanings of gains: of built-in controllers, then of a table's columns."""
+    """Return the units and the meanings of gains.
+
+    Those of built-in controllers take precedence over those in the columns of a sweep's table.
+    """
     controllers = dict.fromkeys(run.controller for run in runs if run.controller in CONTROLLERS)
     units: dict[str, str] = {}
     meanings: dict[str, str] = {}
@@ -321,13 +324,14 @@ def _collect_gain_texts(
             meanings[name] = gain.meaning
     for name, (unit, meaning) in columns.items():
         if unit or meaning:
+            # The unit "1" stands for a number without a unit.
             units.setdefault(name, "" if unit == "1" else replace_unprintable(unit))
             meanings.setdefault(name, replace_unprintable(meaning))
     return units, meanings
 
 
 def _read_figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
-    """Return the figures of a run from its summary, and missing ones from its cost over time."""
+    """Return the figures of a run from its summary; missing ones are computed from its cost over time."""
     values = summary if isinstance(summary, dict) else {}
     figures: dict[str, float | None] = {}
     for name in FIGURE_NAMES:

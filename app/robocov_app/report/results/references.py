@@ -1,4 +1,4 @@
-"""Reference placements: the best ones found for teams that know the whole map."""
+"""Reference placements: the best placements found for teams that know the whole map."""
 
 import json
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from robocov.record import Record
 from robocov_app.report.results.result import Reference, ReportedResult
 
 RESTARTS = 24
-"""Number of searches for the best placement. The best one counts."""
+"""Number of searches for the best placement, of which the best result is used."""
 
 
 def add_references(
@@ -29,15 +29,16 @@ def add_references(
     ----------
     result : ReportedResult
     search : bool
-        Whether references that are not in the cache are computed.
+        Whether to compute references that are not in the cache.
     report_progress : callable
-        Called with the number of settings that are done.
+        Called with the number of settings that are done so far.
 
     Returns
     -------
     ReportedResult
     """
     lattice = result.facts.get("lattice")
+    # Reversed, so that the first run of each setting remains.
     first_runs = {run.setting: run for run in reversed(result.completed_runs)}
     references = {}
     for count, (setting, run) in enumerate(first_runs.items(), start=1):
@@ -57,7 +58,7 @@ def _is_static(record: Record) -> bool:
 
 
 def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference | None:
-    """Return the reference for the team of a run, from the cache or by a search."""
+    """Return the reference for the team of a run, from the cache or from a search; None without either."""
     environment = record.environment
     robots = len(record.team)
     radius = float(record.team.radius.max())
@@ -72,7 +73,7 @@ def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference 
     try:
         best = find_optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
     except ParameterError:
-        # The robots do not all fit into the free space.
+        # The free space is too small for all robots.
         return None
     reference = Reference(best.mean_distance, best.uncovered_area)
     if cache is not None:

@@ -1,4 +1,4 @@
-"""A result: the runs of one folder, with everything that a report shows of them."""
+"""A result: the runs in one folder, with everything that a report shows about them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ ResultKind: TypeAlias = Literal["run", "comparison", "sweep"]
 Gains: TypeAlias = tuple[tuple[str, Value], ...]
 """Names and values of gains."""
 TeamParameters: TypeAlias = tuple[tuple[str, float | None], ...]
-"""Names and values of parameters of a team; None is no limit."""
+"""Names and values of the parameters of a team. The value None means no limit."""
 Setting: TypeAlias = tuple[str, int, TeamParameters]
-"""Map, number of robots and team. Costs of runs with the same setting can be compared."""
+"""Map, number of robots and team. Only the costs of runs with the same setting can be compared directly."""
 
 FIGURE_NAMES = (
     "mean_distance_m",
@@ -39,7 +39,7 @@ FIGURE_NAMES = (
     "stuck_robots",
     "mean_time_s",
 )
-"""Numbers that a report shows of a run, named as the columns in the table of a sweep."""
+"""Figures that a report shows for a run. The names are those of columns in the table of a sweep."""
 _AREA_TOLERANCE_M2 = 1e-6
 
 
@@ -61,9 +61,9 @@ class ReportedRun:
     seed : int or None
     gains : tuple of (str, value)
     figures : mapping of str to float or None
-        By `FIGURE_NAMES`; empty if the run failed.
+        Values keyed by `FIGURE_NAMES`; empty if the run failed.
     error : str or None
-        Why the run failed.
+        Reason why the run failed; None if it did not.
     folder : Path
     """
 
@@ -81,7 +81,7 @@ class ReportedRun:
 
     @property
     def final_distance(self) -> float:
-        """Mean distance to the nearest robot at the end, m; nan if it is not known."""
+        """Mean distance to the nearest robot at the end, m; nan if it is unknown."""
         value = self.figures.get("mean_distance_m")
         if value is None:
             return float("nan")
@@ -99,7 +99,7 @@ class ReportedRun:
 
     @property
     def case(self) -> tuple[object, ...]:
-        """Setting, start and seed. Runs of two controllers with the same case are a pair."""
+        """Setting, start and seed. Two runs of different controllers with the same case form a pair."""
         return *self.setting, self.start, self.seed
 
 
@@ -109,7 +109,7 @@ class Reference(NamedTuple):
     Attributes
     ----------
     mean_distance : float, m
-        J_ref.
+        Mean distance of the placement, J_ref.
     uncovered_area : float, m²
     """
 
@@ -125,6 +125,7 @@ class DamagedRun(NamedTuple):
     folder : str
         Name of its folder.
     reason : str
+        Reason why it cannot be read.
     """
 
     folder: str
@@ -143,18 +144,18 @@ class ReportedResult:
         Runs that completed or failed.
     maps : mapping of str to Environment
     expected_count : int
-        Number of runs that the result has when it is complete.
+        Number of runs of the complete result.
     gain_units, gain_meanings : mapping of str to str
     facts : mapping
         Values that all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``
         and ``versions``, if known.
     loaded : mapping of Path to SavedRun
-        Runs that were read already, by folder.
+        Runs that have been read already, keyed by folder.
     damaged_runs : tuple of DamagedRun
         Runs that cannot be read. They are not in `runs`.
     references : mapping of Setting to Reference
     description : str
-        Text that distinguishes the result from others of the same session; empty if there are none.
+        Text that distinguishes the result from others of the same session; empty if there are no others.
     """
 
     kind: ResultKind
@@ -182,16 +183,16 @@ class ReportedResult:
 
     @property
     def missing_count(self) -> int:
-        """Number of runs that are not done."""
+        """Number of runs that have not been executed."""
         return max(self.expected_count - len(self.runs) - len(self.damaged_runs), 0)
 
     def drop_unreadable(self, report_progress: Callable[[int], None] = lambda count: None) -> ReportedResult:
-        """Read all completed runs, and turn those that cannot be read into damaged ones.
+        """Read all completed runs, and list those that cannot be read as damaged.
 
         Parameters
         ----------
         report_progress : callable
-            Called with the number of runs that were read.
+            Called with the number of runs read so far.
 
         Returns
         -------
@@ -215,7 +216,10 @@ class ReportedResult:
         return replace(self, runs=tuple(readable_runs), damaged_runs=tuple(damaged_runs))
 
     def compute_gap(self, run: ReportedRun) -> float:
-        """Return J / J_ref - 1 of a run at its end; nan without a reference that covers as much."""
+        """Return J / J_ref - 1 at the end of a run.
+
+        It is nan without a reference, or if the reference does not leave the same area uncovered.
+        """
         reference = self.references.get(run.setting)
         if reference is None:
             return float("nan")
@@ -240,7 +244,7 @@ class ReportedResult:
         return record
 
     def read_history(self, run: ReportedRun) -> CostHistory | None:
-        """Read the cost of a run over time; None if it was not saved."""
+        """Read the cost of a run over time; return None if it was not saved."""
         if run.folder in self.loaded:
             return self.loaded[run.folder].history
         path = run.folder / COST_FILE
@@ -250,7 +254,7 @@ class ReportedResult:
 
 
 def replace_unprintable(text: str) -> str:
-    """Replace each character that cannot be displayed by a replacement character."""
+    """Replace each unprintable character by U+FFFD, the replacement character."""
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 

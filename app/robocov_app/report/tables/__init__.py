@@ -1,1 +1,1 @@
-"""The tables of a report, as text."""
+"""The tables of a report, whose cells are text."""

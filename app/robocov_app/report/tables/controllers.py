@@ -12,7 +12,7 @@ MAX_GAIN_SETS = 200
 
 
 def build_controllers_table(result: ReportedResult) -> PageTable:
-    """Build the table of controllers, including those all of whose runs failed."""
+    """Build the table of controllers, including controllers whose runs all failed."""
     groups = list_displayed_groups(result)
     controllers = {group.controller for group in groups}
     for run in result.failed_runs:
@@ -23,7 +23,7 @@ def build_controllers_table(result: ReportedResult) -> PageTable:
 
 
 def build_gain_sets_table(result: ReportedResult) -> PageTable | None:
-    """Build the table of all sets of gains; None if controllers are shown with them, or there are many."""
+    """Build the table of all sets of gains; return None if another table shows them, or if there are many."""
     variants = list_variants(result)
     if len(variants) == len(list_displayed_groups(result)) or len(variants) > MAX_GAIN_SETS:
         return None
@@ -43,7 +43,7 @@ def _build_gains_table(caption: str, groups: Sequence[RunGroup], result: Reporte
 
 
 def _format_gain_ranges(group: RunGroup, result: ReportedResult) -> str:
-    """Return the gains of a group with the ranges of their values."""
+    """Format the gains of a group, each with the range of its values."""
     values: dict[str, list[Value]] = {}
     for run in group.runs:
         for name, value in run.gains:
@@ -55,7 +55,7 @@ def _format_gain_ranges(group: RunGroup, result: ReportedResult) -> str:
 
 
 def _format_range(values: Sequence[Value], unit: str) -> str:
-    """Return the range of numbers, or the alternatives of texts."""
+    """Format the values of a gain: the range of numbers, or a list of words; "or none" if some are None."""
     if any(isinstance(value, str) for value in values):
         return " or ".join(dict.fromkeys(map(format_value, values)))
     numbers = [value for value in values if isinstance(value, int | float)]

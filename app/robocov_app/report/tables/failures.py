@@ -9,7 +9,7 @@ MAX_FAILURE_ROWS = 60
 
 
 def build_failures_table(result: ReportedResult) -> PageTable | None:
-    """Build the table of runs that failed or cannot be read; None if there are none."""
+    """Build the table of runs that failed or cannot be read; return None if there are none."""
     rows: list[tuple[str, ...]] = []
     for run in result.failed_runs:
         row = (
@@ -20,7 +20,7 @@ def build_failures_table(result: ReportedResult) -> PageTable | None:
             run.error or "",
         )
         rows.append(row)
-    # Only the folder is known of a run that cannot be read.
+    # Of a run that cannot be read, only the folder is known.
     rows += [(run.folder, NO_VALUE, NO_VALUE, NO_VALUE, run.reason) for run in result.damaged_runs]
     if not rows:
         return None

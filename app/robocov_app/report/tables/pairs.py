@@ -9,7 +9,7 @@ from robocov_app.report.tables.table import PageTable
 
 
 def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable | None:
-    """Build the table of comparisons over all maps; None if there are none."""
+    """Build the table of comparisons over all maps; return None if there are no comparisons."""
     if not comparisons:
         return None
     rows = []

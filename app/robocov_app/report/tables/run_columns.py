@@ -16,7 +16,7 @@ class RunColumn(NamedTuple):
     ----------
     heading : str
     format_cell : callable
-        Returns the text for one run or several ones.
+        Returns the text of the cell for one or several runs.
     """
 
     heading: str
@@ -44,9 +44,9 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
     Parameters
     ----------
     result : ReportedResult
-        Its mean times are a column if robots are not equally fast.
+        Result whose runs are shown. Mean times are a column only if some robots are faster than others.
     unsettled : str
-        Text in the column of settling times if a team did not settle.
+        Text in the column of settling times for a team that did not settle.
 
     Returns
     -------
@@ -65,12 +65,12 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
 
 
 def list_figures(runs: Sequence[ReportedRun], name: str) -> list[float]:
-    """List the known values of a figure of some runs."""
+    """List the known values of a figure in some runs."""
     return [float(run.figures[name] or 0.0) for run in runs if run.has_figure(name)]
 
 
 def _format_contacts(runs: Sequence[ReportedRun]) -> str:
-    """Return the number of contacts of a run, or the number of runs with contacts if there are several."""
+    """Format the number of contacts of a single run, or the number of runs with contacts."""
     counts = list_figures(runs, "contacts")
     if not counts:
         return NO_VALUE
@@ -80,7 +80,7 @@ def _format_contacts(runs: Sequence[ReportedRun]) -> str:
 
 
 def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
-    """Return the number of stuck robots of a run, or the mean of several runs."""
+    """Format the number of stuck robots of a single run, or the mean of several runs."""
     counts = list_figures(runs, "stuck_robots")
     if not counts:
         return NO_VALUE
@@ -90,7 +90,7 @@ def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
 
 
 def _format_clearance(runs: Sequence[ReportedRun]) -> str:
-    """Return the smallest gap to a wall in any of the runs."""
+    """Format the smallest gap to a wall in any of the runs."""
     gaps = list_figures(runs, "min_clearance_m")
     if not gaps:
         return NO_VALUE

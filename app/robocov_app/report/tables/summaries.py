@@ -1,4 +1,4 @@
-"""Tables of figures by controller, for each map and team and for all of them, and of every run."""
+"""Tables of figures by controller, for each map and team and for all together, and tables of every run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,9 +25,9 @@ from robocov_app.report.tables.run_columns import (
 from robocov_app.report.tables.table import NO_VALUE, PageTable, format_quartiles
 
 MAX_RUN_ROWS = 60
-"""Maximum number of runs that have a row each."""
+"""Maximum number of runs that get a row each."""
 MAX_SETTINGS = 40
-"""Maximum number of maps and teams that have a table each."""
+"""Maximum number of combinations of map and team that get a table each."""
 _SCALED_HEADING = "Mean distance / median"
 _SCALED_NOTE = f"{_SCALED_HEADING}: divided by the median over all runs on the same map with the same team."
 _SEVERAL_RUNS_NOTE = (
@@ -50,7 +50,8 @@ def build_summary_tables(result: ReportedResult) -> list[PageTable]:
     Returns
     -------
     list of PageTable
-        First all maps and teams together, if there are several, then each of them, if there are not too many.
+        First a table for all maps and teams together, if there are several; then a table for each of them, if
+        there are not too many.
     """
     groups = list_displayed_groups(result)
     settings = list_settings(result)
@@ -97,7 +98,7 @@ def _build_summary_table(caption: str, columns: Sequence[RunColumn], groups: Seq
 
 
 def _build_gap_column(result: ReportedResult) -> RunColumn:
-    """Build the column of gaps to the best placement known."""
+    """Build the column of relative gaps, in percent, to the best placement known."""
 
     def format_gaps(runs: Sequence[ReportedRun]) -> str:
         gaps = [100.0 * result.compute_gap(run) for run in runs]
@@ -107,7 +108,7 @@ def _build_gap_column(result: ReportedResult) -> RunColumn:
 
 
 def _build_scaled_column(result: ReportedResult) -> RunColumn:
-    """Build the column of final mean distances for all maps together, which have no common median in m."""
+    """Build the column of final mean distances for all maps together: multiples of each map's median."""
     scales = compute_medians(result)
     return RunColumn(
         _SCALED_HEADING,
@@ -116,7 +117,7 @@ def _build_scaled_column(result: ReportedResult) -> RunColumn:
 
 
 def _format_settled(runs: Sequence[ReportedRun]) -> str:
-    """Return whether the team settled, or the number of runs in which it did if there are several."""
+    """Format whether the team settled in a single run, or in how many of several runs it did."""
     count = len(list_figures(runs, "settled_at_s"))
     if len(runs) > 1:
         return f"{count} of {len(runs)}"
@@ -124,7 +125,7 @@ def _format_settled(runs: Sequence[ReportedRun]) -> str:
 
 
 def build_runs_table(result: ReportedResult) -> PageTable | None:
-    """Build the table of all runs; None if there are too many, or each is already in a summary."""
+    """Build the table of all runs; return None if there are too many, or if summaries show each run."""
     labels = label_runs(result)
     run_count = len(result.completed_runs)
     if run_count > MAX_RUN_ROWS or run_count == len(set(labels.values())):

@@ -1,4 +1,4 @@
-"""A table of a page, and texts of its cells."""
+"""A table of a page, and formatting of its cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 NO_VALUE = "–"
-"""Stands for a value that is not known."""
+"""Text of a cell whose value is unknown."""
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,9 @@ class PageTable:
     head : tuple of str
     rows : sequence of tuple of str
     text_columns : frozenset of int
-        Columns after the first that contain texts, not numbers.
+        Columns after the first that contain text instead of numbers.
     notes : tuple of str
-        Below the table.
+        Notes below the table.
     """
 
     caption: str
@@ -32,7 +32,7 @@ class PageTable:
 
 
 def format_quartiles(values: Sequence[float], decimals: int, no_value: str = NO_VALUE) -> str:
-    """Return the median of some values and their quartiles; a single value alone.
+    """Format the median of values, followed by the quartiles if there are several values.
 
     Examples
     --------
