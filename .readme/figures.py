@@ -1,4 +1,4 @@
-"""Draw the figures that README and handbook show, by the commands that their captions name."""
+"""Draw the figures in README and handbook with the commands that their captions name."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ COMMANDS = {
     "museum": ("compare", "museum"),
     "trap": ("compare", "trap", "--controllers", "rapf", "lloyd", "atlas"),
 }
-"""Command that draws each figure."""
+"""Arguments of `robocov` that draw each figure."""
 FIGURES = {
     "first-run": "cost.png",
     "hospital": "trajectories.png",
     "museum": "trajectories.png",
     "trap": "trajectories.png",
 }
-"""File of the command's folder that is shown."""
+"""File in the result folder of the command that is shown."""
 WIDTH_PX = 1400
 SUFFIXES = {"light": "", "dark": "-dark"}
 
 
 def draw_figure(name: str, theme: str) -> None:
-    """Run the command of a figure in a theme, and save the figure as a small file."""
+    """Run the command of a figure in a theme, and save the figure as a small PNG file."""
     with TemporaryDirectory() as folder:
         out = Path(folder) / name
         status = main([*COMMANDS[name], "--theme", theme, "--out", str(out)])

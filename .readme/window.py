@@ -1,4 +1,4 @@
-"""Draw the windows that README and handbook show; with --video, record the tour as well."""
+"""Draw the screenshots of windows in README and handbook; with --video, record the tour as well."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ PICTURES = HERE.parent / "app/handbook/pictures"
 SIZE = (1280, 720)
 DIALOG_SIZE = (900, 600)
 METERS_PER_PIXEL = 0.025
-"""Scale of the floor plan that is imported."""
+"""Scale of the floor plan in the import dialog."""
 BLUE = (74, 111, 165)
 
 
 def draw_window(theme: str, name: str) -> None:
-    """Use the viewer for a while, and save a screenshot."""
+    """Run the viewer for 12 s, with a robot failing after 6 s, and save a screenshot."""
     session = Session(
         SessionScenario(
             load_map("rooms"), (ControllerChoice("rapf"), ControllerChoice("lloyd")), start="kitchen"
@@ -57,14 +57,14 @@ def draw_window(theme: str, name: str) -> None:
         viewer.inspection.active_pane = 1
         viewer.inspection.selected = 4
         window.panel.show_tab("robot")
-        viewer.pass_time(60.0)  # Earlier messages disappear.
+        viewer.pass_time(60.0)  # Let earlier messages disappear.
         for _ in range(8):
             window.run_frame(0.0)
         save_screenshot(window, HERE / name)
 
 
 def draw_editor(theme: str, name: str) -> None:
-    """Add a showcase to a museum, drag it until it is in line with the others, and save a screenshot."""
+    """Add a showcase to a museum, drag it until it is aligned with the others, and save a screenshot."""
     path = find_map_file("museum")
     launcher = EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True)
     with launcher.window() as window:
@@ -110,7 +110,7 @@ def draw_floor_plan(path: Path) -> None:
 
 
 def draw_import_dialog(theme: str, name: str) -> None:
-    """Import a floor plan, set the color of a room to free, and save a screenshot."""
+    """Open the import dialog for a floor plan, mark the color of a room as free, and save a screenshot."""
     with TemporaryDirectory() as folder:
         plan = Path(folder) / "flat.png"
         draw_floor_plan(plan)
@@ -120,7 +120,7 @@ def draw_import_dialog(theme: str, name: str) -> None:
             dialog = window.editor.dialogs.current
             assert isinstance(dialog, ImportDialog)
             dialog.click_action = SET_COLOR
-            # The text cursor is in the field for the size of a pixel.
+            # Type the size of a pixel, whose field has the focus.
             pygame.event.post(pygame.Event(pygame.TEXTINPUT, text=f"{METERS_PER_PIXEL:g}"))
             window.run_frame(0.1)
             dialog.form.set("min_stroke", "0.1")
@@ -137,7 +137,7 @@ def save_screenshot(window: ViewerWindow | EditorWindow, file: Path) -> None:
 
 
 def record_tour(name: str) -> None:
-    """Record a video of the tour, every second frame, as a small file."""
+    """Record a video of the tour, with every second frame, as a small MP4 file."""
     command = [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
         *("-s", f"{SIZE[0]}x{SIZE[1]}", "-r", f"{HEADLESS_FPS // 2}", "-i", "-", "-c:v", "libx264"),

@@ -1,4 +1,4 @@
-"""The reference, which each build of the handbook generates from the program."""
+"""The pages of the reference, which each build of the handbook generates from the program."""
 
 from __future__ import annotations
 
@@ -60,18 +60,18 @@ OTHER_NAMES = {
         "robocov_app.learning.rewards.share_reward",
     ),
 }
-"""Names outside the top level that the handbook imports, or that public functions return, by heading."""
+"""Names outside the top level, by heading, that the handbook imports or that public functions return."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Write the pages before Sphinx looks for sources."""
+    """Register this module as a Sphinx extension, which writes the pages before sources are read."""
     app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-signature", replace_signature)
     return {"parallel_read_safe": True}
 
 
 def write_pages(app: Sphinx) -> None:
-    """Write every page of the reference into the folder `reference` of the sources."""
+    """Write all pages of the reference to the folder `reference` of the sources."""
     folder = Path(app.srcdir) / "reference"
     folder.mkdir(exist_ok=True)
     builders = {
@@ -89,7 +89,8 @@ def write_pages(app: Sphinx) -> None:
 
 
 def replace_signature(*event: Any) -> tuple[str, None] | None:
-    """Show the gains of a controller instead of the parameters of its ``__new__``."""
+    """Return the signature to show for a controller: its gains instead of the parameters of ``__new__``."""
+    # Sphinx passes the application, the kind of object, its name, the object and more.
     _, kind, _, value = event[:4]
     if kind != "class" or not issubclass(value, BaseController):
         return None
@@ -112,7 +113,7 @@ def build_commands_page() -> str:
 
 
 def build_keys_page() -> str:
-    """Build the page with the keys of both windows, from their tables of commands."""
+    """Build the page with the keys of the window and of the editor, from their tables of commands."""
     text = (
         "# Keys\n\nThe keys of [the window](../window.md) and of [the editor](../draw-a-map.md). F1 shows "
         "them there. Ctrl+K finds every command by its title or name. Type those that need a value, such as "
@@ -130,7 +131,7 @@ def build_keys_page() -> str:
 
 
 def build_key_tables(groups: Sequence[str], commands: Sequence[Command]) -> str:
-    """Build a table of keys for each group of commands."""
+    """Build a table of keys for each group of commands, without hidden commands."""
     text = ""
     for group in groups:
         listed = [command for command in commands if command.group == group and not command.hidden]
@@ -140,13 +141,13 @@ def build_key_tables(groups: Sequence[str], commands: Sequence[Command]) -> str:
 
 
 def format_keys(command: Command) -> str:
-    """Format the keys of a command, or the way to start one that has none."""
+    """Format the keys of a command; commands without keys are started with Ctrl+K."""
     if command.argument is not None:
         return f"Ctrl+K `{command.name}` *{command.argument.description}*"
     if not command.keys:
         return "Ctrl+K"
     keys = ["+".join(format_key(key) for key in split_key_name(name)) for name in command.keys]
-    # Both keys named Enter are listed once.
+    # There are two keys named Enter, which are listed once.
     return escape_cell(" or ".join(dict.fromkeys(keys))).replace("`", "\\`")
 
 
@@ -250,7 +251,7 @@ def build_metrics_page() -> str:
 
 
 def read_attribute_docs(kind: type) -> dict[str, str]:
-    """Return the descriptions in the section Attributes of the docstring of a class."""
+    """Return the descriptions of attributes by name, from the section Attributes of a class docstring."""
     _, _, section = inspect.getdoc(kind).partition("Attributes\n----------\n")  # type: ignore[union-attr]
     pattern = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*\n)*)", re.M)
     return {name: " ".join(description.split()) for name, description in pattern.findall(section)}
@@ -274,7 +275,7 @@ def build_names_page() -> str:
 
 
 def build_other_names_page() -> str:
-    """Build the page that documents further names, which are not at the top level."""
+    """Build the page that documents further names, which are not at the top level of the library."""
     text = build_heading("Python: further names", "=")
     text += "\nWhat public functions return and expect, and what the pages of the handbook import.\n"
     for heading, names in OTHER_NAMES.items():
@@ -316,7 +317,7 @@ def build_heading(title: str, underline: str) -> str:
 
 
 def find_documenting_module(name: str) -> str:
-    """Return the module of the library in which a string below a constant documents it."""
+    """Return the module of the library in which a constant is documented by the string below it."""
     for module in sorted(sys.modules):
         is_candidate = module.startswith("robocov.") and hasattr(sys.modules[module], name)
         if is_candidate and ("", name) in ModuleAnalyzer.for_module(module).find_attr_docs():
@@ -334,15 +335,15 @@ def build_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def escape_cell(text: str) -> str:
-    """Return a text on one line, for a cell of a table."""
+    """Escape a text for a cell of a Markdown table."""
     return escape_text(text).replace("|", "\\|")
 
 
 def escape_text(text: str) -> str:
-    """Return a text on one line, in which no HTML starts."""
+    """Join a text to one line, and escape it such that it contains no HTML."""
     return " ".join(text.split()).replace("<", "&lt;")
 
 
 def capitalize(text: str) -> str:
-    """Return a text with an upper-case first letter."""
+    """Capitalize the first letter of a text, and leave the rest unchanged."""
     return text[:1].upper() + text[1:]

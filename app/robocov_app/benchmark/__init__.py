@@ -1,1 +1,1 @@
-"""The benchmark: a frozen suite of maps and tracks for any controller, whose results anybody can check."""
+"""The benchmark: a frozen suite of maps and tracks for rating controllers, with verifiable results."""

@@ -1,6 +1,7 @@
 """Runs to look into: teams that never move, and teams that end far above RAPF although they usually beat it.
 
-Both are usually faults of a controller: a plan that cannot be followed, or a phase that never ends.
+Both are usually caused by a fault of the controller: a plan that cannot be followed, or a phase that never
+ends.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,7 @@ from robocov_app.benchmark.ratings import get_run_key
 MIN_PATH_LENGTH_M = 0.1
 """A team whose robots move less than this on average was at rest from the start."""
 MAX_RAPF_RATIO = 1.2
-"""Ratio of the final cost to that of RAPF in the same run above which a team is far above RAPF."""
+"""A team ends far above RAPF if the ratio of its final cost to that of RAPF in the same run exceeds this."""
 
 _Costs: TypeAlias = dict[tuple[str, tuple[str, int]], float]
 """Final mean distances by track and run, m."""
@@ -31,7 +32,7 @@ class Anomaly(NamedTuple):
 def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[Anomaly]:
     """Find the runs of a result in which the team never moved, or ended far above RAPF.
 
-    Runs far above RAPF are found only on tracks on which the controller is better than RAPF in the median.
+    Runs far above RAPF are only reported on tracks on which the controller is better than RAPF in the median.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Maps of the benchmark that resemble real places: homes, offices, yards, plants, traffic.
 
-Lengths are in meters. Coordinates are whole centimeters, which are the same on every processor.
+Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every processor.
 """
 
 import itertools
@@ -28,7 +28,7 @@ from robocov.mapfile import from_json, to_json
 FloorPlan: TypeAlias = tuple[Ring, list[Obstacle]]
 """Boundary and obstacles of a map."""
 _SEED_ORDER = ("homes", "offices", "plants", "traffic", "yards")
-"""Position of each kind in the seeds. New kinds are appended: the seeds of the others depend on it."""
+"""Kinds in the order that determines their seeds; append new kinds, so that other seeds do not change."""
 _MAX_ATTEMPTS = 400
 _MIN_PASSAGE_M = 0.6
 _INNER_WALL_M = 0.12
@@ -40,7 +40,7 @@ _MIN_WALL_PIECE_M = 0.15
 def build_floor_plan(kind: str, seed: int) -> Environment:
     """Build a random map of a kind.
 
-    Plans are drawn until one is in one piece, has no narrow passage, and is blocked sufficiently.
+    Plans are drawn until the free space of one is connected, without narrow passages, and small enough.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
     Raises
     ------
     ParameterError
-        If no plan of this seed is suitable.
+        If no plan with this seed is suitable.
     """
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([_SEED_ORDER.index(kind), seed, attempt])
@@ -76,7 +76,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
 
 
 def _is_connected(plan: Environment) -> bool:
-    """Return whether the free space is in one piece, also without its narrow passages."""
+    """Return whether the free space is connected, even without its narrow passages."""
     wide_space = plan.free.buffer(-_MIN_PASSAGE_M / 2.0, quad_segs=16)
     return len(plan.free.geoms) == 1 and isinstance(wide_space, shapely.Polygon)
 
@@ -87,7 +87,7 @@ def _is_blocked_enough(plan: Environment) -> bool:
 
 
 def _find_entry(plan: Environment) -> DiscStart | None:
-    """Return the start disc nearest to the lower left corner, None if there is no space for it."""
+    """Return the free start disc nearest to the lower left corner; None if there is no space for it."""
     centers = plan.static.free.buffer(-_START_RADIUS_M - 0.01)
     if centers.is_empty:
         return None
@@ -122,7 +122,7 @@ def _build_circle(center: Array, radius: float) -> Obstacle:
 def _build_wall_with_door(
     offset: float, start: float, end: float, *, door: float, width: float, is_vertical: bool
 ) -> list[Obstacle]:
-    """Return the two pieces of a wall next to its door. Short pieces are left out.
+    """Return the two pieces of a wall on either side of its door; very short pieces are left out.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _build_wall_with_door(
 
 
 def _build_home(rng: np.random.Generator) -> FloorPlan:
-    """Draw a flat: a rectangle that is divided repeatedly, a door in each wall, some furniture."""
+    """Draw a flat: a rectangle that is divided repeatedly, with a door in each wall, and some furniture."""
     width = rng.uniform(10.0, 14.0)
     height = rng.uniform(8.0, 11.0)
     flat = _Flat(rng)
@@ -163,7 +163,7 @@ class _Flat:
         self._rng = rng
 
     def divide(self, left: float, bottom: float, right: float, top: float) -> None:
-        """Divide a rectangle across its longer side until its parts are rooms, and furnish them."""
+        """Divide a rectangle, across its longer side, until all parts are rooms, and furnish these."""
         is_wide = right - left > top - bottom
         if is_wide:
             split = self._add_wall(left, right, start=bottom, end=top, is_vertical=True)
@@ -186,7 +186,7 @@ class _Flat:
         Parameters
         ----------
         low, high : float, m
-            Range that the wall divides.
+            Range that the wall divides, perpendicular to its direction.
         start, end : float, m
             Ends of the wall along its direction.
         is_vertical : bool
@@ -194,7 +194,7 @@ class _Flat:
         Returns
         -------
         float or None, m
-            Position of the wall in its range; None, and no wall, if the range is that of a single room.
+            Position of the wall; None, and no wall is added, if the range is only wide enough for one room.
         """
         rng = self._rng
         if high - low < rng.uniform(4.6, 6.4):
@@ -208,11 +208,12 @@ class _Flat:
         return split
 
     def _furnish(self, left: float, bottom: float, right: float, top: float) -> None:
-        """Place one piece of furniture in a corner of a room that is large enough."""
+        """Place a piece of furniture in a random corner of a room, if the room is large enough."""
         rng = self._rng
         width = rng.uniform(0.5, 1.6)
         depth = rng.uniform(0.4, 0.9)
         if right - left > width + 2.2 and top - bottom > depth + 2.2:
+            # 0.06 m is half the thickness of the walls.
             x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - width
             y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - depth
             self.furniture.append(_build_block(x, y, width, depth))
@@ -247,7 +248,7 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
 
 
 def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
-    """Return shapes that are at least a gap apart: of two that are nearer, the first stays."""
+    """Return the shapes that are at least a gap apart; of two that are too near, the first is kept."""
     spaced: list[Obstacle] = []
     for shape in shapes:
         if all(shape.polygon.distance(other.polygon) >= gap for other in spaced):
@@ -262,6 +263,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     hull = shapely.orient_polygons(shapely.convex_hull(shapely.MultiPoint(corners)))
     boundary = _round_points(np.asarray(hull.exterior.coords)[:-1])
 
+    # Large shapes first, because later ones are removed where they are too near.
     builders = [_build_house] * 5 + [_build_pond] + [_build_hedge] * 6 + [_build_tree] * 14
     shapes = [build(rng) for build in builders]
     land = shapely.Polygon(boundary)
@@ -303,7 +305,7 @@ def _build_tree(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_plant(rng: np.random.Generator) -> FloorPlan:
-    """Draw a factory hall: rows of racks, machines, a partition with a gate, columns."""
+    """Draw a factory hall: racks in rows, and behind a partition with a gate, machines and columns."""
     width = rng.uniform(15.0, 19.0)
     height = rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
@@ -317,6 +319,7 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
     shapes: list[Obstacle] = []
     for number in range(30):
         center = np.array([rng.uniform(split + 1.6, width - 1.4), rng.uniform(1.4, height - 1.4)])
+        # Every third shape is round.
         if number % 3 == 2:
             shapes.append(_build_circle(center, rng.uniform(0.2, 0.7)))
             continue
@@ -328,7 +331,7 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
 
 
 def _build_traffic(rng: np.random.Generator) -> FloorPlan:
-    """Draw a hall with shelves, and two or three vehicles that drive back and forth in its aisles."""
+    """Draw a hall with shelves, and two or three vehicles that drive back and forth in the aisles."""
     width = 16.0
     height = 11.0
     obstacles: list[Obstacle] = []

@@ -1,8 +1,8 @@
-"""Watching the code of a user's controller for channels that no robot has: files, connections, processes.
+"""Watching a user's controller for the use of channels that no robot has: files, connections, processes.
 
-The guard is a tripwire for mistakes and plain cheating, not a sandbox: only verify controllers that you would
-also run. It uses the audit events of Python. An action counts if a function of the controller's own modules
-is its cause, except for what happens inside a compiler, or while an installed package is imported.
+The guard is a tripwire for mistakes and simple cheating, not a sandbox: only verify controllers that you
+would also run. It uses the audit events of Python. An action counts if it is caused by a function in one of
+the controller's own modules, except for actions of a compiler, and during the import of an installed package.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import Any
 from robocov.controllers.user_modules import MODULE_PREFIX
 
 _COMPILERS = frozenset(("numba", "llvmlite"))
-"""Packages that may write files and load libraries while they compile a function of the controller."""
+"""Packages that may write files and load libraries when they compile a function of the controller."""
 _IMPORT_MODULE = "importlib._bootstrap"
-"""Module of Python that executes imports."""
+"""Module of the standard library that executes imports."""
 _DATA_FOLDER = str(Path(__file__).parent)
 """Folder of the suite's references and of the bundled results, which a controller must not read."""
 _MAX_VIOLATIONS = 20
@@ -51,7 +51,7 @@ _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 class Guard:
-    """Forbids the modules of a controller to use channels that no robot has.
+    """Prevents the modules of a controller from using channels that no robot has.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Guard:
     Attributes
     ----------
     violations : list of str
-        What the controller tried, each only once.
+        Forbidden actions that the controller attempted, without duplicates.
     """
 
     def __init__(self, modules: Collection[str] = ()) -> None:
@@ -69,13 +69,13 @@ class Guard:
         self._modules = frozenset(modules)
 
     def install(self) -> None:
-        """Start to watch this process. A hook cannot be removed again."""
-        # Compiled modules of the user are not written to disk.
+        """Start watching this process, until it ends: audit hooks cannot be removed."""
+        # Importing the user's modules must not write bytecode files.
         sys.dont_write_bytecode = True
         sys.addaudithook(self._audit)
 
     def _audit(self, event: str, arguments: tuple[Any, ...]) -> None:
-        """Receive an audit event; raise PermissionError if a controller must not cause it."""
+        """Handle an audit event; raise PermissionError if it is forbidden and the controller causes it."""
         action = _describe_action(event, arguments)
         if action is None or not self._is_caused_by_controller(sys._getframe(1)):
             return
@@ -84,7 +84,7 @@ class Guard:
         raise PermissionError(f"a controller must not do this: {action}")
 
     def _is_caused_by_controller(self, frame: FrameType | None) -> bool:
-        """Return whether a function of the controller is the cause of what a frame does."""
+        """Return whether a frame was called, directly or indirectly, by a function of the controller."""
         while frame is not None:
             module = str(frame.f_globals.get("__name__", ""))
             package = module.partition(".")[0]
@@ -97,7 +97,7 @@ class Guard:
 
 
 def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
-    """Return what an audit event is about, None if a controller may cause it."""
+    """Describe the action of an audit event; None if a controller may cause it."""
     if event == "open":
         return _describe_opening(*arguments[:3])
     if event.startswith(_FORBIDDEN_PREFIXES):
@@ -107,7 +107,7 @@ def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
 
 
 def _describe_opening(path: Any, mode: Any, flags: Any) -> str | None:
-    """Return a description of opening a file, None if a controller may open it."""
+    """Describe the opening of a file; None if a controller may open it."""
     if isinstance(path, int):
         return None
     name = os.path.realpath(os.fsdecode(path))

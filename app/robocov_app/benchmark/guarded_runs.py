@@ -1,4 +1,4 @@
-"""Runs and replays in guarded processes: the service, and the program that asks it."""
+"""Runs and replays in guarded processes: the worker service, and the processes that execute it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ObservedRun:
     outcome : Outcome
     transcript : Transcript
     violations : list of str
-        What its controller tried although no robot can do it.
+        Forbidden actions that the controller attempted.
     """
 
     outcome: Outcome
@@ -50,7 +50,7 @@ class ReplayAnswer:
     ----------
     decisions : Decisions
     violations : list of str
-        What the controller tried although no robot can do it.
+        Forbidden actions that the controller attempted.
     """
 
     decisions: Decisions
@@ -58,23 +58,23 @@ class ReplayAnswer:
 
 
 Answer: TypeAlias = ObservedRun | ReplayAnswer | None
-"""The answer of a guarded process; None if it ended before."""
+"""The answer of a guarded process; None if it ended without one."""
 
 
 class GuardedService:
-    """Service of a process that repeats one run, or one replay, under a guard."""
+    """Worker service that executes one run or one replay under a guard."""
 
     failure_message = "the verification failed"
 
     def __call__(self, questions: list[Task | Replay], channel: Channel) -> ObservedRun | ReplayAnswer:
-        """Execute a task and observe it, or call the controller for the observations of a replay."""
+        """Execute a task and record it, or call the controller for the observations of a replay."""
         question = questions[-1]
         task = question if isinstance(question, Task) else question.task
         guard = Guard(_list_modules(task))
         guard.install()
         if isinstance(question, Task):
             transcript = Transcript()
-            # The results have the same figures without the files of the run.
+            # Most files of the run are not needed for its row, and are not sent back.
             outcome = perform(question, transcript.add)
             return ObservedRun(replace(outcome, files=_select_files(outcome)), transcript, guard.violations)
         decisions = _decide_again(question)
@@ -90,12 +90,12 @@ def _list_modules(task: Task) -> set[str]:
 
 
 def _select_files(outcome: Outcome) -> dict[str, bytes]:
-    """Return the files of a run that the row of a result is made from."""
+    """Return the files of a run that are needed for its row in a result."""
     return {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
 
 
 def _decide_again(replay: Replay) -> Decisions:
-    """Call the controller of a replay for each of its observations."""
+    """Call the controller for each observation of a replay; return its decisions, and the error if any."""
     task = replay.task
     decisions = Decisions()
     with provide_modules({} if task.source is None else task.source.modules):
@@ -114,7 +114,7 @@ def _decide_again(replay: Replay) -> Decisions:
 
 
 def _generate_decisions(replay: Replay) -> Iterator[Any]:
-    """Yield the decisions of a replay."""
+    """Create the controller of a replay, and yield its decision for each observation."""
     task = replay.task
     controller: Any = make_controller(task.controller, task.gains, source=task.source)
     if replay.environment is not None:
@@ -124,7 +124,7 @@ def _generate_decisions(replay: Replay) -> Iterator[Any]:
     is_individual = isinstance(controller, IndividualControllerAdapter)
     for observations in replay.observations:
         if is_individual and replay.robot is not None:
-            # The observations of the other robots are not real, so it is not called for them.
+            # The observations of other robots are placeholders, so the controller is not called for them.
             decision = controller.decide(observations, memory, [replay.robot])
         else:
             decision = controller.decide(observations, memory)
@@ -133,7 +133,7 @@ def _generate_decisions(replay: Replay) -> Iterator[Any]:
 
 
 class GuardedProcesses:
-    """Starts guarded processes, each of which answers one question and receives nothing else."""
+    """Starts guarded processes, each of which answers a single question and receives nothing else."""
 
     def __init__(self) -> None:
         self._processes: set[subprocess.Popen[bytes]] = set()
@@ -141,7 +141,7 @@ class GuardedProcesses:
         self._lock = threading.Lock()
 
     def ask(self, question: Task | Replay) -> Answer:
-        """Ask a new process, and wait for its answer. Several threads may ask at the same time.
+        """Ask a new process, and wait for its answer; several threads may do so at the same time.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class GuardedProcesses:
         Raises
         ------
         OutputError
-            If the service failed, which is not the fault of a controller.
+            If the service failed for a reason other than the controller.
         """
         with tempfile.TemporaryFile() as errors:
             with self._lock:
@@ -177,7 +177,7 @@ class GuardedProcesses:
         return None if reply is None else reply.answer
 
     def kill(self) -> None:
-        """End all processes; no other one is started."""
+        """Kill all processes, and start no others from now on."""
         with self._lock:
             self._is_stopped = True
             for process in self._processes:

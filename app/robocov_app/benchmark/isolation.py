@@ -1,23 +1,23 @@
-"""Checking that robots use nothing but their own observations: the decisions of single robots are repeated.
+"""Checking that robots use nothing but their own observations, by repeating the decisions of single robots.
 
-A run is observed first: the transcript contains the observations and the decisions of all steps. Then the
-controller is called again in a new process for each robot that is checked, with the observations of this
-robot alone. The simulation depends on the controller only through its decisions. Therefore, if the forces,
-goals and messages are the same in all steps, bit for bit, then the run would have been the same if each of
-these robots had been driven by a process of its own.
+First a run is recorded: its transcript contains the observations and the decisions of all steps. Then, for
+each robot that is checked, the controller is called again in a new process with the observations of only this
+robot. The simulation depends on the controller only through its decisions. Therefore, if forces, goals and
+messages are the same in all steps, bit for bit, the run would have been the same if each of these robots had
+been controlled by a separate process.
 
 What a process receives depends on the information that the controller declares:
 
 ==========  ===========================================================================================
 own         The state and measurements of one robot, the positions of the robots that it hears, and the
             messages that it has received.
-shared map  The same: maps are shared by messages.
+shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
 The built-in controllers that read the maps of other robots directly, and the oracle, receive the observations
-of all robots: that they know no more than the robots have measured is checked, the limits of communication
-are not. In the rows of all other robots there are values that say nothing: positions drawn by the verifier,
+of all robots. This checks that they know no more than the robots have measured, but not the limits of
+communication. Otherwise the rows of all other robots contain placeholders: positions drawn by the verifier,
 no velocity, no obstacle, an empty scan.
 """
 
@@ -38,7 +38,7 @@ from robocov.observation.region import Region
 from robocov_app.sweep.tasks import Task
 
 _FAILED_ATTEMPTS = 1000
-"""Number of points that are drawn before a region counts as too thin to draw points in."""
+"""Number of attempts after which a region counts as too thin for drawing random points in it."""
 
 
 @dataclass(eq=False)
@@ -49,7 +49,7 @@ class Transcript:
     ----------
     observations : list of Observations
     working : list of (n,) bool array or None
-        Masks of the robots that work; None: all.
+        Mask of the working robots in each step; None if all are working.
     forces : list of (n, 2) array, N
     goals : list of (n, 2) array or None, m
     messages : list of sequence of sequence of Message
@@ -62,7 +62,7 @@ class Transcript:
     messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
 
     def add(self, snapshot: Snapshot) -> None:
-        """Add a step."""
+        """Append the observations and decisions of a step."""
         self.observations.append(snapshot.seen)
         self.working.append(snapshot.working)
         self.forces.append(snapshot.decision.forces)
@@ -72,14 +72,14 @@ class Transcript:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """The observations for which a controller is called again, in a process of its own.
+    """The observations for which a controller is called again, in a separate process.
 
     Attributes
     ----------
     task : Task
         The run, from which the controller and the team are taken.
     robot : int or None
-        Number of the robot that is checked; None: the whole team.
+        Row of the robot that is checked; None for the whole team.
     observations : sequence of Observations
     environment : Environment or None
         The map, if the controller may know it.
@@ -111,14 +111,15 @@ class Decisions:
 
 
 def hide_others(observations: Observations, robot: int, substitutes: Array) -> Observations:
-    """Return the observations of one robot, with values that say nothing in the rows of the others.
+    """Return the observations of one robot, with placeholders in the rows of the others.
 
     Parameters
     ----------
     observations : Observations
     robot : int
+        Row of the robot.
     substitutes : (n, 2) array, m
-        Positions of robots that it does not hear.
+        Placeholders for the positions of robots that it does not hear.
 
     Returns
     -------
@@ -127,7 +128,7 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
     count = len(observations.positions)
     is_own = np.arange(count) == robot
     is_known = is_own.copy()
-    # A robot that receives messages knows the positions in them only.
+    # If positions are reported by messages, a robot knows those in the messages, not the true ones.
     if observations.reported_positions is None or observations.neighbors.is_complete:
         is_known[observations.neighbors.list_neighbors(robot)] = True
     hidden = replace(
@@ -153,16 +154,15 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
 
 
 def _hide_scans(scans: Scans, is_own: BoolArray) -> Scans:
-    """Return scans in which the other robots see nothing, not even free space."""
+    """Return scans in which other robots measure nothing: all their rays have length 0."""
     distances = np.where(is_own[:, None], scans.distances, 0.0)
     return Scans(_freeze(distances), _freeze(scans.hit & is_own[:, None]))
 
 
 def _hide_links(observations: Observations, robot: int) -> Observations:
-    """Return observations without the links and the messages that a robot does not know.
+    """Return observations without the links and reports that a robot cannot know.
 
-    If robots know the current positions of those that they hear, a robot also knows which of them hear each
-    other.
+    A robot that knows the current positions of those that it hears also knows which of them hear each other.
     """
     neighbors = observations.neighbors
     if neighbors.indptr is None or neighbors.indices is None:
@@ -192,7 +192,7 @@ def _freeze(array: Any) -> Any:
 
 
 def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Array:
-    """Draw positions in a region that stand for those of unknown robots, (n, 2) m."""
+    """Draw random positions in a region as placeholders for those of unknown robots, (count, 2) m."""
     low_x, low_y, high_x, high_y = region.bounds
     for _ in range(_FAILED_ATTEMPTS):
         points = rng.uniform((low_x, low_y), (high_x, high_y), size=(16 * count, 2))
@@ -212,11 +212,11 @@ def build_replay(
     task : Task
     transcript : Transcript
     information : Information
-        The information that the controller declares, which decides what its process receives.
+        The information that the controller declares, which determines what its process receives.
     robot : int or None
-        Number of the robot; None: the process receives the observations of all robots.
+        Row of the robot; if None, the process receives the observations of all robots.
     rng : Generator
-        Draws the positions of unknown robots.
+        Draws placeholders for the positions of unknown robots.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
     Returns
     -------
     str or None
-        Description of the difference; None if there is none. Decisions of failed robots do not count.
+        Description of the difference; None if there is none. Decisions of failed robots are ignored.
     """
     count = len(transcript.forces[0])
     checked = np.arange(count) if replay.robot is None else np.array([replay.robot])
@@ -267,7 +267,7 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
 
 
 def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -> BoolArray:
-    """Return for which robots two arrays have the same bits, (k,)."""
+    """Return for which robots the rows of two arrays are the same, bit for bit, (k,)."""
     if expected is None or actual is None:
         return np.full(len(robots), expected is actual)
     pairs = zip(expected[robots], actual[robots], strict=True)
@@ -277,7 +277,7 @@ def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -
 def _have_same_messages(
     expected: Sequence[Sequence[Message]], actual: Sequence[Sequence[Message]], robots: Any
 ) -> BoolArray:
-    """Return for which robots the messages are the same, (k,)."""
+    """Return for which robots the sent messages are the same, (k,)."""
     if not expected and not actual:
         return np.ones(len(robots), dtype=bool)
     is_same = []
@@ -333,7 +333,7 @@ def is_same_content(first: Any, second: Any) -> bool:
 
 
 def _get_attributes(value: Any) -> dict[str, Any]:
-    """Return the attributes of an object, also those in slots."""
+    """Return the attributes of an object, including those in slots, by name."""
     names = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
     attributes = {name: getattr(value, name) for name in names if hasattr(value, name)}
     return {**attributes, **getattr(value, "__dict__", {})}

@@ -1,8 +1,8 @@
-"""Maps that nobody has seen: drawn by the verifier from the generators of the suite, and compared with it.
+"""New maps, which the verifier draws from the generators of the suite, and comparison of gaps on them.
 
-A map of a family with a new seed is as good as any other one of the family. Unless a controller, or its
-gains, were fitted to the maps of the suite, its gap on a new map is equally likely to have any rank among its
-gaps on the maps of that family. If its gaps on new maps are too often among the largest, it knows the suite.
+A map with a new seed is statistically like any other map of its family. Unless a controller or its gains are
+fitted to the maps of the suite, its gap on a new map is equally likely to have any rank among its gaps on the
+maps of that family. If gaps on new maps are too often among the largest, the controller knows the suite.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from robocov_app.benchmark.floor_plans import FLOOR_PLANS, build_floor_plan
 TRACK = "ideal"
 """Track of the runs on new maps."""
 MAX_NEW_MAPS = len(suite.FAMILIES) - 1
-"""One map of each family that has a generator."""
+"""Maximum number of new maps: one of each family that has a generator."""
 MIN_P_VALUE = 0.001
-"""A controller whose ranks on new maps have a smaller p-value knows the suite."""
+"""A controller counts as fitted to the suite if its ranks on new maps have a smaller p-value."""
 _MAX_MAP_SEED = 2**31
 _MAX_ATTEMPTS = 100
 _RANK_SAMPLES = 100_000
 _SAME_SUM = 1e-9
-"""Margin of comparisons of sums of ranks."""
+"""Tolerance in comparisons of sums of ranks."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class NewMap:
     Attributes
     ----------
     name : str
-        Name for messages, with its family and seed.
+        Family and seed, for messages.
     family : str
     start_seed : int
         Seed of the starting positions.
@@ -60,11 +60,11 @@ class NewMapComparison:
     Attributes
     ----------
     new_gap, suite_gap : float
-        Median gap on the new maps, and over the maps of the same families in the suite.
+        Median gap on the new maps, and on the maps of the same families in the suite.
     p_value : float
-        Probability of ranks that are at least as high if the new maps are like those of the suite.
+        Probability of ranks at least as extreme if the controller is not fitted to the suite.
     min_p_value : float
-        The smallest possible p-value. With few runs in a result, nothing can be shown.
+        The smallest possible p-value; if a result has few runs, it is too large to show anything.
     """
 
     new_gap: float
@@ -84,9 +84,9 @@ def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator)
     Parameters
     ----------
     families : sequence of str
-        Names of families; those without a generator are ignored.
+        Names of families, of which those without a generator are ignored.
     count : int
-        Number of maps; less if there are fewer families.
+        Number of maps; fewer are drawn if there are fewer families.
     rng : Generator
 
     Returns
@@ -99,7 +99,7 @@ def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator)
 
 
 def _draw_map(family: str, rng: np.random.Generator) -> NewMap:
-    """Draw a map of a family. Seeds for which the generator finds no map are skipped."""
+    """Draw a map of a family; seeds for which the generator finds no map are skipped."""
     for _ in range(_MAX_ATTEMPTS):
         seed = int(rng.integers(suite.MIN_NEW_SEED, _MAX_MAP_SEED))
         try:
@@ -124,12 +124,12 @@ def compare_gaps(
     rows : sequence of Mapping
         Rows of the result.
     new_gaps : sequence of (str, float)
-        Family and gap of each new map; infinite if the run failed. Families are different.
+        Family and gap of each new map, all of different families. The gap is infinite if the run failed.
 
     Returns
     -------
     NewMapComparison or None
-        None if there is nothing to compare.
+        None if the result has no runs on maps of these families.
     """
     gaps_by_family = _collect_gaps(rows)
     compared = [(family, gap) for family, gap in new_gaps if gaps_by_family.get(family)]
@@ -140,6 +140,7 @@ def compare_gaps(
     for family, gap in compared:
         suite_gaps = gaps_by_family[family]
         sizes.append(len(suite_gaps) + 1)
+        # Rank 1 is the largest gap.
         ranks.append(1 + sum(other >= gap for other in suite_gaps))
     fractions = [rank / size for rank, size in zip(ranks, sizes, strict=True)]
     suite_gaps = [gap for family, _ in compared for gap in gaps_by_family[family]]
@@ -152,7 +153,7 @@ def compare_gaps(
 
 
 def _collect_gaps(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
-    """Return the mean gap on each map of the track by family; infinite if a run failed."""
+    """Return the mean gap over the runs on each map of the track, by family; infinite if a run failed."""
     gaps_by_map: dict[str, list[float]] = {}
     for row in rows:
         if row["track"] == TRACK and row["map"] in suite.TRACKS[TRACK].maps:
@@ -165,9 +166,10 @@ def _collect_gaps(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
 
 
 def _compute_p_value(observed_sum: float, sizes: Sequence[int]) -> float:
-    """Return the probability that a sum of uniform ranks, each by its size, is at most the observed one.
+    """Estimate the probability that random ranks have a sum of at most the observed one.
 
-    A low rank is that of a large gap. The probability is estimated from random ranks.
+    Each rank is uniformly distributed from 1 to one of the sizes, and is divided by this size. Low ranks mean
+    large gaps.
     """
     rng = np.random.default_rng(0)
     sums = np.zeros(_RANK_SAMPLES)

@@ -28,10 +28,10 @@ from robocov.observation.region import Region
 from robocov.team import Team
 
 _LATTICE = 8
-"""Cells of the planner's lattice along a side. It is coarse because only paths are planned, no costs."""
+"""Cells along a side of the planner's lattice, which is coarse because no costs are computed on it."""
 _TIME_TOLERANCE_S = 1e-9
 _UNREACHABLE_M = 1e6
-"""Length of a missing path when goals are assigned."""
+"""Length that stands for a missing path when goals are assigned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Oracle(BaseController):
         return OracleMemory(team, routes=unknown, legs=np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: OracleMemory) -> Decision:
-        """Compute the forces along the paths, which are planned again in each period."""
+        """Compute the forces along the paths, which are planned again once in each period."""
         assert self.environment is not None
         stages = self.environment.extra["oracle"]
         stage = _find_stage(stages, seen.time)
@@ -115,7 +115,7 @@ class Oracle(BaseController):
 
 
 def _find_stage(stages: list[Any], time: float) -> int:
-    """Return the index of the last placement that is in use at a time, s."""
+    """Return the index of the placement to use at a time, s: the last one that has started."""
     started = [k for k, (start, _, _) in enumerate(stages) if start <= time + _TIME_TOLERANCE_S]
     return max(started)
 
@@ -125,15 +125,14 @@ def plan_routes(
 ) -> tuple[Array, ...]:
     """Assign the positions of a placement to robots, and plan the shortest paths to them.
 
-    Goals are assigned again even while the robots move: one that blocks the path of another takes over its
-    goal.
+    Goals are assigned again while the robots move, so that a robot that blocks another takes over its goal.
 
     Parameters
     ----------
     planner : GeodesicPlanner
     positions : (n, 2) array, m
     robots : list of int
-        Indices of the k robots that work. The others stay.
+        Rows of the k working robots; the others stay where they are.
     placement : (k, 2) array, m
 
     Returns

@@ -28,12 +28,12 @@ from robocov_app.report.theme_css import build_theme_rules
 
 
 class Quantity(NamedTuple):
-    """A quantity that the gap is plotted against."""
+    """A quantity against which the gap is plotted."""
 
     title: str
     axis_label: str
     compute: Callable[[Rating], float]
-    """Returns the value of a rating."""
+    """Returns the quantity for a rating."""
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -54,24 +54,24 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
 }
 PLOT_SIZE_PX = (560, 350)
-"""Size of a plot. It is large, because there are many labels."""
+"""Size of a plot, which must have space for many labels."""
 YARDSTICKS = ("rapf", "atlas", "oracle")
-"""Controllers whose gaps are shown next to those of incomplete entries, over the same runs."""
+"""Controllers whose gaps over the same runs are shown next to those of incomplete entries."""
 _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
 _DPI = 72.0
-"""Resolution of the plots, at which a pixel is a point."""
+"""Resolution of the plots, at which pixels equal points."""
 _CHARACTER_WIDTH_PX = 6.0
 _LINE_HEIGHT_PX = 13.0
 _MARK_HALF_SIZE_PX = 6.0
 _LABEL_DISTANCE_PX = 8.0
 """Horizontal distance of a label from its mark."""
 _LABEL_ROWS = (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8)
-"""Heights at which a label may be placed, in lines above its mark."""
+"""Heights at which a label may be placed, in lines above its mark, the preferred ones first."""
 _MIN_RATIO = 1.01
-"""Ratio of the largest value to the smallest from which a quantity is plotted."""
+"""Minimum ratio of the largest value to the smallest for plotting a quantity."""
 _MIN_LOG_RATIO = 8.0
-"""Ratio of the largest value to the smallest from which an axis is logarithmic."""
+"""Minimum ratio of the largest value to the smallest for a logarithmic axis."""
 
 
 class ParetoPoint(NamedTuple):
@@ -84,7 +84,7 @@ class ParetoPoint(NamedTuple):
     gap: float
     """Median gap, %."""
     is_rival: bool
-    """Whether the controller competes: it does not know the whole map."""
+    """Whether the controller competes, which means that it does not know the whole map."""
 
 
 class _Entries(NamedTuple):
@@ -97,10 +97,10 @@ class _Entries(NamedTuple):
 
 
 def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
-    """Build the page of some results, with a section for each track.
+    """Build the page that compares results, with a section for each track.
 
-    Entries are ranked by their scores, if they are complete. Each is rated over its own runs, so that no
-    entry changes the figures of another one.
+    Complete entries are ranked by their scores. Each entry is rated over its own runs, so that no entry
+    changes the figures of others.
 
     Parameters
     ----------
@@ -112,12 +112,12 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     Returns
     -------
     str
-        The page as HTML. The same results give the same page.
+        The page as HTML. Equal results give identical pages.
 
     Raises
     ------
     ParameterError
-        If the results contain no run of the suite.
+        If the results contain no runs of the suite.
     """
     labels = ratings.label_results(results)
     styles = choose_curve_styles([result["entry"]["controller"] for result in results])
@@ -151,7 +151,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
 
 
 def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> list[str]:
-    """Return the labels of the yardsticks among the results, with their default gains."""
+    """Return the labels of those results that are of yardsticks with default gains."""
     yardsticks = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]
@@ -161,14 +161,14 @@ def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]
 
 
 def _sort_by_score(rating: Rating) -> tuple[bool, float]:
-    """Return a sort key: complete ratings first, among them the highest score."""
+    """Return a sort key that puts complete ratings first, then higher scores."""
     return not rating.is_complete, -rating.score
 
 
 def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
     """Build the table of scores and gaps on all tracks.
 
-    Entries with all runs of all tracks on the page come first, ranked by their mean scores.
+    Entries with all runs of all tracks on the page come first, ranked by mean score; others have no rank.
     """
     by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
@@ -196,7 +196,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
 def _build_overview_cells(
     label_ratings: Mapping[str, Rating], tracks: Mapping[str, Sequence[Rating]]
 ) -> list[str]:
-    """Return the number of runs, contacts, runs at rest, and the gap on each track that is complete."""
+    """Return the cells for runs, contacts and runs at rest, and for the gap on each complete track."""
     rows = [row for rating in label_ratings.values() for row in rating.rows]
     run_count = sum(rating.run_count for rating in label_ratings.values())
     suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)
@@ -214,7 +214,7 @@ def _build_overview_cells(
 
 
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
-    """Build the variables of a track's section in the template."""
+    """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
     family_head, family_rows = ratings.build_family_rows(ranked)
     rows = [ratings.build_rating_row(rating, entries.information[rating.label]) for rating in ranked]
@@ -238,7 +238,7 @@ def _summarize_track(name: str) -> str:
 
 
 def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
-    """Build the table of the entries that lack runs, next to the gaps of yardsticks over the same runs."""
+    """Build the table of entries that lack runs, with the gaps of yardsticks over the same runs."""
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
     rows = []
     for rating in track_ratings:
@@ -255,7 +255,7 @@ def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) 
 
 
 def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
-    """Build the plots of a track: the gap against each quantity that differs between controllers."""
+    """Build the plots of a track: the gap against each quantity in which controllers differ."""
     plots = []
     for key, quantity in QUANTITIES.items():
         points = []
@@ -282,9 +282,9 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
 
 @plain_style()
 def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
-    """Draw the gap of controllers against another quantity, both better when smaller.
+    """Draw the gap of controllers against another quantity; less is better in both.
 
-    A line connects the controllers that compete and that no other one beats in both.
+    A line connects the competing controllers that no other competing one beats in both (the Pareto front).
 
     Parameters
     ----------
@@ -342,11 +342,12 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
 
 
 def place_labels(marks: Array, labels: Sequence[str]) -> Array:
-    """Place labels next to marks such that they hide no mark and no other label if possible.
+    """Place labels next to marks such that, if possible, they hide no marks and no other labels.
 
     Parameters
     ----------
     marks : (n, 2) array, px
+        Centers of the marks.
     labels : sequence of str
 
     Returns
@@ -363,7 +364,7 @@ def place_labels(marks: Array, labels: Sequence[str]) -> Array:
         boxes = shapely.box(*(candidates - half_size).T, *(candidates + half_size).T)
         hidden_areas = shapely.area(shapely.intersection(boxes[:, None], occupied)).sum(axis=1)
         outside_areas = shapely.area(shapely.difference(boxes, frame))
-        # A label that leaves the frame is cut off, which is worse than any overlap.
+        # A label that extends beyond the frame is cut off, which is worse than any overlap.
         best = int(np.argmin(np.round(hidden_areas + 1e3 * outside_areas, 6)))
         occupied.append(boxes[best])
         centers.append(candidates[best])
@@ -371,7 +372,7 @@ def place_labels(marks: Array, labels: Sequence[str]) -> Array:
 
 
 def _list_label_offsets(half_width: float) -> Array:
-    """Return the offsets of a label from its mark, (k, 2) px, the preferred ones first."""
+    """Return the possible offsets of a label from its mark, (k, 2) px, the preferred ones first."""
     distance = half_width + _LABEL_DISTANCE_PX
     offsets = []
     for row in _LABEL_ROWS:
@@ -383,17 +384,17 @@ def _list_label_offsets(half_width: float) -> Array:
 
 
 def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Find the points that no other one beats in both values.
+    """Find the points that no other point beats in both values.
 
     Parameters
     ----------
     points : sequence of (float, float)
-        Pairs of values, better when smaller.
+        Pairs of values, of which smaller ones are better.
 
     Returns
     -------
     list of int
-        Indices of the points, sorted by their first values.
+        Indices of these points, sorted by their first value.
 
     Examples
     --------
@@ -422,7 +423,7 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
 
 
 def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
-    """Build the table of the runs to look into: teams that never moved, or ended far above RAPF."""
+    """Build the table of runs to look into, in which the team never moved or ended far above RAPF."""
     rapf: Mapping[str, Any] = {"rows": []}
     for result in results:
         if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:

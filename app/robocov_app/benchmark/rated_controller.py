@@ -1,4 +1,4 @@
-"""The controller that the benchmark rates, and the runs that are selected for it."""
+"""The controller that the benchmark rates, and the selection of runs for it."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,9 +29,9 @@ class Selection:
     Parameters
     ----------
     quick : bool
-        Use two tracks only, with the first map of each family and the first seed.
+        Whether to use only two tracks, with the first map of each family and the first seed.
     tracks, maps : tuple of str
-        Names of tracks and maps. If empty, all of them are used.
+        Names of tracks and maps; if empty, all of them are selected.
     """
 
     quick: bool = False
@@ -107,7 +107,7 @@ class RatedController:
         return suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder)
 
     def _locate(self) -> tuple[str, Path]:
-        """Return the name of the controller, and the folder that a relative path of its file starts from."""
+        """Return the name of the controller, and the folder to which a relative path of its file refers."""
         if self.controller == ORACLE:
             return _ORACLE_NAME, Path(__file__).parent
         return self.controller, Path()
@@ -115,7 +115,7 @@ class RatedController:
     def _check_controller(self) -> None:
         """Raise ParameterError if the controller or one of its gains is unknown or invalid.
 
-        It is checked before the maps are built, which takes seconds.
+        This is done before the maps are built, which takes seconds.
         """
         name, folder = self._locate()
         try:
@@ -134,8 +134,8 @@ class RatedController:
         Returns
         -------
         dict
-            Name, label, information, all gains, the gains that were set, and for a controller in a user's
-            file the SHA-256 of its source code. The oracle is part of robocov, whose version is known.
+            Name, label, information, all gains, the gains that were set, and, for a controller in a file of
+            the user, the SHA-256 of its source code. The oracle has none, because it is part of robocov.
         """
         name = study.controllers[0]
         controller_class = study.load_controller_class(name)
@@ -155,11 +155,12 @@ class RatedController:
 
 
 def _add_placements(environment: Environment, track_name: str, map_name: str) -> Environment:
-    """Return a map with the reference placements for the oracle, a new one after each failure of a robot."""
+    """Return a map with the reference placements for the oracle: one for the start and each robot failure."""
     track = suite.TRACKS[track_name]
     working = list(range(track.robots))
     stages = []
     time = 0.0
+    # The last pair is no failure; it only closes the last stage.
     for failed_robot, failure_time in (*track.failures, (-1, np.inf)):
         positions = find_reference(map_name, len(working))["positions_m"]
         stages.append([time, working, positions])

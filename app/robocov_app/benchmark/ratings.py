@@ -1,7 +1,7 @@
 """Ratings of controllers on each track, each over its own runs.
 
-The rating of an entry depends on no other entry: adding one to a page changes neither the figures nor the
-scores of the others. Only complete entries are ranked.
+The rating of an entry does not depend on other entries: adding an entry to a page changes neither the figures
+nor the scores of the others. Only complete entries are ranked.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,12 +17,12 @@ from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_
 
 NO_VALUE = "–"
 MIN_INTERVAL_MAPS = 12
-"""Minimum number of maps for an interval. A 95 % bootstrap interval of 5 maps contains the true value in 82 %
-of all cases, that of 12 in 92 %."""
+"""Minimum number of maps for an interval. A 95 % bootstrap interval contains the true value in 82 % of all
+cases with 5 maps, and in 92 % with 12."""
 CONTACT_FACTOR = 0.5
-"""Factor of the score of a run in which a robot touched a wall or another robot."""
+"""Factor for the score of a run in which a robot touched a wall or another robot."""
 MOTION_FACTOR = 0.5
-"""Factor of the score of a run at whose end the team has not come to rest."""
+"""Factor for the score of a run in which the team has not come to rest by the end."""
 
 HEAD = (
     "Controller",
@@ -43,7 +43,7 @@ HEAD = (
     "B/s",
     "µs/s",
 )
-"""Columns of the table of a track. `NOTES` explain them."""
+"""Columns of the table of a track, which are explained in `NOTES`."""
 _SUMMARY_COLUMNS = (
     "Score, %",
     "Runs",
@@ -83,7 +83,7 @@ RunKey: TypeAlias = tuple[str, int]
 
 @dataclass(frozen=True)
 class Rating:
-    """One controller on one track, over its runs of this track.
+    """The rating of one controller on one track, over its runs on this track.
 
     Parameters
     ----------
@@ -91,16 +91,16 @@ class Rating:
         Label of the controller.
     track : str
     rows : sequence of Mapping
-        Its runs that did not fail.
+        Rows of the runs that did not fail.
     failed : int
-        Number of its runs that failed.
+        Number of runs that failed.
 
     Attributes
     ----------
     is_complete : bool
-        Whether it has all runs of the track. Only complete ratings are ranked.
+        Whether the rating includes all runs of the track; only complete ratings are ranked.
     score : float
-        Mean score of its runs, see `compute_score`.
+        Mean score of the runs, see `compute_score`.
     """
 
     label: str
@@ -119,17 +119,17 @@ class Rating:
 
     @property
     def run_count(self) -> int:
-        """Number of its runs, failed ones included."""
+        """Number of runs, including failed ones."""
         return len(self.rows) + self.failed
 
     @property
     def is_complete(self) -> bool:
-        """Whether it has all runs of the track."""
+        """Whether the rating includes all runs of the track."""
         return self.run_count == len(list_run_keys(self.track))
 
     @property
     def score(self) -> float:
-        """Mean score of its runs; failed runs count 0."""
+        """Mean score of the runs; failed runs count as 0."""
         return sum(map(compute_score, self.rows)) / self.run_count
 
     @property
@@ -144,7 +144,7 @@ class Rating:
         return bootstrap(gaps, "median", maps)
 
     def select_runs(self, keys: Iterable[RunKey]) -> "Rating":
-        """Return the rating over those of its runs that have one of the given keys."""
+        """Return the rating over the runs with the given keys; failed runs are left out."""
         selected = set(keys)
         rows = [row for row in self.rows if get_run_key(row) in selected]
         return replace(self, rows=rows, failed=0)
@@ -155,9 +155,9 @@ class Rating:
         Returns
         -------
         fraction : float
-            Fraction of the runs that are at rest at the end.
+            Fraction of the runs in which the team is at rest at the end.
         time : float or None
-            Median time to rest by Kaplan and Meier, s. None if most runs did not come to rest.
+            Kaplan-Meier estimate of the median time to rest, s; None if most runs did not come to rest.
         """
         rest_times = self.get_values("settled_at_s").tolist()
         fraction = len(rest_times) / max(1, len(self.rows))
@@ -168,7 +168,7 @@ class Rating:
         return fraction, median if np.isfinite(median) else None
 
     def compute_rate(self, figure: str) -> float:
-        """Return the median of a figure for each robot and second of simulation time."""
+        """Return the median of a figure per robot and second of simulation time."""
         track = suite.TRACKS[self.track]
         return self.compute_median(figure) / (track.robots * track.duration)
 
@@ -194,7 +194,8 @@ def compute_score(row: Mapping[str, Any]) -> float:
     Returns
     -------
     float
-        J_ref / J, halved after a contact, and halved if the team has not come to rest; 0 if there is no gap.
+        J_ref / J, halved if there was a contact, and halved again if the team has not come to rest; 0 if the
+        gap is unknown.
 
     Examples
     --------
@@ -216,7 +217,7 @@ def compute_score(row: Mapping[str, Any]) -> float:
 def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
     """Build the ratings of all results by track.
 
-    Each result is rated over its own runs. Rows that are no run of the suite are ignored.
+    Each result is rated over its own runs. Rows that do not belong to the suite are ignored.
 
     Parameters
     ----------
@@ -244,7 +245,7 @@ def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating
 
 
 def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return a unique label for each result: its controller, the gains that were set, and a number if needed.
+    """Return a unique label for each result: controller, gains that were set, and a number if necessary.
 
     Parameters
     ----------
@@ -267,7 +268,7 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def format_number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as text; a dash for None and for values that are not finite."""
+    """Format a number; a dash stands for None and for values that are not finite."""
     if value is None or not np.isfinite(value):
         return NO_VALUE
     return f"{value:{form}}"
@@ -285,7 +286,7 @@ def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Cells under `HEAD`.
+        Cells for the columns in `HEAD`.
     """
     gap = rating.gap
     gaps = rating.get_values("gap")
@@ -325,7 +326,10 @@ def _format_runs(rating: Rating, gaps: int) -> str:
 
 
 def _format_bound(rating: Rating, gaps: int) -> str:
-    """Return the median gap to the lower bounds, in brackets, if all bounds are known."""
+    """Return the median gap to the lower bounds in brackets; empty unless all bounds are known.
+
+    `gaps` is the number of runs with a gap.
+    """
     gaps_to_bound = rating.get_values("gap_to_bound")
     if not gaps or len(gaps_to_bound) != gaps:
         return ""
@@ -333,7 +337,7 @@ def _format_bound(rating: Rating, gaps: int) -> str:
 
 
 def _compute_cost_integral(rating: Rating) -> float | None:
-    """Return the median integral of J / J_ref over a run, s; None if no reference is known."""
+    """Return the median of the integral of J / J_ref over a run, s; None if no run has a gap."""
     ratios = []
     for row in rating.rows:
         if row["gap"] is not None:
@@ -345,7 +349,7 @@ def _compute_cost_integral(rating: Rating) -> float | None:
 
 
 def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Build a table of the median gaps by families of maps, in percent.
+    """Build a table of the median gaps on each family of maps, in percent.
 
     Parameters
     ----------

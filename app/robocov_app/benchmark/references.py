@@ -1,4 +1,4 @@
-"""Reference placements and certified lower bounds for the maps of the suite, stored in its file."""
+"""Reference placements and certified lower bounds for the maps of the suite, which its file contains."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +24,7 @@ SEED = 0
 BOUND_PRECISION = 0.002
 """Relative precision of the certified lower bounds."""
 _POSITION_DIGITS = 4
-"""Decimal places of positions, in meters."""
+"""Number of decimal places of positions in meters."""
 
 
 def list_references() -> Iterator[tuple[str, int, float]]:
@@ -33,8 +33,7 @@ def list_references() -> Iterator[tuple[str, int, float]]:
     Yields
     ------
     tuple of str, int and float
-        Map, number of robots, and time in s. Where obstacles move, they are taken at this time: the end of
-        the runs.
+        Map, number of robots, and time in s at which moving obstacles are taken: the end of the runs.
     """
     times: dict[tuple[str, int], float] = {}
     for track in suite.TRACKS.values():
@@ -47,33 +46,33 @@ def list_references() -> Iterator[tuple[str, int, float]]:
 
 @dataclass(frozen=True)
 class _ReferenceSlot:
-    """Place of one reference in the document of the suite's file."""
+    """Place of one reference in the content of the suite's file."""
 
     references: dict[str, Any]
-    """References of the map by team size. The answers are written here."""
+    """References of the map by team size, to which the answers are added."""
     robots: int
     environment: Environment
 
     @property
     def reference(self) -> dict[str, Any]:
-        """The stored reference, empty if there is none yet."""
+        """The stored reference; empty if there is none yet."""
         return self.references.get(str(self.robots), {})  # type: ignore[no-any-return]
 
 
 def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
     """Compute all reference placements and lower bounds that a file of the suite lacks.
 
-    The file is saved after each answer, so an interrupted search is resumed by the next call. A map whose
-    hash is not that in the file loses its references.
+    The file is saved after each answer, so that the next call resumes an interrupted search. References of
+    maps whose hashes differ from those in the file are removed.
 
     Parameters
     ----------
     path : Path
-        A file of the suite. It is created if it does not exist.
+        A file of the suite, which is created if it does not exist.
     workers : int
         Maximum number of processes.
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
     stop : Interruption
 
     Returns
@@ -108,6 +107,7 @@ def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interrupt
 def _search_references(
     slots: Mapping[str, _ReferenceSlot], workers: int, stop: Interruption, report_answer: Callable[[], None]
 ) -> None:
+    """Search for the reference placements of slots; add each to its slot, and report it."""
     if not slots:
         return
     queries = {
@@ -127,7 +127,8 @@ def _search_references(
 
 
 def _build_reference(environment: Environment, placement: ReferencePlacement) -> dict[str, Any]:
-    # The cost is that of the rounded positions, so that it can be recomputed from the file.
+    """Build the entry of a reference placement in the suite's file, still without a lower bound."""
+    # The cost is computed at the rounded positions, so that it can be recomputed from the file.
     positions = np.round(placement.positions, _POSITION_DIGITS)
     result = CoverageCost(environment, suite.LATTICE)(positions)
     return {
@@ -142,6 +143,7 @@ def _build_reference(environment: Environment, placement: ReferencePlacement) ->
 def _compute_bounds(
     slots: Mapping[str, _ReferenceSlot], workers: int, stop: Interruption, report_answer: Callable[[], None]
 ) -> None:
+    """Compute the lower bounds of slots; add each to the reference in its slot, and report it."""
     if not slots:
         return
     queries = {key: (to_json(slot.environment), slot.reference["positions_m"]) for key, slot in slots.items()}
@@ -156,7 +158,10 @@ class LowerBoundService:
     failure_message = "the bound failed"
 
     def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], channel: Channel) -> float:
-        """Return a lower bound of the mean distance of any placement, m. This may take minutes."""
+        """Return a lower bound for the mean distance of all placements, m, which may take minutes.
+
+        The last question contains the map as JSON, and the positions of the best known placement.
+        """
         from robocov.lower_bound import compute_lower_bound
 
         document, positions = questions[-1]
@@ -171,7 +176,7 @@ class LowerBoundService:
 
 
 def _load_maps(path: Path) -> dict[str, Any]:
-    """Return the maps of a file of the suite, with new entries for those that are missing or changed."""
+    """Return the map entries of a file of the suite, with new ones for maps that are missing or changed."""
     maps: dict[str, Any] = {}
     if path.exists():
         maps = json.loads(path.read_text(encoding="utf-8"))["maps"]

@@ -18,7 +18,7 @@ from robocov_app.sweep.worker import Outcome
 
 RESULT_FILE = "result.json"
 ENTRIES = Path(__file__).parent / "entries"
-"""Folder of the results of the built-in controllers, compressed by ``gzip -9 -n``."""
+"""Folder with the results of the built-in controllers, compressed with ``gzip -9 -n``."""
 RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
 FIGURES = (
     "mean_distance_m",
@@ -32,9 +32,9 @@ FIGURES = (
     "min_clearance_m",
     "stuck_robots",
 )
-"""Figures of a run that a row contains, in addition to its effort and its gap."""
+"""Figures of a run that a row contains in addition to its effort and its gaps."""
 _SAME_AREA_M2 = 1e-6
-"""Maximum difference between uncovered areas of the same free space."""
+"""Maximum difference between uncovered areas that count as the same."""
 Row: TypeAlias = dict[str, Any]
 """One run of a result: its track, map and seed, and its figures or its error."""
 
@@ -46,7 +46,7 @@ def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
     ----------
     map_name : str
     robots : int
-        Size of the team.
+        Number of robots.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
 
 
 def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Row:
-    """Build the row of a run.
+    """Build the row of a run in a result.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     run : Entry or Outcome
         The figures of the run, or its error.
     effort : bytes
-        Content of its ``effort.json``.
+        Content of the run's ``effort.json``.
 
     Returns
     -------
@@ -104,8 +104,8 @@ def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[
     -------
     dict
         ``gap``: J / J_ref - 1, and ``gap_to_bound``: the same with the bound in place of J_ref. Both are
-        None if the team covered another area than that of the reference. ``gap_to_bound`` is also None if
-        there is no bound.
+        None if the team covered a different area from that of the reference. ``gap_to_bound`` is also None if
+        no bound is known.
     """
     reference = find_reference(map_name, suite.TRACKS[track].survivors)
     if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > _SAME_AREA_M2:
@@ -117,9 +117,9 @@ def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[
 
 
 def identify_suite() -> dict[str, str]:
-    """Return the version of the suite, and a SHA-256 of its maps and reference costs.
+    """Return the version of the suite, and the SHA-256 of its maps and reference costs.
 
-    The lower bounds are not part of the hash: results do not depend on them.
+    The lower bounds are not hashed, because costs and gaps do not depend on them.
     """
     costs = {}
     for name, entry in suite.load_frozen_maps().items():
@@ -130,7 +130,7 @@ def identify_suite() -> dict[str, str]:
 
 
 def describe_method() -> list[str]:
-    """Describe the method of the benchmark and its figures, in sentences."""
+    """Return sentences that describe the method of the benchmark and its figures."""
     return [
         f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
         f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
@@ -154,7 +154,7 @@ def read_result(path: Path) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        A file, which may be compressed (``.gz``), or a folder that contains ``result.json``.
+        A result file, which may be compressed (``.gz``), or a folder that contains ``result.json``.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 
 def check_gaps(result: Mapping[str, Any], path: Path) -> None:
-    """Raise InputError if the gaps of a result are not those of its costs.
+    """Raise InputError if the gaps of a result do not follow from its costs.
 
     Parameters
     ----------
@@ -243,12 +243,12 @@ def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None
 
 
 def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
-    """Return the results of the built-in controllers, without those that other results replace.
+    """Return the results of the built-in controllers, except for those that other results replace.
 
     Parameters
     ----------
     others : sequence of Mapping
-        Results. A built-in result of the same controller, gains and source is left out.
+        Results that replace built-in results with the same controller, gains and source.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Running the benchmark: a sweep for each track, then one small file of results."""
+"""Running the benchmark: a sweep for each track, and a small file with all results."""
 
 import json
 from collections.abc import Iterator
@@ -40,31 +40,31 @@ def run_benchmark(
 ) -> dict[str, Any] | None:
     """Run the benchmark, and write its result to ``result.json``.
 
-    Runs that an earlier call finished are reused.
+    Runs that were finished by an earlier call are reused.
 
     Parameters
     ----------
     controller : RatedController
     selection : Selection
     out : Path
-        Folder of the runs and the result. It is created if it does not exist.
+        Folder for the runs and the result, which is created if it does not exist.
     stop : Interruption
     workers : int, optional
-        Maximum number of processes, by default one for each processor.
+        Maximum number of processes; by default one per processor.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers execute the runs.
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
 
     Returns
     -------
     dict or None
-        The result, None if the benchmark was interrupted.
+        The result; None if the benchmark was interrupted.
 
     Raises
     ------
     InputError
-        If the folder contains something else than a benchmark.
+        If the folder contains anything other than a benchmark.
     ParameterError
         If the controller, a track or a map is unknown.
     """
@@ -86,7 +86,7 @@ def run_benchmark(
 
 
 def _describe_result(entry: dict[str, Any], selection: Selection) -> dict[str, Any]:
-    """Return a result without its rows, for the description of a controller."""
+    """Return a result without rows, given the description of the controller."""
     return {
         **RESULT_FORMAT,
         "suite": identify_suite(),
@@ -118,7 +118,7 @@ def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
 
 
 def _write_result(path: Path, result: dict[str, Any], rows: list[Row]) -> None:
-    """Write a result with one line for each run."""
+    """Write a result as JSON with one line per run."""
     head = json.dumps(result, indent=1).removesuffix("\n}")
     lines = ",\n".join(json.dumps(row, allow_nan=False) for row in rows)
     with replace_file(path) as part:

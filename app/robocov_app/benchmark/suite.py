@@ -1,7 +1,7 @@
-"""The frozen suite, version 1: its maps by families, its tracks, and the reference placements of its file.
+"""The frozen suite, version 1: its maps by family, its tracks, and the reference placements in its file.
 
-The file ``suite-v1.json`` contains the SHA-256 of every map, so that a changed generator is noticed, and the
-best placements that were found for it. Robots start at the first start of a map, drawn by seed.
+The file ``suite-v1.json`` contains the SHA-256 of every map, so that changes of a generator are noticed, and
+the best known placements on the map. Robots start from the first start of a map, at positions drawn by seed.
 """
 
 import hashlib
@@ -24,11 +24,11 @@ from robocov_app.sweep.study import Study, StudyMap
 VERSION = "v1"
 SUITE_FILE = Path(__file__).parent / f"suite-{VERSION}.json"
 LATTICE = 128
-"""Sites along a side of the lattice for all costs and reference placements."""
+"""Number of sites along a side of the lattice for all costs and reference placements."""
 ROBOT_RADIUS_M = 0.1
 TEAM_SIZE = 6
 _FIRST_SEED = 7001
-"""Seed of the first map of a kind. The seeds of the tuning maps start at 1."""
+"""Seed of the first map of each kind; the seeds of tuning maps start at 1."""
 MIN_NEW_SEED = 1_000_000
 """Minimum seed of maps that are not part of the suite."""
 _COST_RATE_HZ = 2.0
@@ -68,7 +68,7 @@ OTHER_FAMILIES: Mapping[str, tuple[str, ...]] = {
     "large": tuple(f"large-{name}" for kind in _LARGE_KINDS for name in _list_names(kind, 2)),
     "tuning": tuple(name for kind in _GENERATED_FAMILIES for name in _list_names(kind, 2, first_seed=1)),
 }
-"""Maps of the other tracks by family. Those of tuning serve to choose gains and do not count."""
+"""Maps of the other tracks by family; the tuning maps are for choosing gains and do not count."""
 FAMILY_OF = {name: family for family, names in {**FAMILIES, **OTHER_FAMILIES}.items() for name in names}
 """The family of each map of the suite."""
 _CORE_MAPS = tuple(name for names in FAMILIES.values() for name in names[:3])
@@ -78,12 +78,12 @@ _CORE_MAPS = tuple(name for names in FAMILIES.values() for name in names[:3])
 class Track:
     """A set of runs, defined by its differences from the ideal track.
 
-    On the ideal track six robots communicate without any limit, and nothing goes wrong.
+    On the ideal track six robots communicate without limits, and nothing goes wrong.
 
     Parameters
     ----------
     summary : str
-        The difference in a few words.
+        Short description of the difference.
     maps : tuple of str
     seeds : tuple of int
         Seeds of the starts.
@@ -106,7 +106,7 @@ class Track:
 
     @property
     def survivors(self) -> int:
-        """Number of robots that still work at the end."""
+        """Number of robots that are still working at the end."""
         return self.robots - len(self.failures)
 
 
@@ -129,10 +129,10 @@ TRACKS: Mapping[str, Track] = {
     "one-robot": Track("one robot", robots=1),
     "tuning": Track("as ideal, for choosing gains: no result", OTHER_FAMILIES["tuning"]),
 }
-"""All tracks by name. Those in `RATED_TRACKS` count."""
+"""All tracks by name, of which only `RATED_TRACKS` count."""
 RATED_TRACKS = tuple(name for name in TRACKS if name != "tuning")
 QUICK_TRACKS = ("ideal", "short-range")
-"""Tracks of ``--quick``, each with the first map of each family and the first seed."""
+"""Tracks of ``--quick``, with the first map of each family and the first seed."""
 
 
 def format_heading(track: str) -> str:
@@ -152,7 +152,7 @@ def build_map(name: str) -> Environment:
     Returns
     -------
     Environment
-        The map. It may differ from the frozen one, see `load_suite_map`.
+        The map, which may differ from the frozen one; see `load_suite_map`.
 
     Raises
     ------
@@ -175,19 +175,19 @@ def build_map(name: str) -> Environment:
 
 
 def compute_map_hash(environment: Environment) -> str:
-    """Return the SHA-256 of a map's content, without the version of its file format."""
+    """Return the SHA-256 of the content of a map, apart from the version of the file format."""
     document = {**to_json(environment), "$schema": None}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 @cache
 def load_frozen_maps() -> Mapping[str, Mapping[str, Any]]:
-    """Return the entries of the suite's file by map: its ``sha256`` and its ``references`` by team size."""
+    """Return the entry of each map in the suite's file: ``sha256``, and ``references`` by team size."""
     return dict(json.loads(SUITE_FILE.read_text(encoding="utf-8"))["maps"])
 
 
 def load_suite_map(name: str) -> Environment:
-    """Return a map of the suite that is identical to the frozen one.
+    """Build a map of the suite, and check that it is identical to the frozen one.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def load_suite_map(name: str) -> Environment:
     ParameterError
         If the suite has no such map.
     InputError
-        If its hash differs from the frozen one.
+        If the hash of the map differs from the frozen one.
     """
     environment = build_map(name)
     frozen_maps = load_frozen_maps()
@@ -220,21 +220,21 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
     Parameters
     ----------
     tracks : sequence of str
-        Names of tracks. None: all that count, or with `quick` those in `QUICK_TRACKS`.
+        Names of tracks. If empty, `RATED_TRACKS` or, with `quick`, `QUICK_TRACKS`.
     maps : sequence of str
-        Names of maps. None: all maps of each track.
+        Names of maps. If empty, all maps of each track.
     quick : bool
-        If no maps are given, use the first map of each family only.
+        If no maps are given, whether to use only the first map of each family.
 
     Returns
     -------
     dict
-        Maps by track. Tracks without any map are left out.
+        Maps by track; tracks without maps are left out.
 
     Raises
     ------
     ParameterError
-        If a track or map is unknown, or no track has any of the maps.
+        If a track or map is unknown, or if none of the maps is on any of the tracks.
     """
     for name in tracks:
         if name not in TRACKS:
@@ -273,7 +273,7 @@ def build_study(
     seeds: Sequence[int],
     folder: Path,
 ) -> Study:
-    """Build the sweep of one controller on one track.
+    """Build the sweep of a controller on maps, under the conditions of a track.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def build_study(
         Gains that differ from the defaults, by controller.
     seeds : sequence of int
     folder : Path
-        Folder that a relative path of the controller's file starts from.
+        Folder to which a relative path of the controller's file refers.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def build_study(
         **track.changes,
     }
     if track.failures:
-        # Study files count robots from 1.
+        # The conditions of a study count robots from 1.
         failures = [f"{robot + 1}@{time:g}" for robot, time in track.failures]
         options["conditions"] = {"fail": " ".join(failures)}
     return Study(tuple(maps), (controller,), gains, seeds=seeds, folder=folder, **options)

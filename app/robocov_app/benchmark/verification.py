@@ -1,6 +1,6 @@
 """Verifying a result of the benchmark: runs are repeated, robots are isolated, and new maps are tried.
 
-All choices are made from a seed that the verifier draws, so that nobody can prepare for them.
+All choices follow from a seed that the verifier draws, so that nobody can prepare for them.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ MAX_SEED = 2**63 - 1
 RunKey: TypeAlias = tuple[str, str, int]
 """Track, map and seed of a run."""
 NEW_MAP = "new map"
-"""Stands for the track in the keys of runs on new maps."""
+"""Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
-"""The probability to miss changed rows is given for one row, and for this fraction of all rows."""
+"""The probability of missing changed rows is reported for one row, and for this fraction of all rows."""
 _MACHINE_DEPENDENT = ("deciding_s",)
-"""Figures that differ from run to run, and are not compared."""
+"""Figures that differ from run to run and are not compared."""
 _DESCRIBED = ("label", "information", "gains")
-"""Parts of an entry that describe its controller."""
+"""Parts of an entry that describe its controller and are compared."""
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 _SAMPLE_STREAM = 0
@@ -70,11 +70,11 @@ class VerificationOptions:
     robots : int
         Number of robots to isolate in each run.
     new_maps : int
-        Number of maps to draw.
+        Number of new maps to draw.
     seed : int or None
-        Seed of all choices; by default it is drawn.
+        Seed of all choices; by default a random one.
     workers : int
-        Maximum number of processes at a time.
+        Maximum number of processes at the same time.
     """
 
     sample: int = 10
@@ -86,16 +86,16 @@ class VerificationOptions:
 
 @dataclass(frozen=True)
 class RunCheck:
-    """A repeated run, and what its robots do without the knowledge of others.
+    """The check of a run: the run is repeated, and so are the decisions of some robots in isolation.
 
     Attributes
     ----------
     outcome : Outcome or None
-        None if its process ended.
+        Outcome of the repeated run; None if its process ended.
     robots : int
-        Number of isolated robots, or of teams in processes of their own.
+        Number of isolated robots, or of teams in separate processes.
     differences : list of str
-        Everything that is not as it should be, apart from the figures of the run.
+        Everything that is not as expected, apart from the figures of the run.
     """
 
     outcome: Outcome | None
@@ -105,7 +105,7 @@ class RunCheck:
 
 @dataclass
 class Verification:
-    """What a verification found.
+    """The findings of a verification.
 
     Attributes
     ----------
@@ -116,15 +116,15 @@ class Verification:
     runs : int
         Number of runs of the suite that were repeated.
     robots : int
-        Number of robots whose decisions were repeated in processes of their own.
+        Number of robots whose decisions were repeated in separate processes.
     teams : int
         Number of runs in which a process received the observations of the whole team instead.
     new_maps : int
         Number of new maps that were tried.
     comparison : NewMapComparison or None
-        Comparison of new maps with the suite.
+        Comparison of gaps on new maps with those on the suite.
     differences : list of str
-        Everything that is not as it should be.
+        Everything that is not as expected.
     """
 
     seed: int
@@ -145,7 +145,7 @@ class Verification:
         is_new : bool
             Whether the run was on a new map.
         is_joint : bool
-            Whether a process received the observations of the whole team.
+            Whether a single process received the observations of the whole team.
         """
         if is_new:
             self.new_maps += 1
@@ -174,7 +174,7 @@ class Verification:
         return math.comb(self.rows - changed, self.runs) / math.comb(self.rows, self.runs)
 
     def describe(self) -> list[str]:
-        """Return what was checked, in sentences."""
+        """Return sentences on what was checked."""
         lines = [
             f"{self.runs} of {format_count(self.rows, 'run')} repeated. {self._describe_missing()}",
             *self._describe_isolation(),
@@ -185,7 +185,7 @@ class Verification:
         return lines
 
     def _describe_missing(self) -> str:
-        """Return the probabilities to miss changed rows as text."""
+        """Return a sentence with the probabilities of missing changed rows."""
         many = max(1, round(CHANGED_FRACTION * self.rows))
         one_missed = self.compute_miss_probability(1)
         text = f"One changed row passes with a probability of {one_missed:.1%}"
@@ -194,7 +194,7 @@ class Verification:
         return f"{text}."
 
     def _describe_isolation(self) -> Iterator[str]:
-        """Yield which robots were isolated."""
+        """Yield sentences on the robots and teams whose decisions were repeated."""
         if self.robots:
             robots = format_count(self.robots, "robot")
             yield f"{robots} repeated in processes that receive only the observations of one robot."
@@ -206,7 +206,7 @@ class Verification:
             )
 
     def _describe_new_maps(self, comparison: NewMapComparison) -> str:
-        """Return the comparison with new maps as a sentence."""
+        """Return a sentence on the comparison with new maps."""
         text = (
             f"{format_count(self.new_maps, 'new map')}: median gap {comparison.new_gap:.1%}, on the maps of "
             f"the same families in the suite {comparison.suite_gap:.1%}, p = {comparison.p_value:.2g}"
@@ -224,27 +224,27 @@ def verify_result(
     quiet: bool = False,
     stop: Interruption,
 ) -> Verification:
-    """Verify a result.
+    """Verify a result of the benchmark.
 
     1. The gaps of all rows are recomputed, and missing rows are found.
     2. A sample of the runs is repeated, and must give the same figures, bit for bit.
-    3. In these runs, the decisions of some robots are repeated in processes of their own, which receive only
-       the observations of one robot (`robocov_app.benchmark.isolation`).
-    4. The controller runs on new maps; it must not be clearly worse there than on the maps of the suite
+    3. In these runs, the decisions of some robots are repeated in separate processes, each of which receives
+       only the observations of one robot (`robocov_app.benchmark.isolation`).
+    4. The controller runs on new maps, where it must not be clearly worse than on the maps of the suite
        (`robocov_app.benchmark.new_maps`).
 
-    No code that a result refers to is executed: the controller of a user has to be named, and its source code
-    must have the digest of the result.
+    The verification executes no code to which a result refers: a controller in a file must be given by the
+    caller, and the hash of its source code must be that in the result.
 
     Parameters
     ----------
     path : Path
-        A result, or a folder that contains one.
+        A result file, or a folder that contains one.
     controller : str, optional
-        The controller as ``FILE.py:CLASS``, if it is a user's.
+        The controller as ``FILE.py:CLASS``, if it is in a file of the user.
     options : VerificationOptions, optional
     quiet : bool
-        Show no progress.
+        Whether to show no progress.
     stop : Interruption
 
     Returns
@@ -254,7 +254,7 @@ def verify_result(
     Raises
     ------
     InputError
-        If the result cannot be read, or the controller is not the one that was rated.
+        If the result cannot be read, or the controller is not the rated one.
     OutputError
         If a process of the verification fails.
     """
@@ -301,7 +301,7 @@ def verify_result(
 
 
 def reads_shared_maps(controller: str) -> bool:
-    """Return whether a controller reads the maps of other robots without messages.
+    """Return whether a controller reads the maps of other robots directly, without messages.
 
     Parameters
     ----------
@@ -311,7 +311,7 @@ def reads_shared_maps(controller: str) -> bool:
     Returns
     -------
     bool
-        False for a user's controller, whose robots have to send messages.
+        False for controllers of users, whose robots have to send messages.
     """
     return controller in CONTROLLERS and get_information(CONTROLLERS[controller]) == "shared map"
 
@@ -321,7 +321,7 @@ def _create_generator(seed: int, *stream: int) -> np.random.Generator:
 
 
 def _find_controller(result: Mapping[str, Any], path: Path, controller: str | None) -> RatedController:
-    """Return the controller of a result; raise InputError if it is a user's and was not named."""
+    """Return the controller of a result; raise InputError if it is in a file that was not given."""
     entry = result["entry"]
     name = controller or entry["controller"]
     if entry["source_sha256"] and controller is None:
@@ -337,7 +337,7 @@ def _get_selection(result: Mapping[str, Any]) -> Selection:
 def _describe_controller(
     rated: RatedController, studies: Mapping[str, Study], result: Mapping[str, Any], path: Path
 ) -> dict[str, Any]:
-    """Return the description of a controller, after checking that it is the rated one."""
+    """Return the description of a controller; raise InputError if its source is not the rated one."""
     description = rated.describe(next(iter(studies.values())))
     if description["source_sha256"] != result["entry"]["source_sha256"]:
         raise InputError(
@@ -347,7 +347,7 @@ def _describe_controller(
 
 
 def _compare_descriptions(entry: Mapping[str, Any], description: Mapping[str, Any]) -> list[str]:
-    """List the differences between the entry of a result and its controller."""
+    """List the differences between the entry of a result and the description of its controller."""
     return [
         f"entry: {name}: expected {description[name]}, got {entry[name]}"
         for name in _DESCRIBED
@@ -356,7 +356,7 @@ def _compare_descriptions(entry: Mapping[str, Any], description: Mapping[str, An
 
 
 def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
-    """Return the tasks of the sweeps of all tracks."""
+    """Return the tasks of all sweeps by track, map and seed."""
     tasks = {}
     for track, study in studies.items():
         for task in generate_tasks(study):
@@ -367,7 +367,7 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
 def _draw_maps(
     rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
 ) -> list[NewMap]:
-    """Draw new maps of the families of a result. The oracle knows no best placement for them."""
+    """Draw new maps of the families in a result; none for the oracle, which needs their best placements."""
     if rated.controller == ORACLE or TRACK not in studies:
         return []
     families = dict.fromkeys(suite.FAMILY_OF[study_map.name] for study_map in studies[TRACK].maps)
@@ -375,7 +375,7 @@ def _draw_maps(
 
 
 def _index_new_tasks(rated: RatedController, new_maps: Sequence[NewMap]) -> dict[RunKey, Task]:
-    """Return the tasks of the runs on new maps."""
+    """Return the tasks of the runs on new maps by their keys."""
     tasks = {}
     for new_map in new_maps:
         study = rated.build_study(TRACK, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed])
@@ -384,14 +384,14 @@ def _index_new_tasks(rated: RatedController, new_maps: Sequence[NewMap]) -> dict
 
 
 class _RunChecker:
-    """Repeats runs, and isolates some of their robots.
+    """Repeats runs, and the decisions of some of their robots in isolation.
 
     Parameters
     ----------
     information : Information
         The information that the controller declares.
     is_joint : bool
-        Whether robots are not isolated.
+        Whether a process receives the observations of the whole team, instead of one robot.
     robots : int
         Number of robots that are isolated in each run.
     seed : int
@@ -406,7 +406,7 @@ class _RunChecker:
         self._seed = seed
 
     def check(self, key: RunKey, task: Task) -> tuple[RunKey, RunCheck]:
-        """Repeat a run and isolate its robots; return its key and the check. Called in threads."""
+        """Repeat a run and isolate some robots; return the key and the check. Called in several threads."""
         run = self.processes.ask(task)
         if not isinstance(run, ObservedRun):
             return key, RunCheck(None, 0, ["its process ended"])
@@ -419,7 +419,7 @@ class _RunChecker:
         return key, RunCheck(run.outcome, len(robots), differences)
 
     def _choose_robots(self, task: Task) -> list[int | None]:
-        """Return the numbers of the robots to isolate; None stands for the whole team."""
+        """Return the rows of the robots to isolate; None stands for the whole team."""
         if not self._robots:
             return []
         if self.is_joint:
@@ -431,7 +431,7 @@ class _RunChecker:
         return _create_generator(self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16))
 
     def _isolate(self, task: Task, run: ObservedRun, robot: int | None) -> list[str]:
-        """Repeat the decisions of a robot, and list the differences."""
+        """Repeat the decisions of a robot in a new process, and list the differences."""
         replay = build_replay(task, run.transcript, self._information, robot, self._create_generator(task))
         answer = self.processes.ask(replay)
         if not isinstance(answer, ReplayAnswer):
@@ -446,7 +446,7 @@ class _RunChecker:
 def _check_runs(
     checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, stop: Interruption
 ) -> Iterator[tuple[RunKey, RunCheck]]:
-    """Yield the checks of runs as they are finished, until all are there or `stop` is requested."""
+    """Check runs in parallel; yield each check when it is finished, until the user interrupts."""
     if not tasks:
         return
     pool = ThreadPoolExecutor(min(workers, len(tasks)))
@@ -463,7 +463,7 @@ def _check_runs(
 
 
 def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
-    """List the differences of a run: to its row, and those of its robots."""
+    """List everything that is not as expected in a run: its figures, and the decisions of its robots."""
     differences = [f"{_format_key(key)}: {difference}" for difference in check.differences]
     if row is not None and check.outcome is not None:
         effort = check.outcome.files.get(EFFORT_FILE, b"{}")
@@ -477,7 +477,11 @@ def _compute_new_gaps(
     workers: int,
     stop: Interruption,
 ) -> list[tuple[str, float]]:
-    """Search the best placements for new maps; return the family and the gap of each run."""
+    """Search for the best placements on new maps; return the family and the gap of each run.
+
+    A run that failed or left an area uncovered has an infinite gap. Maps whose search was interrupted are
+    left out.
+    """
     robots = suite.TRACKS[TRACK].survivors
     queries = {
         new_map.name: ReferenceQuery(
@@ -506,7 +510,7 @@ def _compute_new_gaps(
 
 
 def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
-    """Return a difference if a controller is clearly worse on new maps."""
+    """Return a message if the controller is clearly worse on new maps, otherwise an empty list."""
     if comparison is None or not comparison.is_worse:
         return []
     return [
@@ -518,7 +522,7 @@ def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
 def _compare_without_running(
     result: Mapping[str, Any], rows: Mapping[RunKey, Row], tasks: Mapping[RunKey, Task]
 ) -> Iterator[str]:
-    """Yield the differences of versions, of the selection of runs, and of the gaps."""
+    """Yield the differences that are found without running anything: versions, selected runs and gaps."""
     versions = describe_version_differences(result["versions"])
     if versions:
         yield f"made with {versions}"
@@ -536,7 +540,7 @@ def _compare_without_running(
 
 
 def _sample_runs(keys: Iterable[RunKey], sample: int, rng: np.random.Generator) -> list[RunKey]:
-    """Return a random sample of runs in their sorted order."""
+    """Return a random sample of runs, in sorted order."""
     ordered = sorted(keys)
     chosen = rng.permutation(len(ordered))[:sample].tolist()
     return [ordered[k] for k in sorted(chosen)]
@@ -548,6 +552,7 @@ def _format_key(key: RunKey) -> str:
 
 
 def _list_differences(key: RunKey, row: Row, recomputed: Mapping[str, Any]) -> list[str]:
+    """List the figures of a row that differ from recomputed ones."""
     return [
         f"{_format_key(key)}: {name}: expected {value}, got {row.get(name)}"
         for name, value in recomputed.items()

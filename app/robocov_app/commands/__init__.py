@@ -1,10 +1,10 @@
-"""The subcommands of `robocov`: parse, call, print. The work is done elsewhere."""
+"""The subcommands of `robocov`. They parse options, call other packages, and print the answers."""
 
 from typing import NamedTuple
 
 
 class Subcommand(NamedTuple):
-    """A subcommand, in a module with its options `Arguments` and a function `command`.
+    """A subcommand, which is a module with the options `Arguments` and a function `command`.
 
     Attributes
     ----------
@@ -13,7 +13,7 @@ class Subcommand(NamedTuple):
     summary : str
         One line for the list of commands.
     uses_kernels : bool
-        Whether it calls compiled kernels, see `robocov.compiled`.
+        Whether the command calls compiled kernels, see `robocov.compiled`.
     """
 
     module: str

@@ -79,7 +79,7 @@ class Arguments(FigureOptions):
 
 def command(options: Arguments) -> None:
     """Run `robocov bench`."""
-    # These variables are read when numpy is loaded, which `report_compilation` does.
+    # Set these variables before numpy is loaded, which reads them. `report_compilation` loads it.
     for name in _THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     rows: list[Row] = []
@@ -101,7 +101,7 @@ def command(options: Arguments) -> None:
 
 
 def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], Sequence[Row]]]:
-    """Collect the measurements of a part, or of all.
+    """Collect the measurements of a part or of all parts.
 
     Raises
     ------
@@ -129,7 +129,10 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
 def _measure(
     cases: Sequence[Callable[[], Sequence[Row]]], rows: list[Row], *, quiet: bool
 ) -> KeyboardInterrupt | None:
-    """Append the results of the cases to the rows, and return the exception if the user interrupts them."""
+    """Append the results of the cases to `rows`; return the exception if the user interrupts them.
+
+    It is raised again after the results so far have been printed.
+    """
     try:
         with show_progress("measuring", len(cases), quiet=quiet) as update:
             for number, case in enumerate(cases, start=1):
@@ -141,7 +144,7 @@ def _measure(
 
 
 def _describe_machine() -> dict[str, Any]:
-    """Return the versions, the processor and the system, for programs."""
+    """Return the versions, the processor and the system, as JSON content."""
     return {
         "python": platform.python_version(),
         "system": platform.system(),
@@ -180,7 +183,7 @@ def _print_tables(rows: Sequence[Row]) -> None:
 
 
 def _format_measurement(row: Row) -> list[str]:
-    """Return the cells with the figures of a row."""
+    """Return the table cells with the figures of a measurement."""
     return [
         format_duration(row.seconds),
         format_duration(row.yardstick_seconds),
@@ -200,7 +203,7 @@ def _format_ratio(ratio: float | None) -> str:
 
 
 def format_goals(row: Row) -> str:
-    """Format the goals of a measurement, and whether they are missed.
+    """Format the goals of a measurement, followed by "missed" if they are not met.
 
     Parameters
     ----------
@@ -209,7 +212,7 @@ def format_goals(row: Row) -> str:
     Returns
     -------
     str
-        Empty without goals.
+        An empty text if there are no goals.
     """
     goals = []
     if row.goal is not None and row.ratio is not None:

@@ -75,6 +75,7 @@ class Arguments(JsonOption):
     """Page title."""
 
     def __post_init__(self) -> None:
+        """Check the ranges of the options, and that they apply to the action."""
         if self.workers is not None:
             require_number("--workers", self.workers, 1, 1024, whole=True)
         require_number("--sample", self.sample, 0, 1_000_000, whole=True)
@@ -88,7 +89,10 @@ class Arguments(JsonOption):
         self._check_paths()
 
     def _check_applicable_options(self) -> None:
-        """Reject the options that the action does not have."""
+        """Raise a ParameterError for an option that does not apply to the action.
+
+        An option counts as given if it differs from its default.
+        """
         for names in _OPTIONS_BY_ACTION.values():
             for name in names:
                 default = type(self).__dataclass_fields__[name].default
@@ -98,7 +102,7 @@ class Arguments(JsonOption):
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
 
     def _check_paths(self) -> None:
-        """Check the number of results."""
+        """Raise a ParameterError if the number of results does not fit the action."""
         paths = format_count(len(self.paths), "path")
         if self.action == "verify" and len(self.paths) != 1:
             raise ParameterError(f"DIR: expected one result of a benchmark, got {paths}")
@@ -119,6 +123,7 @@ def command(options: Arguments) -> int:
 
 
 def _run(options: Arguments) -> int:
+    """Run the benchmark for a controller, print its ratings, and return the exit status."""
     from robocov_app.benchmark.rated_controller import RatedController, Selection
     from robocov_app.benchmark.results import RESULT_FILE
     from robocov_app.benchmark.running import run_benchmark
@@ -180,7 +185,7 @@ def _print_suite(options: Arguments) -> int:
 
 
 def _verify(options: Arguments) -> int:
-    """Verify a result, and print the differences."""
+    """Verify a result, print the differences, and return the exit status."""
     from robocov_app.benchmark.verification import VerificationOptions, verify_result
     from robocov_app.sweep.local_pool import count_processors
 
@@ -242,7 +247,7 @@ def _write_page(options: Arguments) -> int:
 
 
 def _compute_references(options: Arguments) -> int:
-    """Compute missing references and bounds of the suite."""
+    """Compute the missing references and bounds of the suite, and return the exit status."""
     from robocov_app.benchmark import suite
     from robocov_app.benchmark.references import compute_references
     from robocov_app.sweep.local_pool import count_processors

@@ -24,7 +24,7 @@ _COLUMNS = {
     "clearance": "{min_clearance_m:z.3f} m",
     "path length": "{mean_path_length_m:.2f} m",
 }
-"""Titles of the table's columns, with the formats of their cells. The column of names has no title."""
+"""Titles of the table's columns, with the formats of their cells; the column of names has no title."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ def command(options: Arguments) -> int:
 
     names = options.controllers
     _check_names(names)
-    # Everything that the user entered is checked before a folder is created.
+    # Check all input before a folder is created.
     gains = select_gains(names, parse_gains(options.gains))
     environment = load_map(options.map)
     scenarios = {
@@ -76,7 +76,7 @@ def command(options: Arguments) -> int:
 
 
 def _check_names(names: Sequence[str]) -> None:
-    """Raise a ParameterError if there are no controllers, or duplicates."""
+    """Raise a ParameterError if no controllers are given, or if one is given twice."""
     if not names:
         raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
@@ -84,7 +84,7 @@ def _check_names(names: Sequence[str]) -> None:
 
 
 def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
-    """Print the table of a comparison."""
+    """Print the table of a comparison, with the mean time only if all runs have one."""
     columns = dict(_COLUMNS)
     if not all("mean_time_s" in row for row in rows):
         del columns["mean time"]

@@ -57,12 +57,12 @@ class Arguments:
 
 
 class _Completions(NamedTuple):
-    """Words that the shell completes after a command.
+    """Words that the shell offers after a command.
 
     Attributes
     ----------
     options : list of str
-        Names of options, as ``--robots``.
+        Names of options, such as ``--robots``.
     words : list of str
         Choices of positional arguments.
     takes_maps : bool
@@ -103,7 +103,7 @@ def _collect_completions(kind: type) -> _Completions:
 
 
 def _list_options(kind: Any) -> list[str]:
-    """List the options of a dataclass, and those of the groups in it."""
+    """List the options of a dataclass and of the option groups in it, including aliases."""
     groups = list_option_groups(kind)
     options = []
     for field in fields(kind):
@@ -120,7 +120,7 @@ def _is_positional(kind: Any, field: "Field[Any]") -> bool:
 
 
 def _name_option(kind: Any, field: "Field[Any]") -> str:
-    """Return the option of a field; a flag that is on by default is negated."""
+    """Return the option that sets a field; a flag that is on by default has the prefix ``--no-``."""
     name = field.name
     for annotation in _get_annotations(kind, field):
         name = getattr(annotation, "name", None) or name
@@ -129,7 +129,7 @@ def _name_option(kind: Any, field: "Field[Any]") -> str:
 
 
 def _get_annotations(kind: Any, field: "Field[Any]") -> tuple[Any, ...]:
-    """Return the annotations of a field for tyro."""
+    """Return the annotations of a field that tyro interprets."""
     hints = get_type_hints(kind, include_extras=True)
     annotations: tuple[Any, ...] = getattr(hints[field.name], "__metadata__", ())
     return annotations
@@ -148,7 +148,7 @@ def _write_bash_script(completions: Mapping[str, _Completions]) -> str:
 
 
 def _write_cases(words_by_command: Mapping[str, list[str]]) -> str:
-    """Return cases of bash that set the names to complete after each command."""
+    """Return the bash cases that set `names`, the words to offer, for each command that has some."""
     cases = []
     for name, words in words_by_command.items():
         if words:

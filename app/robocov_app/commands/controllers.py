@@ -53,7 +53,7 @@ def command(options: Arguments) -> None:
 
 
 def _print_controller(console: Console, row: dict[str, Any], gains: Iterable[Gain | Option]) -> None:
-    """Print a controller with the table of its gains."""
+    """Print the name and summary of a controller, and the table of its gains."""
     notes = ""
     if row["flagship"]:
         notes += "   (the paper's controller)"
@@ -73,7 +73,7 @@ def _print_controller(console: Console, row: dict[str, Any], gains: Iterable[Gai
 
 
 def _format_range(gain: Gain | Option) -> str:
-    """Return the values that a gain may have, as text."""
+    """Format the values that a gain may have."""
     if isinstance(gain, Option):
         return " | ".join(gain.choices)
     text = f"{gain.low:g} to {gain.high:g}"
@@ -83,7 +83,7 @@ def _format_range(gain: Gain | Option) -> str:
 
 
 def _build_gain_row(gain: Gain | Option) -> dict[str, Any]:
-    """Build the answer for programs about a gain."""
+    """Build the JSON content that describes a gain."""
     row: dict[str, Any] = {"name": gain.name, "default": gain.default, "unit": gain.unit}
     if isinstance(gain, Option):
         row["words"] = list(gain.choices)

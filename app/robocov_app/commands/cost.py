@@ -20,7 +20,7 @@ from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_dist
 from robocov_app.terminal.output import print_answer
 
 _MAX_COORDINATE_M = 1e300
-"""Coordinates are smaller than this, so that their squares and differences can be checked."""
+"""Limit of coordinates, which keeps computations with them finite."""
 
 
 @dataclass
@@ -83,7 +83,7 @@ def command(options: Arguments) -> None:
 def _save_sites(
     path: Path, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
 ) -> None:
-    """Write distances and owners of the sites to an npz file, by time if there are speeds."""
+    """Write distances and owners of the sites to an npz file; with speeds, those by travel time."""
     owning_result = timed_result or result
     arrays: dict[str, Any] = {
         "points": cost.points,
@@ -99,7 +99,7 @@ def _save_sites(
 def _build_answer(
     environment: Environment, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
 ) -> dict[str, Any]:
-    """Build the answer for programs."""
+    """Build the JSON content of the answer."""
     answer: dict[str, Any] = {"mean_distance_m": result.mean_distance}
     if timed_result is not None:
         answer["mean_time_s"] = timed_result.mean_time
@@ -115,7 +115,7 @@ def _build_answer(
 def _describe_result(
     environment: Environment, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
 ) -> list[str]:
-    """Return the costs as lines of text."""
+    """Return the costs as lines of text for people."""
     lines = [f"mean distance   {result.mean_distance:.4f} m"]
     if timed_result is not None:
         lines.append(f"mean time       {timed_result.mean_time:.4f} s")
@@ -129,7 +129,7 @@ def _describe_result(
 
 
 def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
-    """Build the speeds of the robots, (n,) m/s, from none, one for all, or one for each."""
+    """Build the speeds of the robots, (n,) m/s, from one value for all or one for each; None without any."""
     if not values:
         return None
     if len(values) not in (1, robots):
@@ -144,7 +144,7 @@ def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
 
 
 def _read_positions(path: Path) -> Array:
-    """Read positions, (n, 2) m, from a JSON file. Raises InputError with the index and the value."""
+    """Read positions, (n, 2) m, from a JSON file; raise InputError with the index of an invalid one."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:

@@ -70,7 +70,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
         self._check_headless_options()
 
     def _check_headless_options(self) -> None:
-        """Check that the options of frames and videos fit together."""
+        """Raise a ParameterError if options for frames and videos contradict each other."""
         if self.out is not None and self.frames is None:
             raise ParameterError("--out: nothing to write; requires --frames N")
         if self.frames is not None and self.out is None and self.video is None:
@@ -108,7 +108,7 @@ def command(options: Arguments) -> int:
 
 
 def _build_launcher(options: Arguments) -> ViewerLauncher:
-    """Load or build the session, and build the launcher of its window."""
+    """Load the session from a file, or build it from the options, and build the launcher of its window."""
     from robocov.controllers import list_controller_classes
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.files.session_file import SUFFIX
@@ -119,7 +119,7 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
         file = Path(options.map)
         session, map_name = _load_session(file, controllers, at_once=options.is_headless)
         if options.serve and not file.resolve().is_relative_to(options.folder.resolve()):
-            # The session is saved to another file, in the folder that may be written to.
+            # Visitors may only write to the folder, so the session is saved to a new file there.
             file = None
     else:
         session = build_session(options)
@@ -144,9 +144,9 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
 
 
 def _load_session(file: Path, controllers: tuple[str, ...], *, at_once: bool) -> tuple[Session, str]:
-    """Load a session, and return it with the name of its map.
+    """Load a session; return it and the name of its map.
 
-    Unless it is recomputed at once, the window does so while it is open already.
+    With `at_once`, it is recomputed completely; otherwise the window does this after it has opened.
     """
     from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
@@ -170,7 +170,7 @@ def build_session(options: Arguments) -> Session:
     Raises
     ------
     InputError
-        If the map or the team file cannot be used.
+        If the map or the team file is invalid.
     """
     from robocov.mapfile import load_map
     from robocov.team_files import read_team
@@ -215,7 +215,7 @@ def build_session(options: Arguments) -> Session:
 
 
 def _open_window(launcher: ViewerLauncher, options: Arguments) -> int:
-    """Show the window until it is closed."""
+    """Show the window until it is closed, and return the exit status."""
     from robocov_app.web import show
 
     with launcher.window() as window:
@@ -225,7 +225,7 @@ def _open_window(launcher: ViewerLauncher, options: Arguments) -> int:
 
 
 def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
-    """Start the lesson that the options name."""
+    """Start the lesson or the tour that the options ask for, if any."""
     if options.lesson is not None:
         window.lesson.start(options.lesson)
     elif options.tour:
@@ -233,7 +233,7 @@ def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
 
 
 def _render(launcher: ViewerLauncher, options: Arguments) -> int:
-    """Render the window to frames and a video, and return the exit status."""
+    """Render the window to frames, a video or both, and return the exit status."""
     from robocov.files.result_folder import create_result
     from robocov.files.writing import resolve_target
     from robocov_app.runs.encoding import find_encoder, save_frames_and_video
@@ -269,7 +269,10 @@ def _draw_frames(
     *,
     is_whole_tour: bool,
 ) -> Iterator[Frame]:
-    """Draw frames of the window, until the count, the end of the tour, or an interruption."""
+    """Draw frames of the window, until there are `count`, the tour is over, or the user interrupts.
+
+    `update` is called with the number of drawn frames.
+    """
     from robocov_app.viewer.launch import HEADLESS_FPS
     from robocov_app.viewer.window.screen_video import copy_pixels
 

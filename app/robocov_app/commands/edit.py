@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.ui.window import EditorWindow
 
 _SCREENSHOT_FRAMES = 3
-"""Number of frames after which the layout of a window no longer changes."""
+"""Number of frames until the layout of a window has settled."""
 _SCREENSHOT_FRAME_S = 0.2
 
 
@@ -98,7 +98,7 @@ def _find_path(name: str | None) -> Path | None:
     Raises
     ------
     MapError
-        If a foreign file does not exist; a map file need not.
+        If a foreign file does not exist; a map file need not exist yet.
     """
     from robocov.mapfile import find_map_file, list_bundled_maps
 
@@ -113,7 +113,7 @@ def _find_path(name: str | None) -> Path | None:
 
 
 def _save_screenshot(window: EditorWindow, path: Path, page: str) -> None:
-    """Draw the window with a page of its panel, and save it as PNG."""
+    """Draw the window with the given page of its panel, and save it as PNG."""
     from robocov.files.writing import replace_file
     from robocov_app.runs.encoding import encode_png
     from robocov_app.viewer.window.screen_video import copy_pixels

@@ -8,7 +8,7 @@ from robocov.errors import ParameterError, describe_unknown_name
 
 
 def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Select the gains of each controller.
+    """Distribute the gains of the option ``--set`` to the controllers.
 
     Parameters
     ----------
@@ -26,11 +26,11 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
     Raises
     ------
     ParameterError
-        If no controller has a gain, or a key names an unknown controller.
+        If none of the controllers has a gain, or if a key names an unknown controller.
     """
     known = {name: get_gains(load_controller_class(name)) for name in controllers}
     selected: list[dict[str, Any]] = [{} for _ in controllers]
-    # Keys of one controller come last, and overwrite those of all.
+    # Keys for a single controller (with a dot) come last, so that they overwrite those for all.
     for key, value in sorted(gains.items(), key=lambda item: "." in item[0]):
         owner, _, gain = key.rpartition(".")
         if owner and owner not in known:

@@ -15,9 +15,9 @@ from robocov.errors import InputError, OutputError, RobocovError
 from robocov_app.terminal.output import echo
 
 _BUNDLED_PAGES = Path(__file__).parents[1] / "pages"
-"""Pages that a wheel contains."""
+"""Folder of the built pages, which only wheels contain."""
 _REQUIRED_MODULES = ("sphinx", "furo", "myst_parser")
-"""Modules of the extra `robocov[docs]` that build the pages."""
+"""Modules that build the pages, from the extra `robocov[docs]`."""
 
 
 @dataclass
@@ -49,12 +49,12 @@ def command(options: Arguments) -> None:
 
 
 def _cache_pages() -> Path:
-    """Return the folder of the pages in the user's cache, and build them if they are out of date."""
+    """Return the folder of the pages in the user's cache; build them first if they are out of date."""
     from robocov.files.array_files import ArrayCache
 
     cache = ArrayCache.open_default()
     folder = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
-    # The key changes with every page and every module of the program.
+    # The key changes whenever a page or a module of the program changes.
     states = (f"{file} {file.stat().st_mtime_ns}" for file in _list_sources())
     pages = folder / ArrayCache.compute_key(*states)
     if not (pages / "index.html").is_file():
@@ -67,7 +67,7 @@ def _cache_pages() -> Path:
 
 
 def _list_sources() -> list[Path]:
-    """List the files from which the handbook is built, without the generated reference."""
+    """List the files from which the handbook is built, except for the generated reference."""
     import robocov
 
     pages = find_page_sources()
@@ -77,7 +77,7 @@ def _list_sources() -> list[Path]:
 
 
 def find_page_sources() -> Path:
-    """Find the folder of the handbook's pages as Markdown.
+    """Find the folder with the Markdown sources of the handbook.
 
     Returns
     -------
@@ -94,11 +94,11 @@ def _build_pages(folder: Path) -> None:
     Raises
     ------
     InputError
-        If the folder contains something.
+        If the folder is not empty.
     OutputError
-        If it cannot be written.
+        If the folder cannot be written.
     RobocovError
-        If Sphinx is not installed, or fails.
+        If Sphinx is not installed or fails.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; expected a new or an empty folder")
@@ -121,7 +121,7 @@ def _build_pages(folder: Path) -> None:
 
 def _run_sphinx(scratch: Path) -> Path:
     """Build the pages in a scratch folder, and return their folder."""
-    # Sphinx writes the reference next to the other pages, and packages may be read-only: it gets a copy.
+    # Sphinx writes the reference next to the other sources, which may be read-only, so it gets a copy.
     sources = scratch / "sources"
     pages = scratch / "pages"
     shutil.copytree(find_page_sources(), sources, ignore=shutil.ignore_patterns("reference", "__pycache__"))

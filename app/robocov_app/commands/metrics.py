@@ -31,7 +31,7 @@ _COLUMNS = {
     "to walls": ("wall_clearance_m", "{:z.3f} m"),
     "to robots": ("robot_clearance_m", "{:z.3f} m"),
 }
-"""Titles of the table's columns, with their keys and formats. Areas are fractions of the free area."""
+"""Titles of the table's columns, with their keys and formats; areas are printed relative to the free area."""
 
 
 @dataclass
@@ -94,7 +94,7 @@ def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:
 
 
 def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
-    """Build the answer for programs about one run."""
+    """Build the JSON content about a run."""
     from robocov.metrics.run_metrics import find_time_near_final
 
     record = saved.record
@@ -112,7 +112,7 @@ def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
 
 
 def _save_figure(options: Arguments, path: Path, measured_runs: list[MeasuredRun]) -> None:
-    """Draw the metrics of all runs against time."""
+    """Draw the metrics of all runs against time, and save the figure."""
     from robocov_app.figures.files import save_figure
     from robocov_app.figures.runs import plot_metrics
 
@@ -121,7 +121,7 @@ def _save_figure(options: Arguments, path: Path, measured_runs: list[MeasuredRun
 
 
 def _format_cells(row: dict[str, Any]) -> list[str]:
-    """Return the cells of the table about one run."""
+    """Return the table cells for a run."""
     cells = []
     for key, cell_format in _COLUMNS.values():
         value = row[key]

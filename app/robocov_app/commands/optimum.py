@@ -28,9 +28,9 @@ from robocov_app.terminal.output import check_output_file, print_answer
 from robocov_app.terminal.progress import show_late_progress
 
 _AGREEMENT_TOLERANCES = (0.001, 0.005, 0.02)
-"""Fractions of the best cost within which restarts count as agreeing with it."""
+"""Relative cost differences within which restarts count as agreeing with the best one."""
 _AREA_TOLERANCE_M2 = 1e-6
-"""Maximum difference of the uncovered areas of two placements that cover the same components."""
+"""Maximum difference between the uncovered areas of placements that cover the same components."""
 
 
 @dataclass
@@ -68,6 +68,7 @@ class Arguments(FigureOptions):
     """Relative tolerance of --bound; smaller is slower."""
 
     def __post_init__(self) -> None:
+        """Check that the options are in range and do not contradict each other."""
         if (self.map is None) == (self.run is None):
             raise InputError("MAP or --run DIR: expected one of the two")
         if self.run is not None:
@@ -84,7 +85,7 @@ class Arguments(FigureOptions):
         super().__post_init__()
 
     def _check_run_options(self) -> None:
-        """Reject the options whose values come from the run."""
+        """Raise an InputError if an option is given whose value comes from the run."""
         for name, value in (("--robots", self.robots), ("--radius", self.radius)):
             if value is not None:
                 raise InputError(f"{name}: cannot be combined with --run, which gives its value; got {value}")
@@ -92,7 +93,7 @@ class Arguments(FigureOptions):
 
 @dataclass
 class _Problem:
-    """Map and team whose best positions are searched for, with the runs that they come from."""
+    """The map and the team for which the best positions are searched, and the runs that they come from."""
 
     environment: Environment
     robots: int
@@ -170,7 +171,10 @@ def _prove_bound(options: Arguments, problem: _Problem, best: Optimum) -> LowerB
 
 
 def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> list[dict[str, Any]]:
-    """Compute the gap of each saved run to the best placement; None if it covers other components."""
+    """Compute the gap of each saved run to the best placement.
+
+    The gap is None if the run covers other components of the free space.
+    """
     if not problem.saved_runs:
         return []
     cost = build_cost(problem.environment, options.lattice, quiet=options.json)
@@ -188,7 +192,7 @@ def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> l
 
 
 def _save_positions(path: Path, positions: Array) -> None:
-    """Write positions, (n, 2) m, as JSON with one robot a line."""
+    """Write positions, (n, 2) m, as JSON with one robot per line."""
     rows = ",\n ".join(json.dumps(position) for position in positions.tolist())
     with replace_file(path) as temporary:
         temporary.write_text(f"[{rows}]\n", encoding="utf-8")
@@ -210,7 +214,7 @@ def _save_figure(options: Arguments, path: Path, problem: _Problem, best: Optimu
 def _build_answer(
     problem: _Problem, best: Optimum, bound: LowerBound | None, gaps: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Build the answer for programs."""
+    """Build the JSON content of the answer."""
     lower_bound = None
     if bound is not None:
         lower_bound = {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap}
@@ -248,7 +252,7 @@ def _describe_best(environment: Environment, best: Optimum, bound: LowerBound | 
 
 
 def _describe_search(best: Optimum, robots: int, seconds: float) -> list[str]:
-    """Return the results of the restarts as lines of text."""
+    """Return the agreement of the restarts, and the gain from descent, as lines of text."""
     restarts = len(best.costs)
     lines = [f"{format_count(robots, 'robot')}, {restarts} restarts in {seconds:.1f} s, of these"]
     for tolerance in _AGREEMENT_TOLERANCES:

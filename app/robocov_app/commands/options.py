@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.settings import OutputSettings, VideoSettings
 
 MAX_DEFAULT_RECORD_ROWS = 4e6
-"""Maximum number of recorded steps times robots if no rate is given: about 320 MB."""
+"""Maximum number of recorded steps times robots, about 320 MB, unless ``--record-hz`` is given."""
 _MIN_FIGURE_SIZE_PX = (320, 240)
 _MAX_FIGURE_SIZE_PX = (7680, 4320)
 
@@ -74,12 +74,12 @@ class LayerOptions:
     """Layers to hide, as in --hide cells centroids."""
 
     def read_layers(self) -> tuple[frozenset[str], frozenset[str]]:
-        """Return the layers that are shown in addition to the standard ones, and those that are hidden.
+        """Return the layers to show in addition to the standard ones, and the layers to hide.
 
         Raises
         ------
         ParameterError
-            If there is no layer of a name.
+            If a layer is unknown.
         """
         from robocov_app.render.layer_catalog import check_layer_names
 
@@ -157,24 +157,24 @@ class ConditionOptions:
     """Robots that join late, with their times, and positions if not their starts: --join 6@30:2.5,1."""
 
     def build_conditions(self, seed: int, robots: int) -> Conditions | None:
-        """Build the conditions of a team.
+        """Build the conditions for a team.
 
         Parameters
         ----------
         seed : int
-            Seed of the noise.
+            Seed of all random disturbances.
         robots : int
             Number of robots.
 
         Returns
         -------
         Conditions or None
-            None if they are ideal.
+            None if the conditions are ideal.
 
         Raises
         ------
         ParameterError
-            If an option cannot be used.
+            If an option is invalid.
         """
         if self == ConditionOptions():
             return None
@@ -225,25 +225,25 @@ class VideoOptions(LayerOptions):
         require_number("--film-speed", self.film_speed, 0.01, 1e4)
         self.parse_size()
         if self.video:
-            # Fail now rather than after the run.
+            # If there is no encoder, fail now rather than after the run.
             from robocov_app.runs.encoding import find_encoder
 
             find_encoder()
 
     def parse_size(self) -> tuple[int, int] | None:
-        """Return the width and height in pixels; None if they are not given.
+        """Return the width and height in pixels; None if ``--size`` is not given.
 
         Raises
         ------
         ParameterError
-            If the option is not a size, or out of range.
+            If the option is not a size, or the size is out of range.
         """
         if self.size is None:
             return None
         return parse_size("--size", self.size, _MIN_FIGURE_SIZE_PX, _MAX_FIGURE_SIZE_PX)
 
     def build_settings(self) -> VideoSettings:
-        """Build the settings of frames, videos and figures.
+        """Build the settings for frames, videos and figures.
 
         Returns
         -------
@@ -252,7 +252,7 @@ class VideoOptions(LayerOptions):
         Raises
         ------
         ParameterError
-            If an option cannot be used.
+            If an option is invalid.
         """
         from robocov_app.runs.settings import VideoSettings
 
@@ -338,7 +338,7 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     def _check_record_size(self) -> None:
         """Raise a ParameterError if the record would be too large."""
-        # Help must not load the physics.
+        # Imported here, because printing the help must not load the physics.
         from robocov.scenario import MAX_RECORD_ROWS
         from robocov.simulation import check_dt
 
@@ -354,21 +354,21 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     @property
     def record_every(self) -> int:
-        """Number of steps from one recorded step to the next."""
+        """Number of steps from one recorded step to the next; 1 if all steps are recorded."""
         if self.record_hz is None:
             rows = self.duration / self.dt * self.robots
             return math.ceil(max(rows / MAX_DEFAULT_RECORD_ROWS, 1.0))
         return max(round(1.0 / (self.record_hz * self.dt)), 1)
 
     def describe_record(self) -> str:
-        """Return a remark about a thinned record; empty if all steps are recorded."""
+        """Return a remark on steps that are not recorded; empty if all steps are recorded."""
         every = self.record_every
         if every == 1:
             return ""
         return f"; the record has one step in {every}, and its numbers are computed from these"
 
     def build_team(self) -> Team:
-        """Build the team.
+        """Build the team from the options and, if there is one, the team file.
 
         Returns
         -------
@@ -379,7 +379,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         ParameterError
             If an option is out of range.
         InputError
-            If the team file cannot be used.
+            If the team file is invalid.
         """
         from robocov.team import PARAMETERS, Team
         from robocov.team_files import read_team
@@ -410,7 +410,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         Raises
         ------
         InputError
-            If it cannot be run.
+            If the scenario is impossible.
         """
         from robocov.scenario import Scenario
 
@@ -429,7 +429,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         return scenario
 
     def build_output_settings(self) -> OutputSettings:
-        """Build the settings of the evaluation and of the files.
+        """Build the settings for the evaluation and for the output files.
 
         Returns
         -------
@@ -438,7 +438,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         Raises
         ------
         ParameterError
-            If an option cannot be used.
+            If an option is invalid.
         """
         from robocov_app.runs.settings import OutputSettings
 
@@ -453,7 +453,7 @@ class RunOptions(ScenarioOptions, JsonOption):
 
 
 def get_robot_count(team: Team, robots: int, default: int, path: Path) -> int:
-    """Return the number of robots in a team file.
+    """Return the number of robots in a team file, and check that ``--robots`` does not contradict it.
 
     Parameters
     ----------
@@ -471,7 +471,7 @@ def get_robot_count(team: Team, robots: int, default: int, path: Path) -> int:
     Raises
     ------
     ParameterError
-        If the option was given and differs.
+        If the option is given and differs from the file.
     """
     if robots not in (default, len(team)):
         raise ParameterError(f"--robots: expected {len(team)} as in {path}, got {robots}")

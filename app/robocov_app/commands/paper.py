@@ -62,7 +62,7 @@ class Arguments(JsonOption):
 
     @property
     def selection(self) -> list[str]:
-        """The options that were given to select parts of the study."""
+        """The given options that select parts of the study."""
         names = ("figures_only", "without_beyond", "beyond_only")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]
 
@@ -88,12 +88,12 @@ class _Outcome:
 
     @property
     def failed(self) -> int:
-        """Number of failed runs."""
+        """Number of failed runs in all parts."""
         return sum(results.failed for results in (self.paper, self.beyond) if results is not None)
 
     @property
     def runs(self) -> int:
-        """Number of runs."""
+        """Number of runs in all parts."""
         runs = self.figure_runs
         if self.paper is not None:
             runs = self.paper.runs
@@ -136,7 +136,7 @@ def command(options: Arguments) -> int:
 
 
 def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) -> str:
-    """Return the number of runs and the expected time as text."""
+    """Return the number of runs and the expected computing time as text."""
     from robocov_app.sweep.progress import format_duration
 
     if not expected.left:
@@ -155,12 +155,12 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
 
 
 def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:
-    """Do the selected parts of the study, and write their claims, figures and pages.
+    """Execute the selected parts of the study, and write their claims, figures and pages.
 
     Raises
     ------
     robocov_app.replication.execution.runner.StudyInterrupted
-        If the user stops the study.
+        If the user interrupts the study.
     """
     from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
     from robocov_app.replication.execution import parts
@@ -214,7 +214,7 @@ def _print_interruption(options: Arguments) -> int:
 
 
 def _print_outcome(options: Arguments, plan: Plan, outcome: _Outcome) -> None:
-    """Print the verdicts and the written files."""
+    """Print the verdicts, the names of the written files, and the number of failed runs."""
     if outcome.claims and not options.json:
         _print_claims(outcome.claims)
     pages = ["index.html"]
@@ -239,7 +239,7 @@ def _print_outcome(options: Arguments, plan: Plan, outcome: _Outcome) -> None:
 
 
 def _print_claims(claims: Sequence[Claim]) -> None:
-    """Print the table of verdicts."""
+    """Print the table of claims with their verdicts."""
     fold: dict[str, Any] = {"overflow": "fold"}
     rows = []
     for claim in claims:

@@ -81,6 +81,7 @@ def command(options: Arguments) -> int:
 
 
 def _replay(options: Arguments) -> int:
+    """Replay a session or saved runs, in the window or as a video, and return the exit status."""
     options.video.read_layers()
     path = options.run
     if (path / STORY_FILE).is_file():
@@ -96,7 +97,7 @@ def _replay(options: Arguments) -> int:
 
 
 def _replay_session(path: Path, options: Arguments) -> int:
-    """Open the window of a session, at its start."""
+    """Open a session in the window, playing from its start."""
     from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
 
@@ -110,7 +111,7 @@ def _replay_session(path: Path, options: Arguments) -> int:
 
 
 def _build_session(options: Arguments, saved_runs: Sequence[SavedRun]) -> Session:
-    """Build the session whose past is a saved run or comparison."""
+    """Build the session whose past is a saved run or comparison; check the controllers that may be loaded."""
     from robocov.controllers import load_controller_class
     from robocov_app.viewer.session.recorded import build_replay_session
 
@@ -155,7 +156,7 @@ def _open_window(options: Arguments, session: Session, file: Path | None = None)
 
 
 def _find_map_name(session: Session) -> str:
-    """Return the name of the bundled map that a session has, otherwise the map's own name."""
+    """Return the name of the bundled map in a session; for other maps, the title in the map."""
     from robocov.mapfile import list_bundled_maps, load_map
 
     for name in list_bundled_maps():
@@ -177,7 +178,7 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
     assert options.out is not None
     out = options.out
     for folder in (options.run, *(saved.folder for saved in saved_runs)):
-        # A run must not be replaced by its own video.
+        # Writing the video must not replace the run itself.
         if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
             raise InputError(f"--out: {out}: expected another folder than that of the run")
     runs = []
@@ -185,7 +186,7 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
     for saved in saved_runs:
         history = saved.history or CostHistory(*np.empty((4, 0)))
         runs.append(Run(saved.record, history, {}))
-        # Robots may have failed at other positions in each run. Distances refer to the map without them.
+        # Failed robots are obstacles, at different positions in each run. Common distances ignore them.
         environment = build_roster(saved.record).environment
         roster_runs.append(Run(replace(saved.record, environment=environment), history, {}))
     runs_on_one_map = None

@@ -62,16 +62,17 @@ def command(options: Arguments) -> None:
 
 
 def _choose_target(source: Path) -> Path:
-    """Return the default file of a page about a folder or a session."""
+    """Return the default file for the page about a folder or a session."""
     if source.suffix == _SESSION_SUFFIX:
         return source.with_suffix(".html")
     return source / REPORT_FILE
 
 
 def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
-    """Return the result folders at a path, each with its description.
+    """Return the result folders at a path, each with a description.
 
-    A session is simulated first, into the scratch folder. A branch has one folder for each of its parts.
+    If the path is a session, its branches are simulated first, into the scratch folder. A branch has one
+    result folder for each of its parts.
     """
     from robocov_app.viewer.branch_output.folders import list_part_folders
 
@@ -88,7 +89,7 @@ def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
 def _write_report(
     options: Arguments, sections: Sequence[tuple[Path, str]], target: Path, scratch: Path
 ) -> None:
-    """Gather the results, write the page, and print the answer."""
+    """Load the results, write the page, and print the answer."""
     from robocov_app.report.document import build_report
     from robocov_app.report.results.loading import load_result
 
@@ -99,7 +100,8 @@ def _write_report(
     results = _add_references(options, results)
     page = build_report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
-    # The report in the folder of a run is registered as one of its files, so that it is replaced with it.
+    # A report in the folder of a run is registered as a file of the run, so that it is replaced together
+    # with the run.
     run_folder = None
     if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
         run_folder = options.folders[0]
@@ -114,7 +116,7 @@ def _write_report(
 
 
 def _read_runs(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
-    """Read all runs, about 10 ms each, and return the results with unreadable runs marked as damaged."""
+    """Read all runs, about 10 ms each; return the results with unreadable runs marked as damaged."""
     readable_results = []
     for result in results:
         is_quiet = options.json or result.kind != "sweep"
@@ -142,7 +144,7 @@ def _check_damaged_runs(options: Arguments, results: Sequence[ReportedResult]) -
 
 
 def _add_references(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
-    """Return the results with the best placements, from the cache or by a search."""
+    """Return the results with the best placements, from the cache or, with ``--optimum``, by a search."""
     from robocov_app.report.results.references import add_references
 
     complete_results = []
@@ -155,7 +157,7 @@ def _add_references(options: Arguments, results: Sequence[ReportedResult]) -> li
 
 
 def _write_page(data: bytes, target: Path, run_folder: Path | None) -> None:
-    """Write the page; if it is in the folder of a run, as one of its files."""
+    """Write the page; if `run_folder` is given, as one of the files of this run."""
     with ExitStack() as stack:
         if run_folder is not None:
             result = stack.enter_context(extend_result(run_folder))
@@ -172,7 +174,7 @@ def _name_folder(folder: Path, scratch: Path) -> str:
 
 
 def _count_runs(result: ReportedResult, folder: str, shown: int) -> dict[str, Any]:
-    """Return the numbers of runs in a section of the page, for programs."""
+    """Return the numbers of runs in a section of the page, as JSON content."""
     return {
         "folder": folder,
         "kind": result.kind,
@@ -197,12 +199,12 @@ def _describe_result(result: ReportedResult, folder: str) -> str:
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
-    """Check, before any work is done, that a page may be written.
+    """Check that a page may be written, before any work is done.
 
     Parameters
     ----------
     target : Path
-        File of the page. An earlier report may be replaced in any case.
+        File for the page. An earlier report may always be replaced.
     overwrite : bool
         Whether a file that is not a report may be replaced.
 
@@ -211,7 +213,7 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     InputError
         If the file exists and may not be replaced.
     OutputError
-        If its folder does not exist.
+        If the folder of the file does not exist.
     """
     resolve_target(target)
     if not target.parent.is_dir():

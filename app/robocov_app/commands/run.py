@@ -52,7 +52,7 @@ def command(options: Arguments) -> int:
     from robocov_app.runs.artifacts import execute_run
     from robocov_app.runs.saved_runs import name_folders
 
-    # Everything that the user entered is checked before a folder is created.
+    # Check all input before a folder is created.
     scenario = options.build_scenario(load_map(options.map), options.controller, parse_gains(options.gains))
     settings = options.build_output_settings()
     out = options.out
@@ -122,7 +122,7 @@ def _print_branch(answer: dict[str, Any]) -> None:
 
 
 def save_branches(options: Arguments, interruption: Interruption) -> Iterator[dict[str, Any]]:
-    """Simulate the selected branches of a session, each into its own folder, and yield their results."""
+    """Simulate the selected branches of a session, save each in its own folder, and yield their results."""
     from robocov.errors import InputError
     from robocov.files.result_folder import create_result
     from robocov.files.result_names import SESSION_FILE
@@ -153,7 +153,7 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
 
 
 def _select_branches(session: SavedSession, options: Arguments) -> list[tuple[Node, int, str]]:
-    """Return the last node and step of each selected branch, and the suffix of its folder."""
+    """Return the last node and the last step of each selected branch, and the suffix for its folder name."""
     document = session.document
     if options.branch is not None:
         branch = document.find_branch(options.branch)

@@ -78,7 +78,7 @@ def command(options: Arguments) -> int:
 
 
 def _estimate(options: Arguments, study: Study, out: Path) -> None:
-    """Do one run of the study, and print an estimate for all."""
+    """Execute one run of the study, and print an estimate for all runs."""
     from robocov_app.sweep.estimate import estimate_sweep
 
     workers = _count_workers(options)
@@ -126,7 +126,7 @@ def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
 
 
 def _sweep(options: Arguments, study: Study, out: Path) -> int:
-    """Do the runs of the study, print their totals, and return the exit status."""
+    """Execute the runs of the study, print their totals, and return the exit status."""
     from robocov_app.sweep.sweeping import sweep
 
     totals = sweep(
@@ -179,7 +179,7 @@ def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
 
 
 def _describe_tables(out: Path) -> str:
-    """Return the paths of the written tables as a line of text."""
+    """Return a line of text with the paths of the written tables."""
     text = f"the table is {out / SWEEP_TABLE_FILE}"
     parquet = out / SWEEP_PARQUET_FILE
     if parquet.exists():

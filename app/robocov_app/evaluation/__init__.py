@@ -1,1 +1,1 @@
-"""Shared inputs of the benchmark and of the paper's replication: reference placements, random densities."""
+"""Inputs that the benchmark and the paper's replication share: reference placements and random densities."""

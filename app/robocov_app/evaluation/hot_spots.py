@@ -15,7 +15,7 @@ _CLEARANCE_M = 0.3
 
 
 def add_hot_spots(environment: Environment, seed: int) -> Environment:
-    """Return a copy of a map with a random density of Gaussian peaks over a constant floor.
+    """Return a copy of a map with a random density: Gaussian peaks on a constant floor.
 
     Parameters
     ----------
@@ -26,13 +26,13 @@ def add_hot_spots(environment: Environment, seed: int) -> Environment:
     Returns
     -------
     Environment
-        The map with its new density. Everything else is unchanged.
+        The map with the new density; everything else is unchanged.
     """
     start = replace(environment, starts={"uniform": UniformStart()}).start("uniform")
     centers = start.sample(HOT_SPOTS, seed=seed, radius=_CLEARANCE_M).tolist()
     peaks = []
     for x, y in centers:
-        # Whole centimeters are the same on every processor.
+        # Rounding makes the centers the same on every processor.
         center = (round(x, 2), round(y, 2))
         peaks.append(Gaussian(center, weight=PEAK_WEIGHT, sigma=PEAK_SIGMA_M))
     return replace(environment, density=Gaussians(tuple(peaks), floor=_FLOOR))

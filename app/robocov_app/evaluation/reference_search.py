@@ -1,7 +1,7 @@
 """Searches for the best placement on a map, in separate processes.
 
-A reference placement is the best result of many descents with the whole map known. With its mean distance
-J_ref, the gap of a controller is J / J_ref - 1.
+A reference placement is the best result of many descents with the whole map known. If J_ref is its mean
+distance and J that of a controller, the gap of the controller is J / J_ref - 1.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.terminal.interruption import Interruption
 
 REFERENCE_FORMAT = "robocov-reference 1"
-"""Beginning of the text that is hashed. Change it whenever the search gives other results."""
+"""Beginning of the hashed text. Change it whenever the search gives other results."""
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 
@@ -37,9 +37,9 @@ class ReferenceQuery:
     radius : float
         Radius of a robot, m.
     lattice : int
-        Sites along a side of the lattice on which the cost is computed.
+        Number of sites along a side of the lattice on which the cost is computed.
     restarts : int
-        Number of descents; the best one is used.
+        Number of descents, of which the best one is used.
     seed : int
     """
 
@@ -52,7 +52,7 @@ class ReferenceQuery:
 
     @property
     def input_hash(self) -> str:
-        """Hash of all inputs. The starts of the map are ignored: the placement does not depend on them."""
+        """Hash of all inputs, except for the starts of the map, on which the placement does not depend."""
         inputs = {**asdict(self), "document": {**self.document, "starts": None}}
         text = f"{REFERENCE_FORMAT}{json.dumps(inputs, sort_keys=True)}"
         return hashlib.sha256(text.encode()).hexdigest()
@@ -65,11 +65,11 @@ class ReferencePlacement:
     Parameters
     ----------
     mean_distance : float
-        Its coverage cost, m.
+        Coverage cost of the placement, m.
     positions : tuple of (x, y)
         One position for each robot, m.
     agreement : float
-        Fraction of the restarts whose cost is within 0.5 % of the best.
+        Fraction of the descents whose cost is within 0.5 % of the best.
     """
 
     mean_distance: float
@@ -105,7 +105,7 @@ def answer_queries(
     stop: Interruption,
     service: str = f"{__name__}:ReferenceSearch",
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the answers of a worker service as they arrive, until all are there or `stop` is requested.
+    """Yield the answers of a worker service in the order in which they arrive.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def answer_queries(
     workers : int
         Maximum number of processes.
     stop : Interruption
-        When it is requested, running searches are ended and their answers are lost.
+        When the user interrupts, running searches are ended, and their answers are lost.
     service : str
         The service as ``package.module:Class``.
 
@@ -151,7 +151,7 @@ def answer_queries(
             for future in done:
                 yield future.result()
     finally:
-        # A search takes seconds or minutes, for which the user should not wait after an interruption.
+        # Kill the processes, so that the user need not wait seconds or minutes for running searches.
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.kill()

@@ -1,7 +1,7 @@
-"""Study files in TOML, and their errors in one line.
+"""Study files in TOML, and one-line messages about their errors.
 
-The schema below says which values a key accepts. It is not a pydantic model, because a key accepts a value, a
-list of values or a table, and an error must describe the alternative that was meant.
+The schema below says which values a key accepts. It is not a pydantic model, because a key may accept a
+value, a list of values or a table, and the message must describe the alternative that the user meant.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ ALL_MAPS = "*"
 _ANY_KEY = "*"
 """Key of a table schema that matches all keys."""
 _LIST_KEYS = ("maps", "controllers", "robots", "starts")
-"""Keys that `Study` expects to be lists; a file may have a single value."""
+"""Keys for which `Study` expects a list, but a file may contain a single value."""
 
 _Converter: TypeAlias = Callable[[Any], Any]
-"""Returns a value in the type that is needed; raises ValueError if it has another one."""
+"""Converts a value to the required type; raises ValueError for values of other types."""
 
 
 class _ValueSchema(NamedTuple):
-    """A key that accepts a single value, a list of items, or a table; each may be None."""
+    """Schema of a key: a single value, a list of items or a table. Alternatives that are None are invalid."""
 
     expected: str
     """Description of the accepted values."""
@@ -43,7 +43,7 @@ class _ValueSchema(NamedTuple):
 
 
 class _TableSchema(NamedTuple):
-    """A table."""
+    """Schema of a table; `required` lists the keys that it must contain."""
 
     expected: str
     """Description of the table."""
@@ -52,7 +52,7 @@ class _TableSchema(NamedTuple):
 
 
 def _accept(*types: type, words: tuple[str, ...] = ()) -> _Converter:
-    """Return a converter that accepts values of some types, and some words.
+    """Return a converter that accepts values of given types, and given words.
 
     A bool does not count as an int. If float is accepted, numbers become floats.
     """
@@ -70,7 +70,7 @@ def _accept(*types: type, words: tuple[str, ...] = ()) -> _Converter:
 
 
 def _accept_list(expected: str, item: _ValueSchema) -> _ValueSchema:
-    """Return the schema of a value or a list of such values."""
+    """Return the schema of a single value or a list of such values."""
     return _ValueSchema(expected, item.convert, item)
 
 
@@ -134,7 +134,7 @@ class _SchemaReader:
     Attributes
     ----------
     unknown_keys : list of str
-        Messages about unknown keys. A misspelled key is also a missing one; naming it helps more.
+        Messages about unknown keys. They come first, because a misspelled key is also a missing one.
     other_mistakes : list of str
         All other messages.
     """
@@ -148,7 +148,7 @@ class _SchemaReader:
         return self.unknown_keys + self.other_mistakes
 
     def read(self, value: Any, schema: _ValueSchema | _TableSchema, path: JsonPath) -> Any:
-        """Return the converted value; None if it has a mistake."""
+        """Convert a value as its schema says; None, with a message in the lists, if it is invalid."""
         table = schema if isinstance(schema, _TableSchema) else schema.table
         if table is not None and isinstance(value, dict):
             return self._read_table(value, table, path)
@@ -164,6 +164,7 @@ class _SchemaReader:
         return None
 
     def _read_table(self, table: dict[str, Any], schema: _TableSchema, path: JsonPath) -> dict[str, Any]:
+        """Convert the values of a table by key, and note unknown and missing keys."""
         keys = schema.keys
         if _ANY_KEY in keys:
             keys = dict.fromkeys(table, keys[_ANY_KEY])
@@ -179,7 +180,7 @@ class _SchemaReader:
 
 
 def list_study_keys() -> dict[str, str]:
-    """Return the keys of study files and descriptions of their values; tables in tables have dotted keys."""
+    """Return a description of the value of each key of study files; keys of tables are dotted."""
     return dict(_list_keys(_STUDY, prefix=""))
 
 
@@ -208,8 +209,8 @@ def read_study(path: Path | str) -> Study:
     Raises
     ------
     InputError
-        If the file cannot be read or is invalid; the message has the file, the key, and the expected and
-        actual value.
+        If the file cannot be read or is invalid. The message names the file, the key, and the expected and
+        the actual value.
     """
     path = Path(path)
     where = to_one_line(path)
@@ -223,7 +224,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     ----------
     document : dict
     folder : Path
-        Folder of relative paths.
+        Folder to which relative paths refer.
     where : str
         Name of the file in messages.
 
@@ -251,7 +252,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
 
 
 def _convert_to_arguments(values: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Convert the values of a study file to arguments of `Study`."""
+    """Convert the values of a study file to arguments of `Study`; the keys of the table "team" are merged."""
     arguments = dict(values)
     seeds = arguments.get("seeds")
     if isinstance(seeds, int):
@@ -272,7 +273,7 @@ def _convert_to_arguments(values: dict[str, Any], folder: Path) -> dict[str, Any
 
 
 def _convert_ranges(gains: dict[str, Any]) -> dict[str, Any]:
-    """Convert the tables among the gains of a controller to ranges."""
+    """Convert gains of a controller that are tables to ranges, and leave the others unchanged."""
     converted = {}
     for name, value in gains.items():
         converted[name] = Range(**value) if isinstance(value, dict) else value

@@ -1,4 +1,4 @@
-"""The number of runs of a study, counted before anything is combined."""
+"""The number of runs of a study, which is computed before any combinations are built."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from robocov_app.sweep.gains import Gains
 from robocov_app.sweep.sampling import Range, Sampling
 
 DEFAULT_MAX_RUNS = 100_000
-"""Maximum number of runs, unless the study allows more. On ten cores they take some days."""
+"""Maximum number of runs, unless the study allows more; so many take some days on ten cores."""
 MAX_MAX_RUNS = 10_000_000
-"""Maximum number of runs that a study may allow, because they are listed in memory."""
+"""Upper limit for the maximum of a study, because the runs are listed in memory."""
 _MAX_LISTED_FACTORS = 5
 
 
@@ -26,7 +26,7 @@ def require_few_runs(
 ) -> None:
     """Raise ParameterError if a study has more than `max_runs` runs.
 
-    The combinations are only counted: a small file may define more of them than fit into memory.
+    The combinations are only counted, because a small file may define more than fit into memory.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def require_few_runs(
 
 
 def count_values(values: object) -> int:
-    """Return the number of values in a list, 1 for a single value."""
+    """Return the number of values in a list; 1 for a single value."""
     if isinstance(values, range):
-        # It may be too long for `len`. The negative signs round the quotient up.
+        # A range may be too long for `len`. The negative signs round the quotient up.
         return max(-(-(values.stop - values.start) // values.step), 0)
     if isinstance(values, Sequence) and not isinstance(values, str):
         return len(values)
@@ -62,7 +62,7 @@ def count_values(values: object) -> int:
 
 
 def _count_gains(specification: Any, sampling: Sampling | None) -> int:
-    """Return the number of sets of gains that are tried of a controller."""
+    """Return the number of sets of gains that a study tries for a controller."""
     if isinstance(specification, Gains):
         return len(specification.choices)
     if not isinstance(specification, Mapping):
@@ -80,7 +80,7 @@ def _count_gains(specification: Any, sampling: Sampling | None) -> int:
 
 
 def _format_number(count: int) -> str:
-    """Format a number, which may be too large for a float."""
+    """Format an integer, which may be too large for a float."""
     if count < 10**9:
         return str(count)
     if count < 10**300:

@@ -1,4 +1,4 @@
-"""A sweep: executes the tasks that are left, stores their results and writes the table."""
+"""A sweep: executes the remaining tasks, stores their results and writes the table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MAX_WORKERS = 1024
 _CHECK_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 _MAX_ERRORS = 3
-"""Maximum number of different errors of runs that are reported."""
+"""Maximum number of different run errors that are reported."""
 
 
 @dataclass
@@ -39,21 +39,21 @@ class Totals:
     Attributes
     ----------
     done : int
-        Number of runs that were done now.
+        Number of runs that were completed in this call.
     failed : int
-        Number of runs that have failed, now or earlier.
+        Number of runs that failed, in this call or earlier.
     reused : int
-        Number of runs that were done earlier.
+        Number of runs that were completed earlier.
     interrupted : bool
-        Whether runs are left.
+        Whether runs remain to be executed.
     errors : dict of str to str
-        The first different errors, by the name of a run.
+        The first different errors, by the name of a run with this error.
     damaged : list of str
         Names of runs whose folders were damaged.
     versions : dict of str to int
-        Number of runs by the versions that they were made with.
+        Number of runs by the versions with which they were executed.
     table_replaced : bool
-        Whether the table contains these runs. An interrupted sweep does not replace a longer table.
+        Whether the table contains these runs; an interrupted sweep does not replace a longer table.
     """
 
     done: int
@@ -81,17 +81,17 @@ def sweep(
 ) -> Totals:
     """Execute the remaining runs of a study, and write its table.
 
-    After any interruption, the same call resumes the sweep and ends with the same table, byte for byte.
+    After an interruption, the same call resumes the sweep, and the final table is the same, byte for byte.
 
     Parameters
     ----------
     study : Study
     folder : Path or str
-        Folder of the sweep; it is created.
+        Folder of the sweep; it is created if necessary.
     workers : int, optional
         Number of processes on this machine; by default one per processor.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers execute the runs instead.
+        Address of a Dask scheduler, whose workers execute the runs instead of local processes.
     retry_failed : bool
         Whether failed runs are repeated.
     keep_versions : bool
@@ -101,9 +101,9 @@ def sweep(
     quiet : bool
         Whether no progress is printed.
     title : str
-        Title of the progress.
+        Title of the progress display.
     stop : Interruption, optional
-        Requests the end; by default Ctrl-C does.
+        Tells when to stop; by default Ctrl-C does.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def sweep(
     Raises
     ------
     InputError
-        If the folder contains something else, or the scheduler cannot be reached.
+        If the folder contains anything other than a sweep, or the scheduler cannot be reached.
     OutputError
         If workers end repeatedly, or something cannot be written. Finished runs are kept.
     """
@@ -168,7 +168,10 @@ def _execute_remaining(
     progress: SweepProgress,
     interruption: Interruption,
 ) -> RobocovError | None:
-    """Execute the remaining tasks; return the error that ended them, because the finished runs get rows."""
+    """Execute the remaining tasks, and return the error that ended them, if any.
+
+    It is not raised here, because the rows of finished runs are still to be written.
+    """
     try:
         outcomes.rows.write()
         for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
@@ -201,7 +204,7 @@ def _compute_totals(progress: SweepProgress, survey: Survey, rows: _RowWriter, t
 
 
 def _require_same_versions(outcome: Outcome) -> None:
-    """Raise OutputError if a worker has other versions than this process."""
+    """Raise OutputError if a worker has different versions from this process."""
     differences = describe_version_differences(outcome.versions)
     if differences:
         raise OutputError(
@@ -222,13 +225,13 @@ def execute_tasks(
     ----------
     tasks : iterable of Task
     open_executor : callable
-        Returns the executor; it is not called if there is nothing to do.
+        Returns the executor; only called if there is a task.
     progress : SweepProgress
-        Updated.
+        Its numbers are updated.
     interruption : Interruption
-        Requests the end.
+        Tells when to stop.
     store : callable
-        Called with each task and its outcome, in the order in which they finish.
+        Called with each task and its outcome, in the order in which the tasks finish.
 
     Yields
     ------
@@ -248,7 +251,7 @@ def execute_tasks(
             progress.waiting_reason = executor.waiting_reason
             progress.lost_workers = executor.lost_workers
             if progress.waiting_reason and not progress.done + progress.failed:
-                # The wait for the first worker is not part of the duration of the runs.
+                # Waiting for the first worker does not count as computing time of the runs.
                 progress.start_time = time.perf_counter()
             if result is not None:
                 finished_task, outcome = result
@@ -261,16 +264,16 @@ def execute_tasks(
 
 
 class _RowWriter:
-    """Writes the rows of a table in the order of the tasks; they may finish in any order.
+    """Writes the rows of a table in the order of the tasks, which may finish in any order.
 
     Attributes
     ----------
     finished : set of str
-        Names of the tasks that have finished and have no row yet.
+        Names of the tasks that have finished but have no row yet.
     run_by_error : dict of str to str
-        The name of a run for each of the first different errors.
+        For each of the first different errors, the name of a run with this error.
     version_counts : Counter
-        Number of runs by the versions that they were made with.
+        Number of runs by the versions with which they were executed.
     """
 
     def __init__(self, ledger: Ledger, table: Table, tasks: Iterator[tuple[int, Task]]) -> None:
@@ -304,7 +307,7 @@ class _RowWriter:
         self._next = next(self._tasks, None)
 
     def _write_row(self, task: Task) -> bool:
-        """Write the row of a task; return False if the ledger has no entry of it."""
+        """Write the row of a task; return False if the ledger has no entry for it."""
         entry = self._ledger.read_entry(task)
         if entry is None:
             return False
@@ -325,7 +328,7 @@ class _OutcomeStore:
     ledger : Ledger
     rows : _RowWriter
     requires_same_versions : bool
-        Whether outcomes of other versions than those of this process are rejected.
+        Whether outcomes are rejected if their versions differ from those of this process.
     """
 
     def __init__(self, ledger: Ledger, rows: _RowWriter, *, requires_same_versions: bool) -> None:

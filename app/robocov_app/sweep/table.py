@@ -1,4 +1,4 @@
-"""The table of a sweep: ``results.csv``, which grows during a first sweep, and ``results.parquet``."""
+"""The table of a sweep: ``results.csv``, which grows during the first sweep, and ``results.parquet``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TEMPORARY_CSV_FILE = ".results.part.csv"
 _TEMPORARY_PARQUET_FILE = ".results.part.parquet"
 _TEMPORARY_STUDY_FILE = ".study.part.json"
 ROW_GROUP_SIZE = 4096
-"""Number of rows of a row group in Parquet, and maximum number of rows in memory."""
+"""Number of rows in a Parquet row group, and maximum number of rows in memory."""
 
 
 class Column(NamedTuple):
@@ -36,7 +36,7 @@ class Column(NamedTuple):
 
     name: str
     kind: str
-    """Name of its type in Parquet."""
+    """Name of the Parquet type."""
     unit: str
     meaning: str
 
@@ -72,13 +72,13 @@ _METRIC_COLUMNS = (
 )
 
 RESULT_COLUMNS = (*_FIGURE_COLUMNS, _MEAN_TIME_COLUMN, *_METRIC_COLUMNS)
-"""Columns of the results of a run; not every table has all of them."""
+"""Columns with results of a run; not every table has all of them."""
 
 
 def build_columns(study: Study) -> tuple[Column, ...]:
     """Return the columns of a study's table.
 
-    They include the gains of its controllers, and the parameters of robots and conditions that it varies.
+    They include the gains of the controllers, and the parameters of robots and conditions that are varied.
     """
     parameter_columns = []
     for name in study.varied_parameters:
@@ -102,7 +102,7 @@ def build_columns(study: Study) -> tuple[Column, ...]:
 
 
 def _build_gain_columns(study: Study) -> list[Column]:
-    """Return a column for each gain of the study's controllers."""
+    """Return a column for each gain of the study's controllers; gains of the same name share a column."""
     columns: dict[str, Column] = {}
     for controller in study.controllers:
         gains = get_gains(study.load_controller_class(controller))
@@ -110,13 +110,13 @@ def _build_gain_columns(study: Study) -> list[Column]:
             kind = "string" if isinstance(gains[name], Option) else "double"
             column = Column(get_gain_column(name), kind, gains[name].unit, gains[name].meaning)
             if columns.setdefault(name, column).kind != kind:
-                # A number of one controller and a word of another one can both be written as words.
+                # The gain is a number for one controller and a word for another; text suits both.
                 columns[name] = columns[name]._replace(kind="string")
     return list(columns.values())
 
 
 def get_gain_column(name: str) -> str:
-    """Return the name of the column of a gain: its own, unless another column has it."""
+    """Return the column name of a gain: its name, with a prefix if another column has the same name."""
     other_columns = (*_RUN_COLUMNS, _DURATION_COLUMN, *RESULT_COLUMNS, *_FINAL_COLUMNS)
     other_names = {column.name for column in other_columns}
     other_names |= {name_parameter_column(parameter) for parameter in UNITS}
@@ -126,7 +126,7 @@ def get_gain_column(name: str) -> str:
 
 
 def build_row(task: Task, entry: Entry) -> dict[str, Any]:
-    """Return the row of a task in the table, by the names of the columns."""
+    """Return the values of a task's row in the table, by the name of the column."""
     row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _RUN_COLUMNS}
     row |= {get_gain_column(name): value for name, value in task.gains.items()}
     row |= {name_parameter_column(name): value for name, value in task.team.items()}
@@ -140,10 +140,10 @@ def build_row(task: Task, entry: Entry) -> dict[str, Any]:
 class Table:
     """Writes the rows of a sweep in the order in which they are added; a context manager.
 
-    The files are written under temporary names. They replace earlier ones, together with ``study.json``, when
-    the context ends without an exception; if the table is not complete, only if it has no fewer rows. A first
-    ``results.csv`` appears once it is at least as long as the earlier one, and then grows. It never
-    ends in an incomplete row.
+    The files are written under temporary names. When the context ends without an exception, they replace
+    earlier ones, together with ``study.json``; an incomplete table only if it has at least as many rows. If
+    the earlier ``results.csv`` is incomplete or missing, the new one replaces it as soon as it is as long,
+    and then grows. It never ends in an incomplete row.
 
     Parameters
     ----------
@@ -153,14 +153,14 @@ class Table:
     study : bytes, optional
         Content of ``study.json``.
     parquet : bool
-        Whether a Parquet file is also written. One that exists is replaced in any case.
+        Whether to write a Parquet file as well. An existing one is replaced in any case.
 
     Attributes
     ----------
     is_complete : bool
-        Whether all rows were added; set by the caller before the end.
+        Whether all rows have been added; set by the caller before the context ends.
     is_replaced : bool
-        Whether the files contain these rows.
+        Whether the files under their final names contain these rows.
 
     Raises
     ------
@@ -186,7 +186,7 @@ class Table:
         if self._has_parquet:
             resolve_target(self._folder / SWEEP_PARQUET_FILE)
             import_optional("pyarrow", "parquet", f"{self._folder / SWEEP_PARQUET_FILE}: ")
-        # Before the end, an earlier table is only replaced by one that grows beyond it.
+        # A complete earlier table stays until the end; another one until the new table is as long.
         self._earlier_row_count = count_rows(self._folder)
         self._rows_until_shown = math.inf if has_all_rows(self._folder) else self._earlier_row_count
         with ExitStack() as stack:
@@ -194,7 +194,7 @@ class Table:
                 stack.callback((self._folder / name).unlink, missing_ok=True)
             with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
                 self._csv = (self._folder / _TEMPORARY_CSV_FILE).open("wb", buffering=0)
-            # Another file may be open by then.
+            # A lambda, because `self._csv` may be another file by then.
             stack.callback(lambda: self._csv.close())
             self._write_line(format_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
@@ -212,7 +212,7 @@ class Table:
             self.is_replaced = True
 
     def _replace_files(self) -> None:
-        """Replace the files of an earlier sweep by those of this one, in quick succession."""
+        """Replace the files of an earlier sweep, in quick succession, so that they match each other."""
         temporary_names = {}
         main_file = SWEEP_PARQUET_FILE if self._has_parquet else SWEEP_TABLE_FILE
         with _report_write_errors(self._folder / main_file):
@@ -244,12 +244,12 @@ class Table:
         Parameters
         ----------
         row : mapping
-            Values by the names of the columns; missing ones are null.
+            Values by the name of the column; missing values are null.
 
         Raises
         ------
         OutputError
-            If this row, or an earlier one, could not be written.
+            If this row or an earlier one could not be written.
         """
         if self._error is not None:
             raise self._error
@@ -260,7 +260,7 @@ class Table:
             raise
 
     def _write_line(self, line: str) -> None:
-        """Append a line to the CSV file, completely or not at all; show the file when it is long enough."""
+        """Append a complete line, or nothing, to the CSV file; rename the file once it is long enough."""
         remaining = memoryview(line.encode())
         new_size = self._size + len(remaining)
         with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
@@ -278,7 +278,7 @@ class Table:
 
     def _show(self) -> None:
         """Give the growing CSV file its final name."""
-        # Not every system can rename open files.
+        # Some systems cannot rename open files.
         self._csv.close()
         (self._folder / _TEMPORARY_CSV_FILE).replace(self._folder / SWEEP_TABLE_FILE)
         self._csv = (self._folder / SWEEP_TABLE_FILE).open("ab", buffering=0)
@@ -303,7 +303,7 @@ class Table:
 
 @contextmanager
 def _report_write_errors(path: Path) -> Iterator[None]:
-    """Raise OutputError if the system refuses to write a file."""
+    """Convert an OSError in the context to an OutputError about a file."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Tasks of a sweep: one run each, with everything that it needs."""
+"""Tasks of a sweep, each of which contains everything that one run needs."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from robocov_app.sweep.parameters import ParameterValue, build_conditions, build
 from robocov_app.sweep.study import Study
 
 MAX_CACHED_MAPS = 4
-"""Number of maps that a process keeps in memory. Tasks come map by map."""
+"""Number of maps that a process keeps in memory; a few are enough, since tasks are sorted by map."""
 _HASH_FORMAT = "robocov-task 1"
-"""Beginning of the text that is hashed. Results of other versions are distinguished by their versions."""
+"""Beginning of the hashed text. Versions of robocov are not hashed; outcomes contain them."""
 _MAX_NAME_CHARS = 24
-"""Maximum length of each name in the name of a folder."""
+"""Maximum length of each part of the name of a folder, apart from the hash."""
 _NAME_HASH_CHARS = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run. It can be executed on any machine, because it contains everything that the run needs.
+    """One run, which any machine can execute, because the task contains everything that it needs.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Task:
         The map as JSON.
     controller : str
     source : ControllerSource or None
-        Text of the controller, if it is in a file of the user.
+        Source text of the controller, if it is in a file of the user.
     gains : mapping of str to float, str or None
         A value for each gain.
     robots : int
@@ -54,13 +54,13 @@ class Task:
     duration, dt : float, s
         Simulated time and control period.
     lattice : int
-        The cost is computed on this number of sites along each side of the map.
+        Number of sites along each side of the map at which the cost is computed.
     cost_hz, record_hz : float, Hz
         Rates at which the cost is evaluated and the trajectories are saved.
     metrics : bool
-        Whether the metrics of `robocov.metrics.run_metrics` are also computed.
+        Whether the metrics of `robocov.metrics.run_metrics` are computed as well.
     input_hash : str
-        SHA-256 of all inputs. Tasks with the same hash have the same result.
+        SHA-256 of all inputs. Tasks with the same hash give the same result.
     """
 
     map: str
@@ -88,7 +88,7 @@ class Task:
         return "-".join([*parts, self.input_hash[:_NAME_HASH_CHARS]])
 
     def build_environment(self) -> Environment:
-        """Build the map. The maps of the latest tasks are kept in memory."""
+        """Build the map; the latest maps are kept in memory."""
         return parse_map(self.document, self.map)
 
     def build_scenario(self) -> Scenario:
@@ -101,7 +101,7 @@ class Task:
         Raises
         ------
         InputError
-            If the scenario is not possible, for example because the robots do not fit into the free space.
+            If the scenario is impossible, for example because the robots do not fit into the free space.
         """
         return Scenario(
             self.build_environment(),
@@ -119,7 +119,7 @@ class Task:
 
 @lru_cache(MAX_CACHED_MAPS)
 def parse_map(document: str, name: str) -> Environment:
-    """Parse the map of a task. The latest maps are kept in memory.
+    """Parse the map of a task; the latest maps are kept in memory.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class _TaskController(NamedTuple):
     source : ControllerSource or None
     gains : dict of str to float, str or None
     hashed_inputs : dict
-        Inputs that the hashes of its tasks depend on.
+        The part of the inputs of its tasks that depends on the controller, for their hashes.
     """
 
     name: str
@@ -169,7 +169,7 @@ def generate_tasks(study: Study) -> Iterator[Task]:
     Yields
     ------
     Task
-        In the order of the table: maps vary slowest, controllers and their gains fastest.
+        Tasks in the order of the table: maps vary slowest, controllers and their gains fastest.
     """
     settings: dict[str, Any] = {
         "duration": study.duration,
@@ -179,7 +179,7 @@ def generate_tasks(study: Study) -> Iterator[Task]:
         "record_hz": study.record_hz,
     }
     if study.metrics:
-        # The entry is left out otherwise, so that earlier tasks without metrics keep their hashes.
+        # Without metrics the entry is omitted, so that tasks from before it existed keep their hashes.
         settings["metrics"] = True
     controllers = _list_controllers(study)
     for study_map in study.maps:
@@ -212,7 +212,7 @@ def _list_controllers(study: Study) -> list[_TaskController]:
     controllers = []
     for name in study.controllers:
         source = study.sources.get(name)
-        # The text of a controller counts, not the path of its file.
+        # The hash depends on the source text of a controller, but not on the path of its file.
         hashed_source: dict[str, Any] = {"source": None, "path": None}
         if source is not None:
             hashed_source["source"] = _hash_text(source.text)

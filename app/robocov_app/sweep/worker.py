@@ -1,4 +1,4 @@
-"""Execution of one task: from the inputs of a run to its files and its row of the table."""
+"""Execution of one task: from the inputs of a run to its files and its row in the table."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 
 _COLLECTION_STEPS = 1000
-"""Steps of a long run between two garbage collections."""
+"""Number of steps between two garbage collections in a long run."""
 FIGURES = {
     "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
     "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
@@ -44,22 +44,22 @@ FIGURES = {
     "path_length_m": ("double", "m", "distance traveled, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
-"""Figures of a run in the table, in this order: kind of the column, unit and meaning."""
+"""Figures of a run in the table, in order, with the type of the column, the unit and the meaning."""
 MEAN_TIME = "mean_time_s"
-"""Further figure of runs in which some robots are faster than others."""
+"""Additional figure of runs in which robots differ in speed."""
 EFFORT_FILE = "effort.json"
-"""File of a run with metrics. It is not in the table, because computing times differ each time."""
+"""File with the effort of a run with metrics; not part of the table, since computing times vary."""
 POSITION_BYTES = 20
 """Size of a message with the number and the position of a robot."""
 CELL_BYTES = 5
-"""Size of a cell of a map with its number."""
+"""Size of the state and the index of a map cell."""
 REPORT_BYTES = 28
-"""Size of the position of a robot at some time."""
+"""Size of the number and the position of another robot, and the time of that position."""
 Watch: TypeAlias = Callable[[Snapshot], object]
 """Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
 _RESULTS_VERSION = 4
-"""Increased whenever the same inputs give other results. 4: noise and message loss are drawn with NumPy."""
+"""To be increased whenever the same inputs give other results. 4: noise and message loss use NumPy."""
 
 
 @cache
@@ -80,11 +80,11 @@ class Outcome:
     files : mapping of str to bytes
         Files in the folder of the run, by name.
     figures : mapping of str to float, int or None
-        Figures in the table; none if the run failed.
+        Figures in the table; empty if the run failed.
     error : str or None
-        Reason why the run failed.
+        Reason why the run failed; None if it did not.
     versions : mapping of str to str
-        Versions on which the results depend, by package.
+        Versions of the packages on which the results depend.
     """
 
     files: Mapping[str, bytes]
@@ -94,7 +94,7 @@ class Outcome:
 
 
 def perform(task: Task, watch: Watch | None = None) -> Outcome:
-    """Execute a task. Any error of the run is part of the outcome.
+    """Execute a task; errors of the run are not raised, but part of the outcome.
 
     Parameters
     ----------
@@ -106,8 +106,8 @@ def perform(task: Task, watch: Watch | None = None) -> Outcome:
     -------
     Outcome
     """
-    # The physics of pymunk is not made for several threads. Garbage of a run is collected here, because
-    # another thread would free bodies in the middle of the next run's steps.
+    # pymunk is not thread-safe, so only one run is executed at a time. Its garbage is collected here: an
+    # automatic collection in another thread could free bodies in the middle of the next run's steps.
     with _execution_lock:
         was_enabled = gc.isenabled()
         gc.disable()
@@ -117,18 +117,18 @@ def perform(task: Task, watch: Watch | None = None) -> Outcome:
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return build_failure(message, traceback.format_exc())
         finally:
-            # Objects that are older than the run are not its garbage.
+            # Generation 1 is enough, since the garbage of the run is young.
             gc.collect(1)
             if was_enabled:
                 gc.enable()
 
 
 def _perform(task: Task, watch: Watch | None) -> Outcome:
-    """Simulate and evaluate a run, and build its files."""
+    """Simulate and evaluate a run, and build its files; errors are raised."""
     cost = prepare_cost(task)
     record, effort = _simulate_and_measure(task, watch)
     history = compute_cost_history(record, cost, task.cost_hz)
-    # Figures are computed from all steps, of which the saved record contains only some.
+    # Figures are computed from all steps; the saved record contains only some of them.
     summary = replace_non_finite(summarize(record, history))
     figures = _select_figures(summary)
     files = _build_files(task, record, history, summary)
@@ -139,7 +139,7 @@ def _perform(task: Task, watch: Watch | None) -> Outcome:
 
 
 def _select_figures(summary: Mapping[str, Any]) -> dict[str, float | int | None]:
-    """Return the figures of the table from the summary of a run."""
+    """Select the figures for the table from the summary of a run; the path length is averaged over robots."""
     path_lengths = summary["path_length_m"]
     values = {**summary, "path_length_m": sum(path_lengths) / len(path_lengths)}
     return {name: values[name] for name in (*FIGURES, MEAN_TIME) if name in values}
@@ -164,12 +164,12 @@ def _build_files(
 
 
 class TaskService:
-    """Service of a process that executes the tasks of a `LocalPool`."""
+    """Worker service that executes the tasks of a `LocalPool`."""
 
     failure_message = "the run failed"
 
     def __call__(self, questions: list[Task], channel: Channel) -> Outcome:
-        """Execute the newest task."""
+        """Execute the latest task."""
         return perform(questions[-1])
 
 
@@ -179,14 +179,14 @@ def build_failure(message: str, details: str) -> Outcome:
     Parameters
     ----------
     message : str
-        Reason of the failure. It may contain anything, as controllers of the user write it.
+        Reason for the failure. It may contain any characters, because controllers of the user write it.
     details : str
         Traceback, or the last output of the process.
 
     Returns
     -------
     Outcome
-        Its error is a single line of valid characters.
+        Outcome whose error is a single line of valid characters.
     """
     line = " ".join(message.split()).encode(errors="replace").decode()
     error = line or "no reason was given"
@@ -200,14 +200,14 @@ def simulate(task: Task) -> Record:
     Raises
     ------
     RobocovError
-        If the run is not possible, or its controller fails.
+        If the run is impossible, or its controller fails.
     """
     record, _ = _simulate_and_measure(task)
     return record
 
 
 def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Record, dict[str, float | None]]:
-    """Simulate a run; return its record, and the content of ``effort.json``."""
+    """Simulate a run; return its record and the content of ``effort.json``."""
     scenario = task.build_scenario()
     with provide_modules({} if task.source is None else task.source.modules):
         simulation = scenario.build_simulation()
@@ -229,14 +229,14 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
 class CommunicationMeter:
     """Counts the bytes that robots send, whether they are received or not.
 
-    Each robot sends its position at the rate of the conditions, or in each control step. Robots that share
-    maps also send each cell of their map that has changed, even if another robot measured it, and with each
-    plan the known positions of others.
+    Each robot sends its position at the message rate of the conditions, by default in each control step.
+    Robots that share maps also send each changed cell of their map, even if another robot measured it, and,
+    whenever they plan, the positions of others that they know.
 
     Attributes
     ----------
     bytes : float or None
-        Number of bytes; None if the controller shares maps of another kind.
+        Number of bytes; None if the controller shares maps in a form that cannot be measured.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -274,7 +274,7 @@ class CommunicationMeter:
 
 
 def prepare_cost(task: Task) -> CoverageCost:
-    """Return the coverage cost of a task's map. The costs of the latest maps are kept in memory."""
+    """Return the coverage cost for the map of a task; those for the latest maps are kept in memory."""
     return _build_cost(task.document, task.map, task.lattice)
 
 

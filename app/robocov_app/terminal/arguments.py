@@ -1,4 +1,4 @@
-"""The words of a command line, parsed into options; mistakes are explained in one line."""
+"""Parsing the words of a command line into options; mistakes are explained in one line."""
 
 import contextlib
 import io
@@ -29,9 +29,9 @@ _FIRST_OPTIONS = (
     "start",
     "video",
 )
-"""The most used options, with which the help begins."""
+"""The most frequently used options, which come first in the help."""
 _LAST_OPTIONS = ("json", "overwrite")
-"""Options with which the help ends."""
+"""Options that come last in the help."""
 _NEGATIVE_NUMBER = re.compile(r"-\.?\d.*")
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
 _JSON_CONSTANTS = frozenset(("null", "true", "false", "NaN", "Infinity"))
@@ -39,7 +39,7 @@ _MIN_SIMILARITY = 0.8
 
 
 def _describe_choices(text: str) -> str:
-    """Return "a, b or c" for tyro's list of choices."""
+    """Return choices as "a, b or c", given tyro's list "'a', 'b', 'c'"."""
     choices = [choice.strip("'") for choice in text.split(", ")]
     if "None" in choices:
         choices = sorted(set(choices) - {"None"})
@@ -80,7 +80,7 @@ _EXPLANATIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
     (r"^Unrecognized options: ([^\s,]*).*$", r"unexpected argument \1"),
 )
-"""Messages of tyro, and the messages that are printed instead."""
+"""Patterns of tyro's messages, and the messages that are printed instead."""
 
 
 def parse_options(kind: type[T], command: str, words: list[str]) -> T:
@@ -93,7 +93,7 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
     command : str
         Name of the command.
     words : list of str
-        The words that follow it.
+        The words after the name of the command.
 
     Returns
     -------
@@ -103,9 +103,9 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
     Raises
     ------
     InputError
-        If the words cannot be used.
+        If the words are invalid.
     SystemExit
-        After the help was printed.
+        After the help has been printed.
     """
     words = merge_repeated_options(kind, words)
     complaint = io.StringIO()
@@ -121,7 +121,7 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
 
 
 def _add_suggestion(problem: str, kind: Any, command: str) -> str:
-    """Return a problem with a suggestion, if the user may have meant another option."""
+    """Return the message about a problem, with a suggestion if the user may have meant another option."""
     names = _list_option_names(kind)
     options = [f"--{name}" for name in names]
     match = re.match(r"unexpected argument (\S+)", problem)
@@ -138,6 +138,7 @@ def _add_suggestion(problem: str, kind: Any, command: str) -> str:
 
 
 def _explain_unexpected_argument(word: str, options: list[str]) -> str:
+    """Return the message about an unexpected word, with the option that may be missing before it."""
     text = f"unexpected argument {quote(word)}"
     if _is_controller(word):
         for option in options:
@@ -150,7 +151,7 @@ def _explain_unexpected_argument(word: str, options: list[str]) -> str:
 
 
 def _list_option_names(kind: Any) -> list[str]:
-    """Return the names of the options of a dataclass and its groups, as users write them."""
+    """Return the names of the options in a dataclass and its groups, with hyphens."""
     return [
         option.name.replace("_", "-")
         for group in (kind, *list_option_groups(kind))
@@ -176,12 +177,13 @@ def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
     Returns
     -------
     list of str
-        Words in which each such option occurs once: ``--skip a --skip b`` becomes ``--skip a b``. Otherwise
-        the last occurrence would silently replace the others.
+        Words in which each such option occurs once: ``--skip a --skip b`` becomes ``--skip a b``. Without
+        this, the last occurrence would silently replace the others.
     """
     names = _map_multiple_options(kind)
     merged: list[str] = []
     values_by_option: dict[str, list[str]] = {}
+    # The list to which values are appended: that of the current option, if its values are merged.
     current = merged
     for position, word in enumerate(words):
         if word == "--":
@@ -212,7 +214,7 @@ def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
 
 
 def _map_multiple_options(kind: Any) -> dict[str, str]:
-    """Return the options that take any number of values: full names by names and aliases."""
+    """Return the full names of the options that take any number of values, by full name and by alias."""
     names: dict[str, str] = {}
     for group in (kind, *list_option_groups(kind)):
         plain_hints = get_type_hints(group)
@@ -229,12 +231,15 @@ def _map_multiple_options(kind: Any) -> dict[str, str]:
 
 
 def _takes_many_values(hint: Any) -> bool:
-    """Return whether a type is a tuple of any length, or may be one."""
+    """Return whether a type is a tuple of any length, or a union with one."""
     return any(get_origin(part) is tuple and ... in get_args(part) for part in (hint, *get_args(hint)))
 
 
 def _arrange_help(kind: type[T]) -> type[T]:
-    """Put the most used options first in the help, and drop uninformative default values."""
+    """Put the most frequently used options first in the help, and omit default values that say nothing.
+
+    This changes the annotations and the field order of the dataclass, from which tyro builds the help.
+    """
     for group in (kind, *list_option_groups(kind)):
         owner: Any = group
         hints = get_type_hints(owner, include_extras=True)
@@ -249,13 +254,13 @@ def _arrange_help(kind: type[T]) -> type[T]:
 
 
 def _make_help_settings(option: Any) -> Any:
-    """Return tyro's settings of an option, with the aliases and the metavar in the metadata of its field."""
+    """Return tyro's settings for an option, including those in the metadata of its field, such as aliases."""
     settings = {} if option is None else dict(option.metadata)
     return tyro.conf.arg(help_behavior_hint=_format_default, **settings)
 
 
 def _format_default(label: str) -> str:
-    """Return the hint at a default value; empty for values such as None."""
+    """Return the hint about a default value in the help; empty for values such as None."""
     if label in ("", "None", "False"):
         return ""
     if "." in label:
@@ -265,12 +270,12 @@ def _format_default(label: str) -> str:
 
 
 def list_option_groups(kind: Any) -> list[Any]:
-    """Return the dataclasses of the groups of options in a dataclass of options."""
+    """Return the dataclasses of option groups that a dataclass of options contains."""
     return [option.default_factory for option in fields(kind) if is_dataclass(option.default_factory)]
 
 
 def name_option(kind: Any, message: str) -> str:
-    """Begin a message about a value with the option that gives it, instead of the parameter's name.
+    """Replace the name of a parameter at the start of a message by the option that sets it.
 
     Parameters
     ----------
@@ -295,7 +300,7 @@ def name_option(kind: Any, message: str) -> str:
 
 
 def summarize_complaint(text: str) -> str:
-    """Return tyro's complaint, which is printed in a box, as one line with its suggestion.
+    """Summarize tyro's complaint, which is printed in a box, in one line with its suggestion.
 
     Parameters
     ----------
@@ -320,7 +325,7 @@ def summarize_complaint(text: str) -> str:
 
 
 def _split_box(text: str) -> list[list[str]]:
-    """Return the lines of each paragraph in a box."""
+    """Return the lines of each paragraph of a text in a box drawn with line characters."""
     paragraphs: list[list[str]] = []
     for line in text.splitlines():
         content = line.strip("│| \t")
@@ -349,7 +354,7 @@ def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[
     Raises
     ------
     ParameterError
-        If the text is not a size, or out of range.
+        If the text is not a size, or the size is out of range.
     """
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
@@ -363,7 +368,7 @@ def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[
 
 
 def parse_window_size(text: str | None) -> tuple[int, int] | None:
-    """Parse the option ``--size`` of a window; None if it is not given. See `parse_size`."""
+    """Parse the value of ``--size`` for a window, see `parse_size`; None if the option is not given."""
     if text is None:
         return None
     return parse_size("--size", text, _MIN_WINDOW_SIZE_PX, _MAX_WINDOW_SIZE_PX)
@@ -375,11 +380,12 @@ def parse_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     Parameters
     ----------
     texts : tuple of str
-        Such as ``k_rep=0.3``. The value is JSON, ``null`` for no limit, or a word.
+        Texts such as ``k_rep=0.3``. Each value is JSON (``null`` means no limit) or a word.
 
     Returns
     -------
     dict
+        Values by the name of the gain.
 
     Raises
     ------
@@ -408,6 +414,6 @@ def _parse_gain_value(name: str, text: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        # Numbers of thousands of digits and deeply nested brackets also fail.
+        # ValueError also means thousands of digits, RecursionError deeply nested brackets.
         expected = "expected a number (or null), or a word"
         raise ParameterError(f"--set {name}: {expected}, got {quote(text)}") from error

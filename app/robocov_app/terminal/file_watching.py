@@ -1,4 +1,4 @@
-"""Watching files for changes, which editors write in different ways."""
+"""Watching files for changes, whichever way an editor writes them."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 POLLING_INTERVAL_S = 0.25
-"""Time between two checks of the files; one takes microseconds."""
+"""Time between two checks of the files; a check takes microseconds."""
 SETTLING_TIME_S = 0.1
-"""Time during which a file must not change: editors write in pieces, or remove and rename."""
+"""Time without changes after which a file counts as written; editors write in pieces, or rename files."""
 MAX_SETTLING_TIME_S = 2.0
-"""Time after which a file that keeps changing counts as changed."""
+"""Time after which a file is reported even if it keeps changing."""
 _State: TypeAlias = tuple[int, int, int, int] | None
 
 
@@ -23,7 +23,7 @@ def watch_files(
     ----------
     paths : sequence of Path
     sleep : callable
-        Waits for a number of seconds.
+        Called to wait for a number of seconds.
 
     Yields
     ------
@@ -42,7 +42,7 @@ def watch_files(
         for path, old, new, newest in zip(paths, known, first, settled, strict=True):
             if not old == new == newest:
                 changed.append(path)
-        # Writes from now on are reported as another change, even while the caller handles this one.
+        # Later writes are reported as another change, even if they happen while the caller handles this one.
         known = settled
         yield tuple(changed)
 

@@ -16,17 +16,17 @@ _received_signals: set[int] = set()
 
 
 def was_interrupted() -> bool:
-    """Return whether a `KeyboardInterrupt` was caused by Ctrl-C, not by a user's controller."""
+    """Return whether a `KeyboardInterrupt` was caused by Ctrl-C, and not raised by a user's controller."""
     return bool(_received_signals)
 
 
 @contextmanager
 def note_interrupts() -> Iterator[None]:
-    """Note Ctrl-C for `was_interrupted`, and raise `KeyboardInterrupt` as Python does."""
+    """Record Ctrl-C for `was_interrupted` within the context, and raise `KeyboardInterrupt` as usual."""
     _received_signals.clear()
     is_main_thread = threading.current_thread() is threading.main_thread()
     if not is_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        # Whether there will be a signal cannot be known here.
+        # Signals cannot be observed here, so any KeyboardInterrupt is attributed to Ctrl-C.
         _received_signals.add(signal.SIGINT)
         yield
         return
@@ -44,12 +44,12 @@ def note_interrupts() -> Iterator[None]:
 
 
 class Interruption:
-    """Context in which the first Ctrl-C or SIGTERM is only noted, and a second one ends the command.
+    """Context in which the first Ctrl-C or SIGTERM only sets a flag, and a second one ends the command.
 
     Attributes
     ----------
     requested : bool
-        Whether the loop should end.
+        Whether the user has asked to stop.
     """
 
     def __init__(self) -> None:
@@ -76,12 +76,15 @@ class Interruption:
 
 
 def block_interrupts() -> None:
-    """Block Ctrl-C while child processes start: a terminal sends it to all processes."""
+    """Block Ctrl-C while child processes are started, because a terminal sends it to all of them.
+
+    Children inherit the blocked signal.
+    """
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def unblock_interrupts() -> None:
-    """Let Ctrl-C arrive again after `block_interrupts`."""
+    """Undo `block_interrupts`."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 PIPED_TABLE_COLUMNS = 140
 """Width in characters of a table that is written to a file or a pipe."""
 BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
-"""Look of a column of `print_table`."""
+"""Look of a bold column of `print_table`."""
 RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
-"""Look of a column of `print_table`."""
+"""Look of a right-aligned column of `print_table`."""
 
 
 def echo(
     *texts: object, sep: str = " ", end: str = "\n", to_stderr: bool = False, flush: bool = False
 ) -> None:
-    """Print texts without the control characters that names and messages may contain.
+    """Print texts; control characters, which names and messages may contain, are escaped.
 
-    All output of the application is printed by this function or by `create_console`.
+    All output of the application goes through this function or through `create_console`.
 
     Parameters
     ----------
     *texts : object
     sep, end, flush
-        As of `print`.
+        As for `print`.
     to_stderr : bool
     """
     file = sys.stderr if to_stderr else sys.stdout
@@ -54,11 +54,11 @@ def print_answer(options: Any, answer: Any, *lines: str, indent: int | None = No
     Parameters
     ----------
     options : JsonOption
-        Whether a program reads the answer.
+        Options of the command; ``options.json`` says whether to print JSON.
     answer : object
-        JSON content for programs; numbers that are not finite become null.
+        Content of the JSON; numbers that are not finite become null.
     *lines : str
-        Text for people.
+        Lines that are printed otherwise.
     indent : int or None
         Indentation of the JSON content.
     """
@@ -79,7 +79,8 @@ def find_free_path(folder: Path, stem: str, suffix: str) -> Path:
     Returns
     -------
     Path
-        ``stem-1.suffix``, ``stem-2.suffix`` or so on. A number at the end of the stem is replaced.
+        The first free one of ``stem-1.suffix``, ``stem-2.suffix`` and so on. A number at the end of the given
+        stem is replaced.
     """
     stem = stem.rstrip("0123456789").rstrip("-") or stem
     paths = (folder / f"{stem}-{number}{suffix}" for number in count(1))
@@ -97,13 +98,13 @@ def check_output_file(
     path : Path
         The file.
     alternative : str
-        Suggested alternative in the message, such as ``another --out``.
+        Alternative that the message suggests, such as ``another --out``.
     overwrite : bool
         Whether an existing file may be replaced.
     source : Path or None
-        File that the command reads, which is never replaced.
+        File that the command reads, which must never be replaced.
     source_kind : str
-        Kind of the source, for the message.
+        What the source is, for the message.
 
     Raises
     ------
@@ -124,13 +125,13 @@ def list_files(folder: Path) -> str:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a JSON file, completely or not at all.
+    """Write a JSON file atomically.
 
     Parameters
     ----------
     path : Path
     content : object
-        Its numbers are finite.
+        Content whose numbers are all finite.
 
     Raises
     ------
@@ -142,12 +143,12 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def format_json(content: Any) -> str:
-    """Return the text of a JSON file with finite numbers."""
+    """Format the text of a JSON file; numbers must be finite."""
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV file, completely or not at all.
+    """Write a CSV file atomically.
 
     Parameters
     ----------
@@ -174,8 +175,8 @@ def format_csv(header: str, rows: Iterable[Iterable[object]]) -> str:
     header : str
         First line.
     rows : iterable of iterable of object
-        Numbers keep all their digits, None is an empty cell, and texts are quoted so that no spreadsheet
-        takes them for formulas.
+        Numbers keep all digits, None becomes an empty cell, and texts are quoted such that spreadsheets do
+        not interpret them as formulas.
 
     Returns
     -------
@@ -185,15 +186,15 @@ def format_csv(header: str, rows: Iterable[Iterable[object]]) -> str:
 
 
 def format_csv_line(cells: Iterable[object]) -> str:
-    """Format one row of `format_csv`."""
+    """Format one row of a CSV file, see `format_csv`."""
     text = io.StringIO()
-    # The writer quotes only those line breaks that also end its own lines.
+    # The writer only quotes the characters of its own line ending, so it must contain both line breaks.
     csv.writer(text, lineterminator="\r\n").writerow(map(quote_cell, cells))
     return text.getvalue().removesuffix("\r\n") + "\n"
 
 
 def replace_non_finite(content: Any) -> Any:
-    """Return JSON content with None in place of every number that is not finite, which JSON cannot express.
+    """Replace numbers that are not finite, which JSON cannot express, by None.
 
     Examples
     --------
@@ -210,18 +211,18 @@ def replace_non_finite(content: Any) -> Any:
 
 
 def create_console() -> Console:
-    """Create the console of tables, on standard output.
+    """Create a console for tables on standard output.
 
     Returns
     -------
     rich.console.Console
-        It does not interpret brackets in names as markup. Texts that are printed are safe to display; cells
-        of tables have to be passed through `escape_controls`, as `print_table` does.
+        A console that does not interpret brackets in names as markup, and escapes control characters in
+        printed texts. Table cells have to be passed through `escape_controls`, as `print_table` does.
     """
     from rich.console import Console
 
     class SafeConsole(Console):
-        """A console that prints no control characters."""
+        """A console that escapes control characters in texts."""
 
         def print(self, *objects: Any, **options: Any) -> None:
             """Print objects; control characters in texts are escaped."""
@@ -240,7 +241,7 @@ def print_table(
     Parameters
     ----------
     columns : iterable of (str, mapping)
-        Title of each column, and its look: arguments of `rich.table.Table.add_column`.
+        Title of each column, and its look as arguments of `rich.table.Table.add_column`.
     rows : iterable of iterable of str
     title : str or None
     """

@@ -1,4 +1,4 @@
-"""Progress of long work on standard error: a bar in a terminal, one plain line elsewhere."""
+"""Progress of long tasks on standard error: a bar in a terminal, otherwise one plain line at the end."""
 
 import sys
 import time
@@ -10,12 +10,12 @@ from robocov.text import escape_controls
 from robocov_app.terminal.output import echo
 
 PATIENCE_S = 1.0
-"""Time after which `show_late_progress` shows something."""
+"""Elapsed time after which `show_late_progress` starts to show progress."""
 
 
 @contextmanager
 def show_progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show the progress of some work.
+    """Show the progress of a task that consists of steps.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def show_progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Ca
 
 @contextmanager
 def show_late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
-    """Show the progress of some work once it takes more than `PATIENCE_S`.
+    """Show the progress of a task once it has taken more than `PATIENCE_S`.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def show_late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[
 
 
 def make_counter(update: Callable[[int], None]) -> Callable[[], None]:
-    """Make a function that counts its calls and reports the count.
+    """Return a function that counts its calls and reports the count.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def make_counter(update: Callable[[int], None]) -> Callable[[], None]:
 
 @contextmanager
 def report_compilation() -> Iterator[None]:
-    """Print a line when the first kernel is compiled, which makes the first command slow."""
+    """Print a line when a kernel is compiled within the context, which makes the first command slow."""
     from robocov.compiled import notify_compilation
 
     has_reported = False

@@ -12,7 +12,7 @@ _LABELS = {"stdout": "standard output", "stderr": "standard error"}
 
 
 class StandardStreams:
-    """Standard output and standard error at the start, with duplicated descriptors to restore them."""
+    """The initial standard output and standard error, with duplicated descriptors for restoring them."""
 
     def __init__(self) -> None:
         self._streams: dict[str, IO[str]] = {}
@@ -29,11 +29,11 @@ class StandardStreams:
         self._duplicates.clear()
 
     def list_closed_streams(self) -> list[str]:
-        """Return the labels of the closed streams, as "standard output"."""
+        """Return the labels of the closed streams, such as "standard output"."""
         return [_LABELS[name] for name in self._streams if self._is_closed(name)]
 
     def restore(self) -> list[str]:
-        """Restore closed and replaced streams.
+        """Restore streams that were closed or replaced.
 
         Returns
         -------
@@ -63,5 +63,5 @@ class StandardStreams:
 
 
 def _open_stream(descriptor: int) -> IO[str]:
-    """Open a stream on a descriptor, until the process ends."""
+    """Open a text stream on a descriptor, which stays open until the process ends."""
     return open(descriptor, "w", encoding="utf-8", errors="replace", closefd=False)

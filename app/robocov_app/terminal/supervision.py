@@ -1,11 +1,11 @@
-"""A process that supervises a command which runs a user's controllers.
+"""Supervision of commands that run a user's controllers, by a second process.
 
-`os._exit`, a signal or a crash of the interpreter end a process without a message, and the process cannot
-catch them: its status could be 0 although nothing was done. A command that names controllers of the user
-therefore runs in a second process, which is started before anything large is imported, while the first one
-only waits; this costs some hundredths of a second. The second process sends its status through a pipe when it
-ends properly. Without that message, the first process names the controllers and ends with status 1. All other
-commands run in the first process.
+`os._exit`, a signal or a crash of the interpreter end a process without a message and cannot be caught: the
+exit status could be 0 although the command did nothing. Therefore a command that names controllers of the
+user runs in a second process, which is started before any large import, while the first one only waits. This
+takes some hundredths of a second. The second process sends its status through a pipe when it ends properly.
+Without that message, the first process names the controllers and ends with status 1. All other commands run
+in the first process.
 
 Where descriptors cannot be inherited (Windows), such commands are not supervised.
 """
@@ -55,12 +55,12 @@ def find_own_controllers(words: Sequence[str]) -> list[str]:
 
 
 def can_supervise() -> bool:
-    """Return whether this process may run the command in another one: it is not such a process itself."""
+    """Return whether this process can supervise the command: it must not be supervised itself."""
     return os.name == "posix" and _DESCRIPTOR_VARIABLE not in os.environ
 
 
 def supervise(controllers: Sequence[str]) -> tuple[int, str]:
-    """Run this command again in a process of its own and wait for it.
+    """Run this command again in a second process, and wait for it.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
     Returns
     -------
     status : int
-        The exit status of the command, 1 if it did not end properly.
+        The exit status of the command; 1 if it did not end properly.
     complaint : str
-        The reason for its end, naming the controllers; empty if it ended properly, or was stopped by a signal
-        to this process.
+        Message that names the controllers; empty if the command ended properly, or if a signal to this
+        process stopped it.
     """
     reader, writer = os.pipe()
     environment = {**os.environ, _DESCRIPTOR_VARIABLE: str(writer)}
@@ -86,7 +86,7 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
     if message:
         return int(message), ""
     if received_signals:
-        # A process that a signal has ended has a negative status in Python, and 128 + signal in shells.
+        # If a signal ends a process, its status is -signal in Python, and 128 + signal in shells.
         exit_status = 128 - status if status < 0 else status
         return exit_status or 1, ""
     names = ", ".join(controllers)
@@ -95,12 +95,12 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
 
 @contextmanager
 def _forward_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
-    """Forward signals to a child process, and yield the list of those that are received."""
+    """Forward signals to a child process; yield the list of signals received so far."""
     received_signals: list[int] = []
 
     def forward(number: int, frame: FrameType | None) -> None:
         received_signals.append(number)
-        # A terminal sends Ctrl-C to both processes.
+        # Ctrl-C in a terminal reaches both processes without forwarding.
         if number != signal.SIGINT or not _is_in_foreground():
             with suppress(OSError):
                 child.send_signal(number)
@@ -119,13 +119,13 @@ def _forward_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
 def _read_message(descriptor: int) -> bytes:
     """Return the content of a pipe; empty if nothing was written to it."""
     with open(descriptor, "rb") as pipe:
-        # A process that the command has left behind may keep the pipe open.
+        # Do not wait for the end of the pipe: a process that the command left behind may keep it open.
         os.set_blocking(descriptor, False)
         return pipe.read() or b""
 
 
 def prepare_supervision() -> int | None:
-    """Prepare this process to be supervised, if it is; it then ends with its parent.
+    """Prepare this process if it is supervised: from then on it ends when its parent does.
 
     Returns
     -------
@@ -163,12 +163,12 @@ def report_status(descriptor: int, status: int) -> None:
 
 
 def describe_status(status: int) -> str:
-    """Describe the end of a process.
+    """Describe how a process ended.
 
     Parameters
     ----------
     status : int
-        Status of `subprocess`: the exit status, or the negative number of a signal.
+        Return code as in `subprocess`: the exit status, or the negative number of a signal.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def command(options: Arguments) -> None:
 
 
 def _build_row(name: str) -> dict[str, Any]:
-    """Build the answer for programs about one map."""
+    """Build the JSON content about a map."""
     environment = load_map(name)
     low_x, low_y, high_x, high_y = environment.region.bounds
     return {
@@ -48,7 +48,7 @@ def _build_row(name: str) -> dict[str, Any]:
 
 
 def _format_cells(row: dict[str, Any]) -> tuple[str, ...]:
-    """Return the cells of the table about one map."""
+    """Return the table cells for a map."""
     description = row["description"]
     if row["density"]:
         description = f"{description} Density: {row['density']}."

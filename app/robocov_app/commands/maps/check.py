@@ -62,7 +62,7 @@ def command(options: Arguments) -> int:
 
 
 def _check(name: str) -> MapReport | InputError:
-    """Return the report on a map, or the error that makes it invalid."""
+    """Return the report on a valid map, or the error that makes it invalid."""
     try:
         return check_map(load_map(name))
     except InputError as error:
@@ -80,7 +80,10 @@ def _print_outcome(name: str, outcome: MapReport | InputError) -> None:
 
 
 def _watch(options: Arguments) -> None:
-    """Check again at each save, and print the changes since the last valid state, until Ctrl-C."""
+    """Check the maps, and each again whenever it is saved, until Ctrl-C.
+
+    Changes since the last valid state of a map are marked.
+    """
     names = _find_watched_files(options.files)
     console = create_console()
     outcomes: dict[str, MapReport | InputError] = {}
@@ -99,7 +102,7 @@ def _watch(options: Arguments) -> None:
 
 
 def _find_watched_files(names: tuple[str, ...]) -> dict[Path, str]:
-    """Return the names of the maps by their files, which need not exist yet."""
+    """Return the given names of the maps by the paths of their files, which need not exist yet."""
     files = {}
     for name in names:
         try:
@@ -115,7 +118,7 @@ def _display_outcomes(
     new_outcomes: Mapping[str, MapReport | InputError],
     previous_reports: Mapping[str, MapReport],
 ) -> None:
-    """Display new outcomes with their changes; a terminal also shows those of the other maps."""
+    """Display new outcomes with their changes; in a terminal, clear it and show all other maps as well."""
     if console.is_terminal:
         console.clear()
     clock_time = time.strftime("%H:%M:%S")
@@ -132,7 +135,7 @@ def _display_outcomes(
 def _display(
     console: Console, title: str, outcome: MapReport | InputError, previous: MapReport | None = None
 ) -> None:
-    """Display the outcome of one map."""
+    """Display the verdict on a map and its details, with changes since the previous report."""
     if isinstance(outcome, MapReport):
         verdict = "valid"
         color = "green"
@@ -145,7 +148,7 @@ def _display(
 
 
 def _build_row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
-    """Build the answer for programs about one map."""
+    """Build the JSON content about a map."""
     if isinstance(outcome, MapReport):
         return {"map": name, "valid": True, **outcome.to_dict()}
     row: dict[str, Any] = {"map": name, "valid": False, "error": str(outcome)}
@@ -166,7 +169,7 @@ def _build_row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
 
 
 def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report, or one for each mistake, in the order of the file."""
+    """Yield the lines of a report or, for an invalid map, one per mistake in the order of the file."""
     if isinstance(outcome, MapReport):
         yield from format_report(outcome, previous)
     elif not isinstance(outcome, MapError) or not outcome.mistakes:
@@ -180,13 +183,13 @@ def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None 
 
 
 def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report, and mark what changed since the previous report.
+    """Yield the lines of a report, with what has changed since a previous one marked.
 
     Parameters
     ----------
     report : MapReport
     previous : MapReport or None
-        Report on the map before it was changed; by default nothing is marked.
+        Report on an earlier state of the map; by default nothing is marked.
 
     Yields
     ------
@@ -207,7 +210,7 @@ def format_report(report: MapReport, previous: MapReport | None = None) -> Itera
 
 
 def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return the titles and values of a report; changed values are followed by the previous ones."""
+    """Return the titles and values of a report; changed values are followed by the previous value."""
     lines = []
     for title, value in rows.items():
         previous_value = previous_rows.get(title, "none")
@@ -222,7 +225,7 @@ def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]
 
 
 def _format_rows(report: MapReport) -> dict[str, str]:
-    """Return the titles and values of a report."""
+    """Return the values of a report as text, by title."""
     areas = [f"{area:.6g} m²" for area in report.components[:_MAX_LISTED_COMPONENTS]]
     if len(report.components) > _MAX_LISTED_COMPONENTS:
         areas.append("...")

@@ -36,7 +36,7 @@ MAX_MAPS = 10_000
 """Maximum number of maps that are generated in one call."""
 _DEFAULT_SIDE_M = 10.0
 _FIXED_BY_STUDY = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
-"""Options about the kind and the number of maps, which a study of the paper fixes."""
+"""Options on the kind and the number of maps, which ``--study`` fixes."""
 
 
 @dataclass
@@ -107,7 +107,7 @@ class Arguments(FigureOptions):
 
 
 class _MapTask(NamedTuple):
-    """Name of a map, the function that builds it, and its seed in a series."""
+    """A map to build: its name, the function that builds it, and its seed if it is one of a series."""
 
     name: str
     build: Callable[[], Environment]
@@ -146,11 +146,11 @@ def command(options: Arguments) -> None:
 
 
 def _build_map(task: _MapTask) -> Environment:
-    """Build a map; errors name the option, and the seed in a series."""
+    """Build a map; error messages name the option and, in a series of maps, the seed."""
     try:
         return task.build()
     except ParameterError as error:
-        # The message begins with the name of the parameter.
+        # The message begins with the name of the parameter, which is also that of the option.
         message = f"--{error}"
         if task.seed is not None:
             message += f" (seed {task.seed})"
@@ -166,7 +166,7 @@ def _save_sheet(options: Arguments, path: Path, environments: list[Environment])
 
 
 def _describe_map(row: dict[str, Any]) -> str:
-    """Return the properties of a map as a line of text."""
+    """Return the most important properties of a map as a line of text."""
     passages = "no passage"
     if row["narrowest_gap_m"] is not None:
         passages = f"narrowest gap {row['narrowest_gap_m']:.3f} m"
@@ -176,7 +176,7 @@ def _describe_map(row: dict[str, Any]) -> str:
 
 
 def _prepare_folder(folder: Path | None, *, overwrite: bool) -> None:
-    """Create the folder of the maps, and check that it may be used."""
+    """Create the folder of the maps; raise an error if it is missing, not writable or not empty."""
     if folder is None:
         raise InputError("--out: required with --count and --study, as the folder of the maps")
     try:
@@ -189,14 +189,14 @@ def _prepare_folder(folder: Path | None, *, overwrite: bool) -> None:
 
 
 def _check_file(path: Path, *, overwrite: bool) -> None:
-    """Check that the file of a single map may be written."""
+    """Raise an InputError if the file of a single map may not be written."""
     if path.is_dir() or not path.name:
         raise InputError(f"--out: expected the name of a file (--count makes a folder), got {str(path)!r}")
     check_output_file(path, "another --out", overwrite=overwrite)
 
 
 def _check_replaced_map(path: Path) -> None:
-    """Check that an existing file is a map of robocov, which may be replaced."""
+    """Raise an InputError if a file exists and is not a map of robocov, as only maps are replaced."""
     if not resolve_target(path).exists():
         return
     try:
@@ -207,7 +207,7 @@ def _check_replaced_map(path: Path) -> None:
 
 
 def _list_tasks(options: Arguments) -> list[_MapTask]:
-    """List the maps to build: those of the seeds, or those of a study of the paper."""
+    """List the maps to build: those of consecutive seeds, or those of a study of the paper."""
     if options.study is not None:
         return _list_study_tasks(is_quick=options.study == "quick")
     from robocov.generator import generate_map
@@ -227,7 +227,7 @@ def _list_tasks(options: Arguments) -> list[_MapTask]:
 
 
 def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
-    """List the random maps of a study of the paper."""
+    """List the generated maps of a study of the paper, without the bundled ones."""
     from robocov_app.replication.design.plan import FULL, QUICK
     from robocov_app.replication.design.study_maps import (
         build_claim_maps,

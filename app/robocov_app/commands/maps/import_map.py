@@ -84,7 +84,7 @@ def command(options: Arguments) -> None:
 
 
 def _check_options(options: Arguments, out: Path) -> None:
-    """Check the format and the files before the import, which may take long."""
+    """Check the format and the output files before the import, which may take long."""
     if options.format is not None and options.format not in IMPORTERS:
         known = ", ".join(IMPORTERS)
         raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
