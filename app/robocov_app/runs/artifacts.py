@@ -251,6 +251,7 @@ def save_figures(
 
 
 def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comparison: bool) -> Figure:
+    """Plot the trajectories of the only run, or of several runs side by side."""
     from robocov_app.figures.runs import plot_comparison, plot_trajectories
 
     video = settings.video
@@ -275,6 +276,7 @@ def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comp
 
 
 def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings) -> Figure:
+    """Plot the costs of runs over time, with maps of the distances at the end of each run."""
     from robocov_app.figures.coverage import plot_coverage
 
     record = runs[0].record

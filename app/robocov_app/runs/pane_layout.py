@@ -194,6 +194,7 @@ def _draw_legend(
 def _select_legend_scenes(
     records: Sequence[Record], fields: DistanceFields | None, painter: Painter
 ) -> list[Scene]:
+    """Return the first scene of each record, and the last one if robots may fail, for the legend."""
     shown_fields = fields if painter.needs_field else None
     scenes = []
     for record in records:
@@ -230,6 +231,7 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
         x = column * (width + gap)
         y = row * (height + gap)
         page[y : y + height, x : x + width] = frame
+        # The lines to the left of the frame and above its row; at the edge of the page they are empty.
         page[y : y + height, max(x - gap, 0) : x] = line
         page[max(y - gap, 0) : y] = line
     return page

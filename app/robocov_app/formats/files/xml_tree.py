@@ -154,6 +154,7 @@ class _Reader:
     """Handlers for expat that build the tree of elements."""
 
     def __init__(self, where: str, content: bytes, kind: str, text_tags: Collection[str]) -> None:
+        """Prepare a parser for `content`, which must be passed to `parser.Parse`."""
         self.where = where
         self.kind = kind
         self.text_tags = text_tags

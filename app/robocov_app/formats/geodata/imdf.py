@@ -65,6 +65,7 @@ class _Archive:
     """The GeoJSON files of an archive, keyed by their names without suffix."""
 
     def __init__(self, path: Path) -> None:
+        """Read the files of a zip or folder; raise MapError if files are missing or too large."""
         self.path = path
         self.where = to_one_line(path)
         texts = _read_folder(path) if path.is_dir() else _read_zip(path)
@@ -131,6 +132,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     continue
                 roles.append(role)
                 if role == "opening":
+                    # `build_floor` requires openings that are straight lines of two points.
                     geometry = _straighten(geometry)
                 geometries.append(geometry)
     if without_floor:

@@ -1,4 +1,4 @@
-// One moment of a run, drawn on a canvas.
+// Draws the state of a run at a given time on a canvas.
 
 const COLORS = [
   "background", "panel", "ink", "faint", "grid", "line", "boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start",
@@ -13,7 +13,7 @@ function lookOf(element) {
   return Object.fromEntries(COLORS.map((name) => [name, style.getPropertyValue(`--rc-${name}`).trim()]));
 }
 
-/** Makes a canvas as sharp as its screen and returns its context in CSS pixels, null while it has no size. */
+/** Matches a canvas to the screen's resolution; returns its context in CSS pixels, or null if it has no size. */
 function prepared(canvas) {
   const { clientWidth: width, clientHeight: height } = canvas;
   if (!width || !height) return null;
@@ -26,7 +26,7 @@ function prepared(canvas) {
   return context;
 }
 
-/** The part of a convex polygon [x, y, ...] that is nearer to robot i than to any other that counts: equation (1). */
+/** The part of a convex polygon [x, y, ...] that is nearer to robot i than to any other working robot: equation (1). */
 function cellOf(region, places, i, counts = () => true) {
   const [x, y] = [places[2 * i], places[2 * i + 1]];
   const others = [];
@@ -66,7 +66,7 @@ function clipped(polygon, x, y, dx, dy, limit) {
   return kept;
 }
 
-/** Where meters are on a canvas: the whole region, as large as it goes, with a margin. */
+/** The transform from meters to pixels: the whole region, as large as possible, with a margin. */
 function frameOf(plan, width, height, margin = 2) {
   const zoom = Math.min((width - 2 * margin) / plan.width, (height - 2 * margin) / plan.height);
   const left = (width - zoom * plan.width) / 2;
@@ -85,7 +85,7 @@ function traced(frame, rings) {
   return path;
 }
 
-/** Radii in pixels: readable where there is room, in a crowd down to true size. */
+/** Radii in pixels: enlarged to be readable where there is room, down to true size where robots are close. */
 function drawnRadii(run, places, states, frame, most) {
   return run.radii.map((radius, i) => {
     let nearest = Infinity;
@@ -97,7 +97,7 @@ function drawnRadii(run, places, states, frame, most) {
   });
 }
 
-/** Draws a run at a time. `show` says what: cells, trajectories, goals. */
+/** Draws a run at a given time. `show` says what to draw: cells, trajectories, goals. */
 function drawArena(canvas, run, time, look, show) {
   const context = prepared(canvas);
   if (!context) return;
@@ -133,7 +133,7 @@ function drawArena(canvas, run, time, look, show) {
   drawRobots(context, run, places, states, radii, frame, look);
 }
 
-/** Obstacles that move, where they are; what sticks out of the region is not seen. */
+/** Draws moving obstacles at their present positions, clipped to the region. */
 function drawMovers(context, run, time, frame, region, look) {
   if (!run.plan.movers.length) return;
   context.save();
@@ -151,7 +151,7 @@ function drawMovers(context, run, time, frame, region, look) {
   for (const mover of run.plan.movers) drawMotion(context, mover, (run.begin ?? 0) + Math.min(time, run.end), frame, look);
 }
 
-/** The path of a moving obstacle's middle, dashed, and an arrow where it heads. */
+/** Draws the path of a moving obstacle's center, dashed, and an arrow in its direction. */
 function drawMotion(context, mover, time, frame, look) {
   const { line, rings } = mover;
   const [xs, ys] = [0, 1].map((axis) => rings[0].filter((_, k) => k % 2 === axis));
@@ -176,7 +176,7 @@ function drawMotion(context, mover, time, frame, look) {
   context.restore();
 }
 
-/** Cells by travel time: those of fast robots first, for those of slow ones are holes in them. */
+/** Draws cells by travel time: fast robots first, because the cells of slow ones are holes in theirs. */
 function drawTimedCells(context, run, hues, places, states, frame, look) {
   const { speeds } = run;
   for (const i of [...speeds.keys()].filter((k) => states[k] === WORKS).sort((a, b) => speeds[b] - speeds[a])) {
@@ -270,7 +270,7 @@ function drawGoals(context, goals, places, radii, frame, look) {
   context.stroke();
 }
 
-/** Robots that have failed: what is left of them is an obstacle, crossed out, its number beside it. */
+/** Draws failed robots, which have become obstacles: crossed out, with their numbers next to them. */
 function drawFailed(context, run, places, states, radii, frame, look) {
   context.textAlign = "left";
   context.textBaseline = "middle";
@@ -299,7 +299,7 @@ function drawFailed(context, run, places, states, radii, frame, look) {
   }
 }
 
-/** Where unicycles face, under their discs. */
+/** Draws the headings of unicycles, below their discs. */
 function drawNoses(context, run, time, places, states, radii, frame, look) {
   const vectors = run.headings.at(run.path || time >= run.end ? time : 0);
   for (let i = 0; i < run.robots; i += 1) {

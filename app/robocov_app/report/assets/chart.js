@@ -1,15 +1,15 @@
-// Cost curves of the runs that are shown, with a cursor at the time that is shown.
+// Cost curves of the displayed runs, with a cursor at the displayed time.
 
 const SMALL = 11.5;
 
-/** Round numbers within [low, high], in at most `most` intervals; none if there is no room for them. */
+/** Round numbers within [low, high] for at most `most` intervals; empty if there is no room for any. */
 function roundTicks(low, high, most, factors) {
   const rough = (high - low) / Math.max(most, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = factors.map((factor) => factor * power).find((value) => value >= rough * 0.999);
   const first = Math.ceil(low / step - 1e-9);
   const count = Math.floor(high / step + 1e-9) - first + 1;
-  // where the steps are below a rounding error, or nothing is finite, they could not be counted
+  // if steps are smaller than rounding errors, or a limit is not finite, they cannot be counted
   if (!Number.isFinite(step) || !(Math.abs(first) < 1e12) || !(count > 0 && count < 1000)) return [];
   return Array.from({ length: count }, (_, k) => (first + k) * step);
 }
@@ -18,7 +18,7 @@ function plain(value) {
   return String(Number(value.toPrecision(6)));
 }
 
-/** Heights at least `gap` apart, nearest to the given ones, within [low, high]: look/labels.py, spread_labels. */
+/** Heights at least `gap` apart within [low, high], as near as possible to the given ones; see spread_labels in look/labels.py. */
 function spreadLabels(heights, gap, low, high) {
   const order = heights.map((_, k) => k).sort((a, b) => heights[a] - heights[b]);
   const blocks = []; // of labels that are moved together: mean and number
@@ -39,7 +39,7 @@ function spreadLabels(heights, gap, low, high) {
   return result;
 }
 
-/** Limits of the chart, by the rule of look/axes.py, whose numbers are in the data. */
+/** Limits of the chart by the rule of look/axes.py, whose constants are in the data. */
 function limitsOf(runs, rules) {
   let [low, high, end] = [Infinity, -Infinity, 0];
   for (const run of runs) {
@@ -59,7 +59,7 @@ function labelOf(run, number, numbered) {
   return numbered ? `${number} ${run.label}` : run.label;
 }
 
-/** Draws the chart; returns what turns a pixel into a time. */
+/** Draws the chart; returns a function that converts a pixel to a time. */
 function drawChart(canvas, runs, time, look, rules) {
   const context = prepared(canvas);
   if (!context) return () => time;
@@ -103,7 +103,7 @@ function drawChart(canvas, runs, time, look, rules) {
   return (pixel) => Math.min(Math.max((pixel - box.left) / (box.right - box.left), 0), 1) * end;
 }
 
-/** When robots failed (×) and joined (+): a line each, its words where there is room. */
+/** Marks when robots failed (×) and joined (+): a line for each, with a label where there is room. */
 function drawEvents(context, box, x, runs, look) {
   const seen = new Set();
   const events = runs.flatMap((run) => run.events).filter(({ time, words }) => {
@@ -178,7 +178,7 @@ function drawCurve(context, run, x, y, look, above) {
   context.setLineDash([]);
 }
 
-/** The mark of a curve, an SVG path: a shape of its own beside the color of its own. */
+/** Draws the mark of a curve, an SVG path: curves differ in shape as well as in color. */
 function drawMark(context, mark, x, y, size, color, look) {
   const path = new Path2D(mark);
   context.save();

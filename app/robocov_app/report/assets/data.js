@@ -1,4 +1,4 @@
-// Reads what embedding.py writes.
+// Reads the data written by embedding.py.
 
 const NONE = 65535;
 
@@ -15,13 +15,13 @@ function numbersOf(text) {
   return values;
 }
 
-/** Rows of numbers at even times from 0; the last row is at the end, however near. */
+/** Rows of numbers at equal time steps from 0. The last row is at the end, which may be less than a step later. */
 class Series {
   constructor(text, width, step, count, end) {
     Object.assign(this, { width, step, count, end, values: numbersOf(text) });
   }
 
-  /** The row at or before a time. */
+  /** Index of the last row at or before a time. */
   before(time) {
     if (time >= this.end) return this.count - 1;
     return Math.max(Math.min(Math.floor(time / this.step + 1e-9), this.count - 2), 0);
@@ -31,7 +31,7 @@ class Series {
     return row >= this.count - 1 ? this.end : row * this.step;
   }
 
-  /** The row at any time, linear in between; NaN where either neighbor is. */
+  /** The row at any time, interpolated linearly; NaN if a neighboring row is. */
   at(time) {
     const row = this.before(time);
     const from = this.values.subarray(row * this.width, (row + 1) * this.width);
@@ -44,7 +44,7 @@ class Series {
 }
 
 class Plan {
-  /** `again` is called when there is more to be drawn than at first. */
+  /** `again` is called to draw again when more has been loaded, such as an image. */
   constructor(data, again) {
     const meters = (ring) => Float64Array.from(ring, (value) => value * data.unit);
     this.name = data.name;
@@ -62,7 +62,7 @@ class Plan {
   }
 }
 
-/** By how much an obstacle has moved after some seconds, along the line of one turn. */
+/** Displacement of an obstacle after some seconds, along the line of its round trip. */
 function shiftOf({ line, speed }, time) {
   const pieces = [];
   for (let k = 2; k < line.length; k += 2) pieces.push(Math.hypot(line[k] - line[k - 2], line[k + 1] - line[k - 1]));
@@ -97,7 +97,7 @@ class Run {
     this.radii = Array.from({ length: this.robots }, (_, k) => (Array.isArray(data.radius) ? data.radius[k] : data.radius));
   }
 
-  /** Whether each robot is away, as it has not joined yet, works, or has failed. */
+  /** State of each robot: it has not joined yet, works, or has failed. */
   statesAt(time) {
     return this.lives.map(([begin, end]) => {
       if (time < begin - 1e-9) return AWAY;
@@ -105,12 +105,12 @@ class Run {
     });
   }
 
-  /** Places in meters, x and y in turn. Where the record tells no path, robots stay until they are there. */
+  /** Positions in meters, x and y alternating. If the record has no path, robots stay at the start until the end. */
   placesAt(time, series = this.where) {
     return this.meters(series.at(this.path || time >= this.end ? time : 0));
   }
 
-  /** The hue of each robot's cell: neighbors differ. Hues change at moments of the run, seldom. */
+  /** The hue of each robot's cell, which differs from its neighbors'. Hues change rarely during a run. */
   huesAt(time) {
     const moment = this.path || time >= this.end ? this.where.before(time) : 0;
     const hues = [...this.hues.first];
@@ -126,7 +126,7 @@ class Run {
     return Float64Array.from(row, (value, k) => (k % 2 ? low + value * height : left + value * width));
   }
 
-  /** Mean distance to the nearest robot in meters, NaN where it is not known. */
+  /** Mean distance to the nearest robot in meters; NaN if it is unknown. */
   costAt(time) {
     if (!this.cost) return NaN;
     const { low, high, last } = this.range;

@@ -1,4 +1,4 @@
-// The replay: up to four runs in lockstep, their costs, and what moves them.
+// The replay: up to four synchronized runs, their costs, and the controls.
 
 const MAX_PANES = 4;
 const GAP = 16;
@@ -42,7 +42,7 @@ function choice(label, options, chosen) {
   return element;
 }
 
-/** Columns for pictures side by side, and how wide each may be to stay on the screen together. */
+/** Number of columns for pictures side by side, and their maximum width so that all fit on the screen. */
 function columnsFor(count, aspect, width, height) {
   let best = { columns: 1, wide: 0 };
   let [most, slot] = [1, width];
@@ -54,7 +54,7 @@ function columnsFor(count, aspect, width, height) {
     const wide = Math.min(room, tall * aspect);
     if (wide > best.wide + 1) best = { columns, wide };
   }
-  // where they do not fit together, they are at least large enough to be seen
+  // if they do not all fit, they are at least large enough to be seen
   const least = Math.min(slot, 420);
   return best.wide < least ? { columns: most, wide: least } : best;
 }
@@ -74,7 +74,7 @@ class Replay {
     new ResizeObserver(() => this.draw()).observe(this.stage);
     const again = () => this.recolor();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
-    // notebooks change their theme by attributes of the page
+    // notebooks change their theme through attributes of the page
     const watch = new MutationObserver(again);
     for (const page of [document.documentElement, document.body]) {
       watch.observe(page, { attributes: true, attributeFilter: ["class", "data-theme", "data-jp-theme-light"] });
@@ -142,7 +142,7 @@ class Replay {
     return made("label", { class: name }, box, name[0].toUpperCase() + name.slice(1));
   }
 
-  /** Makes the panes anew: after a run was added, removed or chosen. */
+  /** Rebuilds the panes after a run was added, removed or chosen. */
   fill() {
     const { runs, shown } = this;
     this.time = Math.min(this.time, this.end);
@@ -196,7 +196,7 @@ class Replay {
     this.panes.at(-1).element.querySelector("select").focus();
   }
 
-  /** Shows one run in place of the last pane, unless it is there. */
+  /** Shows a run in place of the last pane, unless it is shown already. */
   present(k) {
     if (!this.shown.includes(k)) {
       if (this.shown.length < MAX_PANES) this.shown.push(k);
@@ -218,11 +218,11 @@ class Replay {
     let ahead = this.time;
     const frame = (now) => {
       if (!this.playing) return;
-      // a page that was hidden goes on where it was
+      // after the page was hidden, the replay continues where it was
       const passed = before === null ? 0 : Math.min((now - before) / 1000, 0.1);
       before = now;
       ahead = Math.min(ahead + passed * Number(this.speed.value), this.end);
-      // who wants little motion gets pictures one after the other
+      // readers who prefer reduced motion get one still picture after another
       const held = CALM.matches && ahead < this.end && ahead - this.time < Number(this.speed.value) * 0.5;
       if (!held) this.time = ahead;
       if (!held) this.update();
@@ -275,7 +275,7 @@ class Replay {
     this.draw();
   }
 
-  /** Brings controls and pictures to the present time. */
+  /** Updates controls and pictures to the current time. */
   update() {
     const [time, end] = [this.time.toFixed(1), this.end.toFixed(1)];
     this.slider.value = String(this.time);
@@ -297,7 +297,7 @@ class Replay {
     this.draw();
   }
 
-  /** Says in words what is seen; never while it plays. */
+  /** Describes the pictures for screen readers, but not during playback. */
   describe() {
     if (this.playing) return;
     const at = `At ${this.time.toFixed(1)} s`;
@@ -335,7 +335,7 @@ class Replay {
   }
 }
 
-/** Starts the replays of the page that are not started yet; returns them by their elements. */
+/** Starts the replays of the page that have not been started; returns them, keyed by their elements. */
 function startReplays() {
   const started = new Map();
   for (const root of document.querySelectorAll(".robocov-replay:not([data-live])")) {

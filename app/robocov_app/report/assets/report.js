@@ -1,6 +1,6 @@
-// The page round the replays: pictures that open large, and what is printed.
+// The page around the replays: enlarged pictures, and printing.
 
-/** The large picture of a run, with the runs before and after it. */
+/** The enlarged picture of a run, from which one can go to the previous and the next run. */
 class Enlarged {
   constructor() {
     this.title = made("h2");
@@ -52,7 +52,7 @@ class Enlarged {
     this.facts.textContent = `${final}${run.facts}`;
     this.canvas.setAttribute("aria-label", `${run.title}: trajectories of all robots. ${final}${run.facts}`);
     this.canvas.style.aspectRatio = `${run.plan.width} / ${run.plan.height}`;
-    // as large as the screen allows, whatever the shape of the map
+    // as large as the screen allows, whatever the aspect of the map
     this.canvas.style.maxWidth = `calc((100vh - 210px) * ${run.plan.width / run.plan.height})`;
     this.draw();
   }
@@ -72,7 +72,7 @@ function startReport(replays) {
       thumbnail.addEventListener("click", () => enlarged.open(replay, Number(thumbnail.dataset.run), thumbnail));
     }
   }
-  // what is folded away is printed all the same
+  // collapsed sections are printed, too
   let folded = [];
   addEventListener("beforeprint", () => {
     folded = [...document.querySelectorAll("details:not([open])")];

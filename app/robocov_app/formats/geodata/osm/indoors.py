@@ -130,6 +130,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
         if role == "opening":
             doors.append(element)
             continue
+        # Doors are nodes of the outlines of rooms ("walled") or of walls that are drawn as lines.
         if role in ("walled", "wall"):
             walls.append(element)
         if role == "solid" and _is_stairs(element.tags):

@@ -49,6 +49,7 @@ class _XmlReader:
     """Handlers for expat that fill `data`."""
 
     def __init__(self, where: str, content: bytes) -> None:
+        """Parse `content`; raise MapError if it is damaged or too large."""
         self.where = where
         self.data = OsmData(where)
         # Counting takes milliseconds, parsing a huge file takes seconds.
@@ -68,6 +69,7 @@ class _XmlReader:
             raise MapError(f"{where}:{line}: not XML: {to_one_line(error)[:80]}") from None
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
+        """Add the content of an XML element; raise MapError if an attribute is missing or invalid."""
         self.depth += 1
         if self.depth == 1 and name != "osm":
             self._refuse(f"expected <osm>, got <{to_one_line(name)[:40]}>")

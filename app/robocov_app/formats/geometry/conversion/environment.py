@@ -223,6 +223,7 @@ def _report_unreachable(environment: Environment, conversion: Conversion) -> Non
 
 
 def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversion) -> Environment:
+    """Build the environment from its boundary and obstacles; `free` is the free space between them, m."""
     foreign = conversion.foreign
     environment = Environment(
         name=to_one_line(foreign.name)[:_MAX_NAME_CHARACTERS].strip() or "map",

@@ -70,6 +70,7 @@ class OriginalOutline(RingVertices):
     def __init__(self, polygons: list[Polygon], cell: float | None) -> None:
         lines, owner = shapely.get_rings(polygons, return_index=True)
         points, ring = shapely.get_coordinates(lines, return_index=True)
+        # Drop the last vertex of each ring, which repeats the first one.
         is_closing = np.append(ring[1:] != ring[:-1], True)
         points = points[~is_closing]
         ring = ring[~is_closing]

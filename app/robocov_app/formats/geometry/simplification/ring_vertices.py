@@ -45,7 +45,7 @@ class RingVertices:
         self.ring = np.arange(len(starts)).repeat(self.size)
         self.after = np.arange(1, len(points) + 1)
         self.after[starts + self.size - 1] = starts
-        self.before = np.argsort(self.after)
+        self.before = np.argsort(self.after)  # the inverse permutation
 
     @cached_property
     def areas(self) -> Array:

@@ -161,6 +161,7 @@ class EntityReader:
         self._shapes.add_outline([ring], labels, rule="evenodd", at=at)
 
     def _add_hatch(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        """Add a hatch as an area, if the option ``hatches`` is set; otherwise count it as left out."""
         if not self._shapes.options.hatches:
             self._shapes.leave_out("HATCH", "(--hatches takes them as areas)")
             return
@@ -184,6 +185,7 @@ class EntityReader:
         self._shapes.add_circle(center, radius * self._scale, labels, at=at)
 
     def _add_curve(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        """Add a circle, arc, ellipse or spline as an outline if it is closed, otherwise as a wall."""
         points = self._flatten(entity)
         self._has_curves = True
         self._require_near(points)

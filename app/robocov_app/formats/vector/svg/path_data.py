@@ -132,6 +132,7 @@ class _Pen:
     """
 
     def __init__(self, max_points: int, max_commands: int) -> None:
+        """Start without a path; points and commands of the path are limited."""
         self.commands = 0
         self._max_points = max_points
         self._max_commands = max_commands
@@ -249,6 +250,7 @@ class _Pen:
         self._last_kind = kind
 
     def _draw_polyline(self, values: list[float], *, is_relative: bool) -> None:
+        """Draw lines through positions x, y, x, y, ..., which may each be relative to the previous one."""
         points = np.array(values).view(complex)
         if is_relative:
             points = np.cumsum(points) + self._position

@@ -120,6 +120,7 @@ class _DrawingReader:
     """Visits the elements, including uses and nested images, in the order in which they are drawn."""
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
+        """Collect the style sheets of the drawing, and its elements by id."""
         self.root = root
         self.shapes = shapes
         self.sheet = StyleSheet(root.where)

@@ -134,6 +134,7 @@ class WktParser:
         self._scanner.skip_space()
 
     def _parse_geometry(self, at: str, *, depth: int) -> None:
+        """Parse a geometry, whose number for messages is `at`, inside `depth` collections."""
         if depth > MAX_DEPTH:
             self._scanner.refuse(f"nested too deeply, expected at most {MAX_DEPTH} levels")
         start = self._scanner.position
