@@ -68,6 +68,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
 
 
 def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _Costs:
+    """Return the final mean distances of the runs that did not fail."""
     return {
         (row["track"], get_run_key(row)): row["mean_distance_m"]
         for row in rows

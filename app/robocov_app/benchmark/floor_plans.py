@@ -105,10 +105,12 @@ def _build_box(left: float, bottom: float, right: float, top: float) -> Ring:
 
 
 def _build_block(x: float, y: float, width: float, height: float) -> Obstacle:
+    """Build a rectangle whose lower left corner is at (x, y)."""
     return PolygonObstacle(_build_box(x, y, x + width, y + height))
 
 
 def _build_rotated_block(center: Array, width: float, height: float, angle: float) -> Obstacle:
+    """Build a rectangle around a center, rotated counterclockwise by an angle, rad."""
     corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
     along = np.array([np.cos(angle), np.sin(angle)])
     across = [-along[1], along[0]]
@@ -284,6 +286,7 @@ def _build_house(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_pond(rng: np.random.Generator) -> Obstacle:
+    """Draw a pond: a polygon with 14 corners, roughly an ellipse with a wavy shore."""
     angles = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
     radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
     shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
@@ -291,6 +294,7 @@ def _build_pond(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_hedge(rng: np.random.Generator) -> Obstacle:
+    """Draw a hedge: a wall with a right angle between two equal parts."""
     start = _draw_yard_point(rng)
     angle = rng.uniform(0.0, np.pi)
     along = np.array((np.cos(angle), np.sin(angle)))

@@ -230,6 +230,7 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
 
 
 def _summarize_track(name: str) -> str:
+    """Return sentences on the conditions of a track, and on the number of its runs and maps."""
     track = suite.TRACKS[name]
     run_count = len(ratings.list_run_keys(name))
     runs = f"{format_count(run_count, 'run')} on {format_count(len(track.maps), 'map')}"
@@ -409,6 +410,7 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
+    """Build the table of the entries with their names, source hashes, gains and versions."""
     rows = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]

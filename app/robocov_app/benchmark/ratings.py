@@ -317,6 +317,10 @@ def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
 
 
 def _format_runs(rating: Rating, gaps: int) -> str:
+    """Return the numbers of runs, failed runs and runs without a gap as text.
+
+    `gaps` is the number of runs with a gap.
+    """
     text = f"{rating.run_count} of {len(list_run_keys(rating.track))}"
     if rating.failed:
         text += f", {rating.failed} failed"

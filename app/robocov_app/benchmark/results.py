@@ -235,6 +235,7 @@ def _check_row(row: Any, place: str) -> None:
 
 
 def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None:
+    """Raise InputError unless a JSON object has all keys in `types`, with values of these types."""
     for name, expected in types.items():
         if not isinstance(values, dict) or name not in values:
             raise InputError(f"{place}: {name}: missing, expected a whole result")

@@ -98,6 +98,7 @@ def _describe_result(entry: dict[str, Any], selection: Selection) -> dict[str, A
 
 
 def _check_folder(out: Path) -> None:
+    """Raise InputError if a folder contains anything other than a benchmark."""
     foreign = set()
     if out.is_dir():
         foreign = {path.name for path in out.iterdir()} - {RESULT_FILE, TRACKS_FOLDER}

@@ -58,6 +58,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     """MP4 file to render without a display; with --tour, all of the tour."""
 
     def __post_init__(self) -> None:
+        """Check that the options are in range and do not contradict each other."""
         super().__post_init__()
         require_number("--robots", self.robots, 1, 1000)
         require_number("--seed", self.seed, 0, 2**63 - 1)

@@ -146,6 +146,7 @@ def _build_problem(options: Arguments) -> _Problem:
 
 
 def _search(options: Arguments, problem: _Problem) -> Optimum:
+    """Search for the best positions, and show the progress if that takes long."""
     with show_late_progress("searching", quiet=options.json) as update:
         return find_optimum(
             problem.environment,
@@ -159,6 +160,7 @@ def _search(options: Arguments, problem: _Problem) -> Optimum:
 
 
 def _prove_bound(options: Arguments, problem: _Problem, best: Optimum) -> LowerBound:
+    """Compute a lower bound on the cost of all placements, and show the progress if that takes long."""
     with show_late_progress("proving the bound", quiet=options.json) as update:
         return compute_lower_bound(
             problem.environment,
@@ -199,6 +201,7 @@ def _save_positions(path: Path, positions: Array) -> None:
 
 
 def _save_figure(options: Arguments, path: Path, problem: _Problem, best: Optimum) -> None:
+    """Draw the distances to the best positions, on a lattice that is fine enough for a figure."""
     environment = problem.environment
     save_distance_figure(
         path,

@@ -44,6 +44,7 @@ class Arguments(JsonOption, WebOptions):
     video: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
 
     def __post_init__(self) -> None:
+        """Check the options, which differ between the window and a video."""
         super().__post_init__()
         if self.each:
             raise ParameterError("--each: requires a session file, opened by robocov demo")
@@ -56,6 +57,7 @@ class Arguments(JsonOption, WebOptions):
             parse_window_size(self.video.size)
 
     def _check_headless_options(self) -> None:
+        """Raise a ParameterError if an option does not suit a video or frames, or if --out is missing."""
         if self.serve:
             raise ParameterError("--serve: cannot be combined with --frames or --video")
         if self.out is None:

@@ -97,7 +97,7 @@ def choose_curve_styles(controllers: Sequence[str]) -> list[CurveStyle]:
     Returns
     -------
     list of CurveStyle
-        The first curve of each controller has the controller's own style, further ones have variants.
+        The first curve of each controller has the controller's own style; further curves have variants of it.
     """
     first_styles = _choose_first_styles(controllers)
     used = set(first_styles.values())

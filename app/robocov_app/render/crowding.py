@@ -84,7 +84,7 @@ def fit_mark_size(points: Array, low: float, high: float) -> float:
 
 
 def choose_width_factor(n_lines: int) -> float:
-    """Return the factor by which lines are thinner: from 1 for a few lines to 0.5 for many."""
+    """Return the factor for the width of lines: from 1 for a few lines down to 0.5 for many."""
     factor = np.sqrt(_MAX_LINES_AT_FULL_WIDTH / max(n_lines, 1))
     return float(np.clip(factor, _MIN_WIDTH_FACTOR, 1.0))
 

@@ -206,8 +206,8 @@ class Painter:
     def _update_hues(self, scene: Scene) -> None:
         """Choose the hues of the robots.
 
-        In small teams each number has its own hue. In large ones adjacent cells differ, and robots keep
-        their hues if possible.
+        In small teams each number has its own hue. In large teams, adjacent cells have different hues, which
+        change as little as possible.
         """
         numbers = scene.numbers
         if numbers is not None and max(numbers, default=1) <= MAX_OWN_HUES:

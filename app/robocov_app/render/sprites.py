@@ -235,6 +235,10 @@ def _render_disc(
     edge: Color,
     text: str,
 ) -> pygame.Surface:
+    """Render a disc as `render_disc`, with a shift that is already adapted to its size.
+
+    Circles are drawn from the largest to the smallest: edge, ring, fill.
+    """
     fineness = _choose_fineness(radius)
     large, center = _create_large(radius + 1, shift, fineness)
     pygame.draw.circle(large, edge, center, (radius + _EDGE_PX) * fineness)

@@ -100,6 +100,7 @@ class Cluster(Executor):
         self._add_future(task, future)
 
     def _get_result(self, future: Future[Any]) -> Outcome | LostWorker:
+        """Return the outcome of a task, or the end of its worker; raise OutputError if Dask itself fails."""
         self._futures.remove(future)
         try:
             return super()._get_result(future)

@@ -168,6 +168,7 @@ class Study:
     teams: tuple[Mapping[str, ParameterValue], ...] = field(init=False)
 
     def __post_init__(self) -> None:
+        """Check all values, and replace given values by resolved ones; later steps rely on earlier ones."""
         self._check_size()
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
             self._set(name, tuple(getattr(self, name)))

@@ -182,6 +182,7 @@ class Table:
         self._row_count = -1  # The header is no row.
 
     def __enter__(self) -> Table:
+        """Open the temporary CSV file and write its header; temporary files are removed at the end."""
         resolve_target(self._folder / SWEEP_TABLE_FILE)
         if self._has_parquet:
             resolve_target(self._folder / SWEEP_PARQUET_FILE)
@@ -201,6 +202,7 @@ class Table:
         return self
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+        """Replace earlier files, unless there was an exception or the earlier table has more rows."""
         with self._stack:
             if error_type is not None:
                 return

@@ -80,6 +80,7 @@ class Arguments(FigureOptions):
     """Replace earlier maps with the same names."""
 
     def __post_init__(self) -> None:
+        """Check that the options are in range and do not contradict each other."""
         if self.study is not None:
             self._check_study_options()
         if self.count is not None:
@@ -93,7 +94,7 @@ class Arguments(FigureOptions):
         super().__post_init__()
 
     def _check_study_options(self) -> None:
-        """Reject the options that a study fixes."""
+        """Raise an InputError if an option is given that ``--study`` fixes."""
         for field in fields(Arguments):
             value = getattr(self, field.name)
             if field.name in _FIXED_BY_STUDY and value != field.default:

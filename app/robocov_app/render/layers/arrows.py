@@ -69,6 +69,7 @@ def _build_arrow_layer(
     """
 
     def draw(canvas: Canvas, scene: Scene) -> None:
+        """Draw the arrow of each robot, except for very short ones."""
         vectors = compute_vectors(scene, canvas.scale)
         if vectors is None:
             return
@@ -107,6 +108,7 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
     """
 
     def compute_vectors(scene: Scene, scale: float) -> Array | None:
+        """Return the arrows of the forces, (n, 2) px with y down; None if there are no such forces."""
         forces = _get_forces(scene, term)
         if forces is None:
             return None

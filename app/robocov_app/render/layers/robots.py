@@ -117,6 +117,7 @@ def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, r
 
 
 def _build_disc(canvas: Canvas, radius: float, ring_width: float, hue: int, text: str) -> Sprite:
+    """Return the sprite of a working robot, with lengths in px and `text` as its number."""
     theme = canvas.theme
     return partial(
         sprites.render_disc,

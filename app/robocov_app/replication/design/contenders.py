@@ -167,9 +167,9 @@ def build_paper_contenders(best: BestGains) -> tuple[Contender, ...]:
 
 
 def select_strongest(contenders: Sequence[Contender]) -> list[Contender]:
-    """Return the paper's strongest contenders: Lloyd's algorithm, and RAPF with its best gains.
+    """Return the paper's strongest contenders: RAPF with its best gains, then Lloyd's algorithm.
 
-    Without its best gains, RAPF with its defaults is returned.
+    If the best gains are unknown, RAPF with its defaults takes their place. Missing contenders are left out.
     """
     by_key = {contender.key: contender for contender in contenders}
     rapf = by_key.get("rapf-best") or by_key.get("rapf-default")

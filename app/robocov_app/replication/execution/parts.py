@@ -106,6 +106,7 @@ def run_figures(
 
 
 def _read_figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
+    """Yield the table row and the content of each run in a sweep; raise InputError if one failed."""
     results = read_results(folder)
     for row in results.rows():
         if row["error"] is not None:

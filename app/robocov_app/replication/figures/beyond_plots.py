@@ -64,6 +64,7 @@ def build_gap_samples(results: BeyondResults) -> list[Sample]:
 
 
 def _list_duel_rows(results: BeyondResults) -> list[PairsRow]:
+    """Compare our main controller with each other contender, in the order of the ranking."""
     own_key = OWN[0].key
     rows = []
     for summary in rank_contenders(results):
@@ -75,6 +76,7 @@ def _list_duel_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _list_target_rows(results: BeyondResults) -> list[PairsRow]:
+    """Compare RAPF with other targets in its cells with RAPF that moves to the centroids."""
     centroid = TARGETS[0]
     return [
         PairsRow(target.label, results.targets.compare(target.key, centroid.key), "rapf")
@@ -83,7 +85,9 @@ def _list_target_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
+    """Compare, for each controller of mixed teams, cells by time with cells by distance."""
     rows = []
+    # `TEAMS` contains both kinds of cells of each controller in turn, first those by distance.
     for by_distance, by_time in zip(TEAMS[::2], TEAMS[1::2], strict=True):
         pairs = results.teams.compare(by_time.key, by_distance.key, "time")
         rows.append(PairsRow(by_time.label, pairs, by_time.controller))
@@ -101,6 +105,7 @@ def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
 
 
 def _plan_degradations_plot(results: BeyondResults, theme: Theme) -> Draw | None:
+    """Return a function that draws the controllers with all disturbances; None without results."""
     degradations = [
         degradation
         for degradation in results.degradations

@@ -48,6 +48,7 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
 
 
 def _list_convex_rows(outcomes: Outcomes) -> list[PairsRow]:
+    """Compare RAPF with Lloyd's algorithm at the end, and early on from each kind of clustered starts."""
     rows = [PairsRow("at the end", outcomes.compare("rapf-shared", "lloyd"), "rapf")]
     for start in CLUSTERED:
         pairs = outcomes.select_starts(start).compare("rapf-shared", "lloyd", "early")
@@ -56,6 +57,7 @@ def _list_convex_rows(outcomes: Outcomes) -> list[PairsRow]:
 
 
 def _list_nonconvex_rows(outcomes: Outcomes) -> list[PairsRow]:
+    """Compare RAPF with RPF, at the end and in the first minute, and with Lloyd's algorithm at the end."""
     rows = []
     for gains in ("shared", "best"):
         pairs = outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", "final")

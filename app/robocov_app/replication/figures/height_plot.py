@@ -75,12 +75,14 @@ def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
 
 
 def _find_ground_optimum(cell: VoronoiPartition) -> SensorOptimum:
+    """Find the limit of the best position for h → 0, from a height that is tiny compared with the cell."""
     size = float(np.sqrt(cell.mass[0]))
     position = find_best_points(cell, Sensing(_GROUND_HEIGHT * size))[0]
     return _build_optimum(cell, 0.0, position, float("nan"))
 
 
 def _find_optimum(cell: VoronoiPartition, height: float) -> SensorOptimum:
+    """Find the best position at a height, m, and the loss of a sensor above the centroid instead."""
     position = find_best_points(cell, Sensing(height))[0]
     best = _compute_cost(cell, position, height)
     at_centroid = _compute_cost(cell, cell.centroid[0], height)

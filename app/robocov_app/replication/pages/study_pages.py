@@ -138,6 +138,7 @@ def build_paper_page(
 
 
 def _build_replay(runs: Mapping[str, FigureRun]) -> Markup:
+    """Build the HTML element that replays the runs of the figures, named by figure and controller."""
     replays = []
     for name, run in runs.items():
         figure = _FIGURES_OF_CASES[name.partition("/")[0]]
