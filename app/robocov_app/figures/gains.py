@@ -122,7 +122,7 @@ def plot_gains(
 
 @plain_style()
 def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
-    """Plot a grid of two gains on a page of its own, see `draw_gain_grid`."""
+    """Plot a grid of two gains on a separate page, see `draw_gain_grid`."""
     axes = _create_axes(size)
     draw_gain_grid(axes, grid, LIGHT)
     return get_figure(axes)

@@ -70,7 +70,7 @@ def plot_environment(
     ----------
     environment : Environment
     axes : matplotlib.axes.Axes, optional
-        By default, a page of its own.
+        By default, new axes on a separate page.
     theme : Theme or str
     size : (width, height), px, optional
         Size of the page.
@@ -107,7 +107,7 @@ def plot_trajectories(
     ----------
     record : Record
     axes : matplotlib.axes.Axes, optional
-        By default, a page of its own.
+        By default, new axes on a separate page.
     theme : Theme or str
     colors : {"paper", "robots"}
         Colors of the paper, or a hue for each robot.
@@ -381,7 +381,7 @@ def plot_cost(
     ----------
     curves : sequence of TimeCurve
     axes : matplotlib.axes.Axes, optional
-        By default, a page of its own.
+        By default, new axes on a separate page.
     theme : Theme or str
     size : (width, height), px, optional
         Size of the page.

@@ -244,6 +244,7 @@ class Canvas:
             return
         along = (tip - tail) / length
         across = np.array([-along[1], along[0]])
+        # The size of the head grows with the width of the shaft, but short arrows are only a head.
         head_length = min(2.6 * width + 4 * self.scale, length)
         if head == "bar":
             half_bar = 1.1 * width + 1.7 * self.scale

@@ -53,7 +53,7 @@ def build_standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
 
 
 def build_pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
-    """Build the layers of one pane among several, which has a caption instead of a legend of its own."""
+    """Build the layers of one pane among several, which has a caption but no separate legend."""
 
     def draw_status(canvas: Canvas, scene: Scene) -> None:
         # Controller and cost are already in the caption.

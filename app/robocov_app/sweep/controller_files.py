@@ -29,7 +29,7 @@ def load_study_controller(name: str, folder: Path) -> tuple[type[Any], Controlle
     Raises
     ------
     ParameterError
-        If there is no such controller, or its file cannot be used.
+        If there is no such controller, or if its file is invalid.
     """
     source = _read_source(name, folder)
     controller_class = load_controller_class(name, source=source)

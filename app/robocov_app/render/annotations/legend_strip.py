@@ -1,4 +1,4 @@
-"""The legend: a strip of symbols and texts above the arena, or a picture of its own."""
+"""The legend: a strip of symbols and texts above the arena, or a separate picture."""
 
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
@@ -83,7 +83,7 @@ def render_legend_image(
     scale: float,
     visible_layers: Set[str] = frozenset(),
 ) -> NDArray[np.uint8]:
-    """Render a legend as a picture of its own.
+    """Render a legend as a separate picture.
 
     Parameters
     ----------

@@ -102,6 +102,7 @@ def _rate_hidden(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect)
 
 
 def _draw_path_start(canvas: Canvas, x: float, y: float) -> None:
+    """Draw the dot at the cursor, with a halo in the background color."""
     canvas.draw_sprite(partial(sprites.render_dot, 5.0 * canvas.scale, canvas.theme.background), (x, y))
     canvas.draw_sprite(partial(sprites.render_dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
 

@@ -70,6 +70,7 @@ def _list_links(scene: Scene) -> IntArray | None:
 
 
 def _draw_link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
+    """Draw the line between two neighbors, in a color that is paler than final positions."""
     color = mix(canvas.theme.background, canvas.theme.final, 0.7)
     canvas.draw_line(start, end, color, canvas.scale_width(canvas.theme.line))
 

@@ -70,7 +70,7 @@ def generate_convex_region(seed: int) -> StudyMap:
 
 
 def replace_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
-    """Return a map with the study's starts in place of its own.
+    """Return a map whose starts are replaced by those of the study.
 
     Raises
     ------
