@@ -184,7 +184,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "svg: uses": (_one("a.svg", _uses), Job("import", None, {"scale": 1.0}), "to be drawn, uses and all"),
     "svg: entities": (_one("a.svg", lambda: _entities("svg")), _READ, "for other entities"),
     "svg: a file": (lambda: _external("svg", "a.svg"), _READ, "for another file"),
-    "dxf: blocks": (_one("a.dxf", _blocks), Job("import", None, {"scale": 1.0}), "blocks and all"),
+    "dxf: blocks": (_one("a.dxf", _blocks), Job("import", None, {"scale": 1.0}), "including those in blocks"),
     "osm: relations": (_one("a.osm", _relations), _READ, "expected at most 500000"),
     "osm: entities": (_one("a.osm", lambda: _entities("osm")), Job("import", "osm"), "no document type"),
     "geojson: collections": (_one("a.geojson", _collections), _READ, "nested too deeply"),

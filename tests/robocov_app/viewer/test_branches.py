@@ -179,3 +179,15 @@ def test_a_branch_lists_the_controllers_that_it_ran():
     assert controllers == [{0: "lloyd", 1: "rapf"}, {0: "rpf"}]
     assert "Lloyd" in branches[0].describe_end(session.timeline.scenario.dt)
     assert {ghost.controller for ghost in session.timeline.ghosts} == {"rpf"}
+
+
+def test_the_trail_of_a_pane_that_was_removed_is_complete_after_a_return() -> None:
+    session = advance_session(start_session(RAPF, LLOYD, robots=2), 20)
+    session.remove_pane(session.timeline.panes[0])
+    session.show_time(0.2)
+    assert session.branch()
+    session.show_time(0.1)
+    for pane in session.timeline.panes:
+        positions, times = session.displayed.get_trail(pane)
+        assert times[0] == 0.0
+        assert np.isfinite(positions).all()

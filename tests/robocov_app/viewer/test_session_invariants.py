@@ -221,11 +221,16 @@ class RandomEdits(RuleBasedStateMachine):
     @invariant()
     def arrays_have_a_finite_row_for_each_robot(self):
         for pane in self.session.timeline.panes:
-            shape = (len(pane.setup.numbers), 2)
-            for rows in (pane.simulation.positions, pane.starts, pane.trail.positions[-1]):
-                assert rows.shape == shape
-                assert np.isfinite(rows).all()
-            assert len(pane.simulation.team) == shape[0]
+            working = len(pane.setup.numbers)
+            with_failed = working + len(pane.setup.failed)
+            for rows, robots in (
+                (pane.simulation.positions, working),
+                (pane.starts, working),
+                (pane.trail.positions[-1], with_failed),
+            ):
+                assert rows.shape == (robots, 2)
+                assert np.isfinite(rows[:working]).all()
+            assert len(pane.simulation.team) == working
 
     @precondition(lambda self: self.session)
     @invariant()
@@ -275,8 +280,9 @@ class RandomEdits(RuleBasedStateMachine):
             assert snapshot.time == pytest.approx(displayed.time, abs=1e-9)
             np.testing.assert_array_equal(snapshot.positions, displayed.get_positions(pane))
             trail, times = displayed.get_trail(pane)
-            robots = len(displayed.get_setup(pane).numbers)
-            assert trail.shape[1:] == snapshot.positions.shape == (robots, 2)
+            setup = displayed.get_setup(pane)
+            assert snapshot.positions.shape == (len(setup.numbers), 2)
+            assert trail.shape[1:] == (len(setup.numbers) + len(setup.failed), 2)
             assert len(trail) == len(times) >= 1
             assert times[-1] <= displayed.time + 1e-6
 

@@ -16,7 +16,12 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.decision_replay import get_sensor
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import RunState
-from robocov_app.viewer.session.past.trails import TrailSection, build_trail, merge_sections
+from robocov_app.viewer.session.past.trails import (
+    TrailSection,
+    build_trail,
+    merge_sections,
+    rebuild_trail,
+)
 
 MAX_SENSED_STATES = 300
 """Maximum number of states from which sensed points are recomputed after a move to another branch."""
@@ -243,6 +248,10 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Ite
     dt = new.run.scenario.dt
     for pane in new.run.panes:
         _restore_trail(path, last_steps, pane, dt)
+        if pane.trail.times[0] > new.history.get_time(0) + 0.5 * dt:
+            # A pane that was removed later: its trail was not stored in the nodes.
+            earlier = rebuild_trail(new.history, pane.number).extract(-np.inf, np.inf)
+            pane.trail = build_trail(merge_sections(earlier, pane.trail.extract(-np.inf, np.inf)))
         for quantity, curve in pane.curves.items():
             for node in path:
                 curve.extend(node.curves[pane.number, quantity], last_steps[node.number] * dt)
