@@ -1,4 +1,4 @@
-"""What the user inspects: a robot, a pane, and the point under the cursor."""
+"""Inspected items: a robot, a pane, and the point under the cursor."""
 
 from dataclasses import dataclass
 

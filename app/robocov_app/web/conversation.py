@@ -31,7 +31,7 @@ _PAUSE_S = 0.05
 
 @dataclass
 class SharedWindow:
-    """What all pages of a served window share.
+    """State that all pages of a served window share.
 
     Attributes
     ----------

@@ -272,7 +272,7 @@ class Mine:
     def force(self, own):
         return [0.0, 0.0]
 """
-"""What is left of a controller that recognizes the maps of the suite, on a map that it does not recognize."""
+"""Controller that stands still, as one that recognizes the maps of the suite does on any other map."""
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What surprised people who used the window for the first time."""
+"""Behavior that surprised people who used the window for the first time."""
 
 from __future__ import annotations
 

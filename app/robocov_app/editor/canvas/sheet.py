@@ -41,7 +41,7 @@ _TRANSPARENT = (0, 0, 0, 0)
 
 @dataclass(frozen=True, eq=False)
 class _PageState:
-    """What the cached page shows."""
+    """Content of the cached page."""
 
     look: tuple[object, ...]  # everything except for the obstacles and the position of the camera
     camera: Camera

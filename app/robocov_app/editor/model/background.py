@@ -168,7 +168,7 @@ Names: TypeAlias = Sequence[str | None]  # of the obstacles
 
 
 class ReadMarks(NamedTuple):
-    """What was read from the free keys of a map.
+    """Content of the free keys of a map.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the tools of the editor show on the sheet. All lengths are in meters."""
+"""State that the tools of the editor draw on the sheet. All lengths are in meters."""
 
 from dataclasses import dataclass
 

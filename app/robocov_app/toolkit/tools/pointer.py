@@ -18,7 +18,7 @@ Pixel: TypeAlias = tuple[int, int]
 
 
 class Gesture:
-    """What the mouse does while a button is held down: base class of the gestures.
+    """Action of the mouse while a button is held down: base class of the gestures.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ from robocov_app.formats.reports import format_area
 Cells: TypeAlias = NDArray[np.uint8]
 """(rows, columns) array of `FREE`, `BLOCKED` and `UNKNOWN`, the top row first."""
 Meaning: TypeAlias = Literal["obstacle", "free", "cut"]
-"""What unknown cells become. With "cut", the map ends at the edge of the known cells."""
+"""Treatment of unknown cells. With "cut", the map ends at the edge of the known cells."""
 FREE = 0
 BLOCKED = 1
 UNKNOWN = 2
