@@ -85,6 +85,26 @@ class Theme:
     arrow_line: float = 2.0
 
     @property
+    def accent(self) -> Color:
+        """Color of selections and of other highlights in windows."""
+        return self.final
+
+    @property
+    def error(self) -> Color:
+        """Color of errors."""
+        return self.trajectory
+
+    @property
+    def warning(self) -> Color:
+        """Color of warnings."""
+        return self.others[1]
+
+    @property
+    def cut_off(self) -> Color:
+        """Color of the hatching on areas that no robot can reach from the start."""
+        return self.forces["repulsion_robots"]
+
+    @property
     def moving_obstacle(self) -> Color:
         """Color of moving obstacles."""
         return mix(self.obstacle, self.background, 0.5)
