@@ -35,8 +35,12 @@ MAX_ROBOTS = 10_000
 """Maximum number of robots in a team file or a record."""
 DEFAULT_TRACK_PER_RADIUS = 1.6
 """Default track width of a unicycle divided by its radius; the wheels are within the disc."""
-KINEMATICS = ("point", "unicycle")
-"""A point moves in any direction; a unicycle has two driven wheels and has to turn."""
+POINT = "point"
+"""Kinematics of a robot that moves in any direction."""
+UNICYCLE = "unicycle"
+"""Kinematics of a robot with two driven wheels, which has to turn before it can move sideways."""
+KINEMATICS = (POINT, UNICYCLE)
+"""Names of the kinematics of a robot."""
 
 
 class TeamParameter(NamedTuple):
@@ -218,9 +222,9 @@ class Team:
         """
         if kinematics not in (None, *KINEMATICS):
             raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
-        if kinematics == "unicycle" and not track_width:
+        if kinematics == UNICYCLE and not track_width:
             track_width = DEFAULT_TRACK_PER_RADIUS * radius
-        elif kinematics == "point":
+        elif kinematics == POINT:
             track_width = 0.0
         if not is_number(n, Integral) or n < 1:
             raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")

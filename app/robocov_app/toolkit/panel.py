@@ -50,8 +50,7 @@ class SidePanel:
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Adopt the position and the scale of the panel in a layout, and the colors of a theme."""
-        # A panel of width 0 is hidden.
-        self.hidden = not layout.panel[2]
+        self.hidden = not layout.has_panel
         if self.hidden:
             self.ui.stop_typing()
         if theme is not self.ui.theme or layout.scale != self.ui.scale:

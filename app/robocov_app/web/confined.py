@@ -23,6 +23,8 @@ _PATH_COUNTS = {
     **dict.fromkeys(("os.rename", "os.link", "os.symlink"), 2),
 }
 """Python's audit events for file access, and how many of their first arguments are paths."""
+_OPEN_FLAGS_ARGUMENT = 2
+"""Index of the flags among the arguments of the event "open"; they are None if they are unknown."""
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _SYSTEM_FOLDERS = ("/dev", "/proc", "/usr/share")
 
@@ -65,8 +67,9 @@ class FileConfinement:
         if not self.is_active or event not in _PATH_COUNTS:
             return
         is_reading = event in _READING_EVENTS
-        if event == "open" and not (arguments[2] or 0) & _WRITE_FLAGS:
-            is_reading = True
+        if event == "open":
+            flags = arguments[_OPEN_FLAGS_ARGUMENT] or 0
+            is_reading = not flags & _WRITE_FLAGS
         for argument in arguments[: _PATH_COUNTS[event]]:
             if not isinstance(argument, str | bytes | os.PathLike):
                 continue  # A file descriptor: the file is already open.

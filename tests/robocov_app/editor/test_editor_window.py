@@ -142,9 +142,9 @@ def test_keys_switch_pages(driver: EditorDriver) -> None:
         seen.append(driver.window.panel.tab)
     assert sorted(seen) == sorted(EditorPanel.tabs)
     driver.press_key("h")
-    assert driver.window.layout.panel[2] == 0
+    assert driver.window.layout.panel.width == 0
     driver.press_key("f2")  # the field of the map's name brings the panel back
-    assert driver.window.layout.panel[2] > 0 and driver.window.panel.ui.edit
+    assert driver.window.layout.panel.width > 0 and driver.window.panel.ui.edit
     driver.type("New name")
     driver.press_key("return")
     assert driver.sketch.name == "New name"
@@ -155,7 +155,7 @@ def test_the_cursor_depends_on_tool_and_panel(driver: EditorDriver) -> None:
     driver.move_to((5.0, 5.0))
     driver.wait()
     assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
-    driver.move(driver.window.layout.panel[0] + 20, 200)
+    driver.move(driver.window.layout.panel.left + 20, 200)
     driver.wait()
     assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 

@@ -58,7 +58,7 @@ def test_panes_have_equal_sizes_and_do_not_overlap(layout: Layout) -> None:
     left, top, width, height = layout.arena
     for k, pane in enumerate(layout.panes):
         assert pane[0] >= left
-        assert pane[1] >= top + layout.legend[3]
+        assert pane[1] >= top + layout.legend.height
         assert pane[0] + pane[2] <= left + width
         assert pane[1] + pane[3] <= top + height
         assert pane[2] > 50
@@ -72,8 +72,8 @@ def test_texts_fit_at_the_scale_of_the_layout(layout: Layout) -> None:
     min_size = MIN_SIZE_PX if width >= height else MIN_PORTRAIT_SIZE_PX
     assert width / layout.scale >= min_size[0]
     assert height / layout.scale >= min_size[1]
-    assert layout.panel[2] in (0, round(320 * layout.scale))
-    assert layout.status[3] == layout.track[3] == round(26 * layout.scale)
+    assert layout.panel.width in (0, round(320 * layout.scale))
+    assert layout.status.height == layout.track.height == round(26 * layout.scale)
 
 
 @given(WIDTHS, HEIGHTS, SCALES)
@@ -91,7 +91,7 @@ def test_windows_that_are_too_small_have_a_small_scale(size: tuple[int, int]) ->
     for panes in (1, 2, 3, 4):
         layout = build_layout(size, 1.0, panes, 1.3)
         assert layout.scale < 1.0
-        assert layout.arena[2] >= 0
+        assert layout.arena.width >= 0
         assert all(pane[3] >= 1 for pane in layout.panes)
 
 

@@ -302,7 +302,7 @@ def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
 def test_the_lesson_pauses_when_the_arena_is_clicked(driver: Driver) -> None:
     driver.press_key("f2")
     driver.run_frames(3)
-    driver.click(*driver.window.layout.arena[2:])
+    driver.click(*driver.window.layout.arena.size)
     driver.click(200, 200)
     assert driver.window.lesson.player is not None
     assert driver.window.lesson.player.state == "left"

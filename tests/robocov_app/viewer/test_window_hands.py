@@ -22,7 +22,7 @@ def test_a_dragged_robot_follows_the_mouse(driver: Driver) -> None:
         driver.run_frames()
     assert np.hypot(*(get_position(driver, 2) - MIDDLE)) < 0.3
     assert driver.session.timeline.run.drag is not None
-    assert driver.session.timeline.run.drag[0] == 2
+    assert driver.session.timeline.run.drag.robot == 2
     driver.release()
     assert driver.session.timeline.run.drag is None
     assert driver.viewer.selected_robot == 2

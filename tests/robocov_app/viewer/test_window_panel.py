@@ -316,9 +316,9 @@ def test_fail_and_remove_buttons_act_on_the_selected_robot(driver: Driver) -> No
 
 def test_the_arena_fills_the_place_of_a_hidden_panel(driver: Driver) -> None:
     driver.press_key("h")
-    assert driver.window.layout.panel[2] == 0
+    assert driver.window.layout.panel.width == 0
     assert driver.window.panel.hidden
-    assert driver.window.layout.arena[2] == 900
+    assert driver.window.layout.arena.width == 900
     driver.click(880, 40)
     driver.press_key("space")
     driver.run_frames(3)
@@ -351,7 +351,7 @@ def test_the_panel_does_not_depend_on_earlier_sizes_and_panes(tmp_path: Path) ->
     def draw_panel(driver: Driver) -> np.ndarray:
         driver.move(300, 300)
         driver.run_frames(3, 0.3)
-        left = driver.window.layout.panel[0]
+        left = driver.window.layout.panel.left
         return driver.copy_frame()[:, left:].copy()
 
     with open_viewer(tmp_path, RAPF, RPF, RPF, size=(1100, 700)) as driver:

@@ -151,7 +151,7 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         driver.run_frames(30)
         ((node, points),) = driver.window.chart.ghosts
         x, y = points[-1].tolist()
-        driver.click(x, y + driver.window.layout.chart[1])
+        driver.click(x, y + driver.window.layout.chart.top)
         assert "robot 2 failed" in driver.viewer.message
         assert driver.session.timeline.head.number == node
         assert driver.session.displayed.numbers == (1, 3)

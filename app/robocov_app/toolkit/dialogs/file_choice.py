@@ -99,14 +99,16 @@ class _FileBrowser:
         prefix = text.removesuffix(name)
         folder = self.resolve(prefix)
         try:
-            # False sorts before True: folders come first.
-            entries = [(not path.is_dir(), path) for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES)]
+            entries = list(islice(folder.iterdir(), MAX_FOLDER_ENTRIES))
+            subfolders = {path for path in entries if path.is_dir()}
         except (OSError, ValueError):
             return []
+        entries.sort(key=lambda path: (path not in subfolders, path.name.lower()))
         options = []
         if not text:
             options += [Option(str(path), "recent", str(path), value=path) for path in self.recent]
-        for is_file, path in sorted(entries, key=lambda entry: (entry[0], entry[1].name.lower())):
+        for path in entries:
+            is_file = path not in subfolders
             if not self._is_listed(path, name, is_file=is_file):
                 continue
             if is_file:

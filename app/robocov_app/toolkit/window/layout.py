@@ -1,12 +1,9 @@
 """Layout of a window: boxes of arena, panel, chart, timeline and status line."""
 
 from math import ceil, floor
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from robocov_app.render.panel_grid import choose_column_count
-
-Box: TypeAlias = tuple[int, int, int, int]
-"""Left, top, width and height, px."""
 
 # Lengths in pixels at scale 1.
 PANEL_WIDTH_PX = 320
@@ -23,6 +20,25 @@ MIN_PORTRAIT_SIZE_PX = (460, 600)
 _MIN_SCALE = 0.25
 _SCALE_STEPS = 8
 """Scales are multiples of 1 / 8, so that text does not jitter while the window is resized."""
+
+
+class Box(NamedTuple):
+    """A rectangle of a window, px; y points down."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+    @property
+    def position(self) -> tuple[int, int]:
+        """Left and top, px."""
+        return self.left, self.top
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.width, self.height
 
 
 class Layout(NamedTuple):
@@ -52,6 +68,11 @@ class Layout(NamedTuple):
     status: Box
     panes: tuple[Box, ...]
     legend: Box
+
+    @property
+    def has_panel(self) -> bool:
+        """Whether the panel is shown."""
+        return self.panel.width > 0
 
 
 def build_layout(
@@ -103,13 +124,13 @@ def build_layout(
     return Layout(
         size=size,
         scale=scale,
-        arena=(0, 0, left_width, arena_height),
-        panel=(left_width, 0, panel_width, height),
-        chart=(0, arena_height, left_width, chart_height),
-        track=(0, arena_height + chart_height, left_width, timeline_height),
-        status=(0, arena_height + chart_height + timeline_height, left_width, status_height),
+        arena=Box(0, 0, left_width, arena_height),
+        panel=Box(left_width, 0, panel_width, height),
+        chart=Box(0, arena_height, left_width, chart_height),
+        track=Box(0, arena_height + chart_height, left_width, timeline_height),
+        status=Box(0, arena_height + chart_height + timeline_height, left_width, status_height),
         panes=_arrange_panes(panes, aspect, scale, left_width, arena_height, legend_height),
-        legend=(0, 0, left_width, legend_height),
+        legend=Box(0, 0, left_width, legend_height),
     )
 
 
@@ -127,7 +148,7 @@ def _arrange_panes(
         row, column = divmod(number, columns)
         left = column * (pane_width + PANE_GAP_PX)
         top = legend_height + row * (pane_height + PANE_GAP_PX)
-        boxes.append((left, top, pane_width, max(pane_height, 1)))
+        boxes.append(Box(left, top, pane_width, max(pane_height, 1)))
     return tuple(boxes)
 
 

@@ -16,6 +16,7 @@ from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_window
 from robocov_app.toolkit.window.faults import FaultLog
 from robocov_app.toolkit.window.input import clean_event, drop_late_repeats
+from robocov_app.toolkit.window.layout import Box
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
 from robocov_app.toolkit.window.termination import is_ending
 
@@ -311,7 +312,7 @@ class BaseWindow:
     def _draw_fault(self, message: str) -> None:
         """Draw a message over the incomplete frame."""
         width, height = self.screen.get_size()
-        draw_message(self.screen, message, (0, 0, width, height), LIGHT, 1.0, is_error=True)
+        draw_message(self.screen, message, Box(0, 0, width, height), LIGHT, 1.0, is_error=True)
         self.show_screen()
 
     # Display

@@ -69,13 +69,15 @@ class HandledTime:
     ----------
     robot : int
         Number of the robot.
-    first_step, last_step : int
-        First step of the period, and the step after its last step.
+    first_step : int
+        First step of the period.
+    end_step : int
+        The step after its last step.
     """
 
     robot: int
     first_step: int
-    last_step: int
+    end_step: int
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ class BranchPart:
             self.recorders[pane.number].add(pane.simulation.observe_and_decide())
         placed = {edit.robot for edit in node.edits if edit.step == run.step and isinstance(edit, PlaceRobot)}
         self.placed += [(run.step, robot) for robot in sorted(placed)]
-        dragged = set() if run.drag is None else {run.drag[0]}
+        dragged = set() if run.drag is None else {run.drag.robot}
         for robot in dragged | placed:
             self._add_handled(robot, run.step)
 
@@ -151,8 +153,8 @@ class BranchPart:
             Step in which it is dragged or placed.
         """
         for time in self.handled:
-            if time.robot == robot and time.last_step >= step - 1:
-                time.last_step = step + 1
+            if time.robot == robot and time.end_step >= step - 1:
+                time.end_step = step + 1
                 return
         self.handled.append(HandledTime(robot, step, step + 1))
 
@@ -264,7 +266,7 @@ def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
 
 def _describe_handled(time: HandledTime, first_step: int, dt: float) -> dict[str, Any]:
     start = (time.first_step - first_step) * dt
-    end = (time.last_step - first_step) * dt
+    end = (time.end_step - first_step) * dt
     return {"from_s": start, "to_s": end, "robots": [time.robot]}
 
 

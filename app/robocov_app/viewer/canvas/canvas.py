@@ -1,6 +1,7 @@
 """The canvas: a painted pane for each controller, one camera for all panes, and overlays of tools."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pygame
@@ -46,7 +47,21 @@ MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, its caption s
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
 _COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while the largest distance is in this fraction of it
-_NO_ROBOT = (-1, -1)
+
+
+class HoveredRobot(NamedTuple):
+    """The robot under the cursor.
+
+    Attributes
+    ----------
+    pane : int
+        Index of the pane that shows it.
+    number : int
+        Number of the robot.
+    """
+
+    pane: int
+    number: int
 
 
 class ViewerCanvas:
@@ -61,8 +76,8 @@ class ViewerCanvas:
 
     Attributes
     ----------
-    hovered : tuple of int
-        Index of the pane and number of the robot under the cursor; (-1, -1) for none.
+    hovered : HoveredRobot or None
+        The robot under the cursor, if there is one.
     layout : Layout
         Layout of the window, from `arrange`.
     """
@@ -73,7 +88,7 @@ class ViewerCanvas:
         """Build a canvas without painters; `arrange` adds them."""
         self.viewer = viewer
         self.theme = theme
-        self.hovered = _NO_ROBOT
+        self.hovered: HoveredRobot | None = None
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._environment: Environment | None = None
@@ -137,7 +152,8 @@ class ViewerCanvas:
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
         """Return the point of the map, m, at a pixel of the window, as shown by a pane."""
-        x, y = self._painters[pane].camera.to_world(np.subtract(pixel, self.layout.panes[pane][:2])).tolist()
+        offset = np.subtract(pixel, self.layout.panes[pane].position)
+        x, y = self._painters[pane].camera.to_world(offset).tolist()
         return x, y
 
     def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
@@ -301,8 +317,8 @@ class ViewerCanvas:
         session = self.viewer.session
         draw_drag(canvas, scene, session.timeline.run.drag)
         draw_failed_selection(canvas, scene, self.viewer.selected_robot)
-        if pane == self.hovered[0]:
-            draw_hovered_robot(canvas, scene, self.hovered[1])
+        if self.hovered is not None and self.hovered.pane == pane:
+            draw_hovered_robot(canvas, scene, self.hovered.number)
         draw_tool_state(canvas, self.viewer.tool.build_draw_state(session))
         surface.set_clip(None)
 

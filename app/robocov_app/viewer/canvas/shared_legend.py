@@ -34,7 +34,7 @@ class SharedLegend:
     def count_rows(self, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]) -> int:
         """Return the number of rows needed; it never decreases within a layout, so that panes do not jump."""
         # Only the width of the page, that of the arena, matters for arranging the rows.
-        page = pygame.Surface((layout.arena[2], 1))
+        page = pygame.Surface((layout.arena.width, 1))
         rows = len(arrange_legend_rows(create_flat_canvas(page, self.theme, layout.scale), entries))
         key = (layout.size, layout.scale, len(layout.panes), layers)
         if key == self._rows_key:

@@ -7,12 +7,13 @@ import pygame
 import shapely
 
 from robocov.arrays import Array
-from robocov.environment import Obstacle, Point
+from robocov.environment import Obstacle
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_tag
+from robocov_app.viewer.session.past.states import Drag
 from robocov_app.viewer.tools.tool import ViewerDrawState
 
 # Lengths in pixels at scale 1.
@@ -25,14 +26,13 @@ _PREMULTIPLIED_FRACTION = 0.35  # the same opacity as a fraction, for premultipl
 _MAX_PIXEL = 1e4  # limit of the coordinates of polygons, which may be far outside the window
 
 
-def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> None:
+def draw_drag(canvas: Canvas, scene: Scene, drag: Drag | None) -> None:
     """Draw a line from the dragged robot to the point to which it is pulled."""
     numbers = list(scene.numbers or ())
-    if drag is None or drag[0] not in numbers:
+    if drag is None or drag.robot not in numbers:
         return
-    number, target = drag
-    position = scene.now.positions[numbers.index(number)]
-    start, end = canvas.camera.to_pixels(np.array([position, target])).tolist()
+    position = scene.now.positions[numbers.index(drag.robot)]
+    start, end = canvas.camera.to_pixels(np.array([position, drag.target])).tolist()
     canvas.draw_dashed_line(start, end, canvas.theme.ink, canvas.scale_width(1.5), dash=3.0)
 
 

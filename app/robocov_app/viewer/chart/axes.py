@@ -62,7 +62,12 @@ def draw_switch(canvas: Canvas, frame: ChartFrame, title_end: float) -> Box:
     chart_left, chart_top, _, _ = frame.layout.chart
     padding = _SWITCH_PADDING_PX * scale
     width = canvas.measure_text(text, size) + 2 * padding
-    return round(chart_left + left - padding), chart_top, round(width), round(TOP_PX * scale)
+    return Box(
+        left=round(chart_left + left - padding),
+        top=chart_top,
+        width=round(width),
+        height=round(TOP_PX * scale),
+    )
 
 
 def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
@@ -75,7 +80,7 @@ def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
         canvas.surface.fill(line_color, (round(times.left), round(row), round(times.width), 1))
         position = (times.left - _VALUE_GAP_PX * frame.scale, row)
         canvas.draw_text(f"{value:.6g}", position, size=size, color=frame.theme.faint, anchor="right")
-    row = frame.layout.chart[3] - 0.5 * BOTTOM_PX * frame.scale
+    row = frame.layout.chart.height - 0.5 * BOTTOM_PX * frame.scale
     step = _choose_time_step(canvas, frame, times)
     for time in list_ticks(0.0, times.end, step).tolist():
         position = (times.to_column(time), row)

@@ -42,7 +42,7 @@ def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) 
         [scale.to_row(values[pane.number]) for pane in panes],
         gap=gap,
         low=0.5 * gap,
-        high=frame.layout.chart[3] - _BOTTOM_PX * frame.scale,
+        high=frame.layout.chart.height - _BOTTOM_PX * frame.scale,
     )
     left = frame.times.right + _LEFT_PX * frame.scale
     for row, pane in zip(rows, panes, strict=True):

@@ -99,7 +99,7 @@ class Chart:
 
     def find_ghost(self, pixel: tuple[int, int]) -> int | None:
         """Return the number of the last node of the branch whose curve is at a pixel; None without one."""
-        point = np.array([pixel[0], pixel[1] - self._layout.chart[1]])
+        point = np.array([pixel[0], pixel[1] - self._layout.chart.top])
         return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self._layout.scale)
 
     def to_time(self, column: float) -> float:
@@ -117,7 +117,7 @@ class Chart:
         page = self._page
         if self._update_page_key(frame) or page is None:
             page = self._draw_page(frame)
-        screen.blit(page, self._layout.chart[:2])
+        screen.blit(page, self._layout.chart.position)
         draw_captions(screen, frame, self._scale)
         draw_present(screen, frame)
         if self.hover is not None:
@@ -152,7 +152,7 @@ class Chart:
     def _draw_page(self, frame: ChartFrame) -> pygame.Surface:
         """Draw the page: axes, events, curves, and the empty time slider."""
         layout = frame.layout
-        page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
+        page = pygame.Surface((layout.chart.width, layout.chart.height + layout.track.height), 0, 32)
         self._page = page
         self._page_time = self.viewer.now
         curves = [curve.values for curve in frame.list_curves()]

@@ -56,5 +56,5 @@ class ChartFrame:
 
     def draw_rule(self, surface: pygame.Surface, column: float, color: Color, *, top: int) -> None:
         """Draw a vertical line across the chart, whose upper edge is at row `top` of the surface."""
-        height = self.layout.chart[3] - (TOP_PX + BOTTOM_PX) * self.scale
+        height = self.layout.chart.height - (TOP_PX + BOTTOM_PX) * self.scale
         surface.fill(color, (round(column), round(top + TOP_PX * self.scale), 1, round(height)))

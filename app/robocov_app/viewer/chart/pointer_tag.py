@@ -32,7 +32,7 @@ def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int
     theme = frame.theme
     scale = frame.scale
     times = frame.times
-    top = frame.layout.chart[1]
+    top = frame.layout.chart.top
     column = round(times.to_column(time))
     frame.draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
     text = describe_events_at(frame, pixel[0]) or _describe_values(frame, time)

@@ -132,7 +132,7 @@ def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array])
     ChartScale
     """
     top = TOP_PX * layout.scale
-    bottom = layout.chart[3] - BOTTOM_PX * layout.scale
+    bottom = layout.chart.height - BOTTOM_PX * layout.scale
     values = np.concatenate([*curves, np.empty(0)])
     low = high = np.nan
     if len(values):

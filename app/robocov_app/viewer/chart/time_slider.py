@@ -34,9 +34,9 @@ def draw_empty_time_line(canvas: Canvas, frame: ChartFrame, times: TimeScale) ->
         Time axis of the page.
     """
     theme = frame.theme
-    top = frame.layout.chart[3]
-    middle = top + 0.5 * frame.layout.track[3]
-    canvas.surface.fill(theme.panel, pygame.Rect(0, top, *frame.layout.track[2:]))
+    top = frame.layout.chart.height
+    middle = top + 0.5 * frame.layout.track.height
+    canvas.surface.fill(theme.panel, pygame.Rect(0, top, *frame.layout.track.size))
     thickness = _get_thickness(frame)
     bar = pygame.Rect(
         round(times.left), round(middle - thickness / 2), round(times.right - times.left), thickness
@@ -58,7 +58,7 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
         canvas.draw_text("live", (left, middle), color=theme.start, bold=True, size=size)
         return
     text = "live · past thinned"
-    if left + canvas.measure_text(text, size=size) > frame.layout.track[2]:
+    if left + canvas.measure_text(text, size=size) > frame.layout.track.width:
         text = "thinned"
     canvas.draw_text(text, (left, middle), color=theme.start, size=size)
 
@@ -69,14 +69,14 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
     times = frame.times
     timeline = frame.timeline
     canvas = create_flat_canvas(screen, theme, frame.scale)
-    middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
+    middle = frame.layout.track.top + 0.5 * frame.layout.track.height
     column = times.to_column(frame.session.displayed.time)
     end_column = times.to_column(timeline.end_time)
     # Gray up to the simulated time; if the past is displayed, colored up to the displayed time.
     _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, 0.4))
     if not timeline.is_live:
         _fill_bar(screen, frame, column, theme.final)
-        frame.draw_rule(screen, column, theme.final, top=frame.layout.chart[1])
+        frame.draw_rule(screen, column, theme.final, top=frame.layout.chart.top)
     dot_radius = max(_MIN_EVENT_DOT_RADIUS_PX, round(_EVENT_DOT_PX * frame.scale) / 2)
     dot = partial(sprites.render_dot, dot_radius, theme.ink)
     for event in timeline.events:
@@ -95,7 +95,7 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
 def _fill_bar(screen: pygame.Surface, frame: ChartFrame, end: float, color: Color) -> None:
     """Fill the bar of the time slider from its start to column `end` of the window."""
     thickness = _get_thickness(frame)
-    middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
+    middle = frame.layout.track.top + 0.5 * frame.layout.track.height
     left = round(frame.times.to_column(0.0))
     width = max(round(end) - left, thickness)
     bar = pygame.Rect(left, round(middle - thickness / 2), width, thickness)

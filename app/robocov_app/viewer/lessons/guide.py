@@ -169,7 +169,7 @@ class LessonGuide:
         self.click_areas = []
         if self.shown is None:
             return False
-        if layout.panel[2]:  # the width of the panel; 0 while it is hidden
+        if layout.has_panel:
             self.click_areas = draw_lesson_page(screen, layout, theme, self.shown)
         else:
             draw_caption(screen, layout, theme, self.shown)

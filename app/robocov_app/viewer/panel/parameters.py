@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from robocov.controllers.gains import Gain, Option, Value
 from robocov.errors import ParameterError, quote
-from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, UNITS
+from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, POINT, UNICYCLE, UNITS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
@@ -190,11 +190,11 @@ def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
 
 def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParameter:
     """Build the parameter of a numeric gain; its slider covers a range around the default value."""
-    usual = min(max(gain.default or 1.0, gain.low), gain.high)
-    if usual > 0 and gain.low >= 0:
-        lowest = usual / SLIDER_SPAN
+    reference_value = min(max(gain.default or 1.0, gain.low), gain.high)
+    if reference_value > 0 and gain.low >= 0:
+        lowest = reference_value / SLIDER_SPAN
     else:
-        lowest = -SLIDER_SPAN * abs(usual)
+        lowest = -SLIDER_SPAN * abs(reference_value)
     return NumberParameter(
         name=name,
         label=name,
@@ -203,7 +203,7 @@ def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParamete
         value=None if isinstance(value, str) else value,
         default=gain.default,
         low=max(gain.low, lowest),
-        high=min(gain.high, SLIDER_SPAN * abs(usual)),
+        high=min(gain.high, SLIDER_SPAN * abs(reference_value)),
         is_optional=gain.optional,
     )
 
@@ -228,10 +228,15 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
             high=slider.high,
             is_optional=name.endswith("_range"),
         )
-    # KINEMATICS is ("point", "unicycle"); only unicycles have a track width.
-    kinematics = KINEMATICS[1] if limits.track_width > 0.0 else KINEMATICS[0]
+    # Only unicycles have a track width.
+    kinematics = UNICYCLE if limits.track_width > 0.0 else POINT
     yield OptionParameter(
-        "team.kinematics", "kinematics", _KINEMATICS_MEANING, kinematics, KINEMATICS[0], KINEMATICS
+        name="team.kinematics",
+        label="kinematics",
+        meaning=_KINEMATICS_MEANING,
+        value=kinematics,
+        default=POINT,
+        choices=KINEMATICS,
     )
 
 
@@ -259,7 +264,7 @@ def replace_limit(limits: RobotProperties, name: str, value: float | str | None)
     """
     name = name.removeprefix("team.")
     if name == "kinematics":
-        is_unicycle = value == KINEMATICS[1]
+        is_unicycle = value == UNICYCLE
         name = "track_width"
         value = DEFAULT_TRACK_PER_RADIUS * limits.radius if is_unicycle else 0.0
     number = math.inf if value is None else float(value)

@@ -27,7 +27,7 @@ from robocov_app.viewer.session.edits import (
     SetDensity,
 )
 from robocov_app.viewer.session.pane import Continuation, Pane, resume_simulation, start_simulation
-from robocov_app.viewer.session.past.states import PaneSetup, RunState
+from robocov_app.viewer.session.past.states import Drag, PaneSetup, RunState
 from robocov_app.viewer.session.scenario import SessionScenario
 
 MIN_REPORTED_OFFSET_M = 5e-4
@@ -66,8 +66,8 @@ class Lockstep:
         Current map, controllers and properties.
     step : int
         Number of control steps since time 0.
-    drag : tuple or None
-        Number of the dragged robot, and the point to which it is pulled, m.
+    drag : Drag or None
+        The dragged robot, if there is one.
     panes : list of Pane
         One pane for each controller.
 
@@ -95,7 +95,7 @@ class Lockstep:
         numbers = tuple((np.flatnonzero(is_working) + 1).tolist())
         self.scenario = scenario
         self.step = 0
-        self.drag: tuple[int, Point] | None = None
+        self.drag: Drag | None = None
         self.panes: list[Pane] = []
         for number, controller in enumerate(scenario.controllers):
             setup = PaneSetup(scenario.environment, controller, scenario.properties, numbers, {}, conditions)
@@ -164,7 +164,7 @@ class Lockstep:
         """
         match edit:
             case DragRobot(robot, to):
-                self.drag = (robot, to)
+                self.drag = Drag(robot, to)
                 return
             case ReleaseRobot():
                 self.drag = None
@@ -195,7 +195,7 @@ class Lockstep:
 
     def _edit_panes(self, edit: PaneEdit) -> None:
         self._change_panes(edit.build_continuation)
-        is_drag_possible = self.drag is not None and self.panes[0].get_row(self.drag[0]) is not None
+        is_drag_possible = self.drag is not None and self.panes[0].get_row(self.drag.robot) is not None
         if isinstance(edit, PlaceRobot) or not is_drag_possible:
             self.drag = None
 
@@ -214,11 +214,10 @@ class Lockstep:
         """Return the forces of the spring that pulls the dragged robot, (n, 2) N; None if there is none."""
         if self.drag is None:
             return None
-        number, target = self.drag
-        row = pane.get_row(number)
+        row = pane.get_row(self.drag.robot)
         if row is None:
             return None
-        return compute_spring_forces(pane.simulation, row, target)
+        return compute_spring_forces(pane.simulation, row, self.drag.target)
 
     def _find_changing_robots(self, change_times: Array) -> list[int]:
         """Return the numbers of the robots whose change times, (n,) s, lie within the last step."""

@@ -396,7 +396,7 @@ class Session:
     def release(self) -> None:
         """Release the dragged robot, if there is one, and end the current gesture."""
         if self.timeline.run.drag is not None and self.timeline.is_live:
-            number, _ = self.timeline.run.drag
+            number = self.timeline.run.drag.robot
             self.apply(ReleaseRobot(), "hand", f"robot {number} was dragged", ("hand", number))
         self._gesture = None
 

@@ -9,15 +9,13 @@ from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.window.layout import is_inside
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
-from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.canvas.canvas import HoveredRobot, ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.scrubbing import TimeGesture
 from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
-
-_NO_ROBOT = (-1, -1)
 
 
 class ViewerPointer(Pointer):
@@ -71,9 +69,9 @@ class ViewerPointer(Pointer):
             inspection.cursor_pane = pane
             if viewer.tool.takes_robots:
                 number = canvas.find_robot(self.at, pane)
-        canvas.hovered = _NO_ROBOT
+        canvas.hovered = None
         if pane is not None and number is not None:
-            canvas.hovered = (pane, number)
+            canvas.hovered = HoveredRobot(pane, number)
         cursor.show(self._choose_cursor(pane, number))
 
     def _choose_cursor(self, pane: int | None, number: int | None) -> CursorShape:

@@ -275,7 +275,7 @@ class ViewerWindow(CommandWindow):
         self.chart.draw(self.screen)
         self._draw_status()
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
-        if not has_lesson and layout.panel[2]:  # the width of the panel; 0 while it is hidden
+        if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
         self._draw_message(can_suggest=not has_lesson)
         self.draw_above_map()

@@ -111,6 +111,21 @@ class PaneState(NamedTuple):
     steering: Array | None = None
 
 
+class Drag(NamedTuple):
+    """A robot that the user drags.
+
+    Attributes
+    ----------
+    robot : int
+        Number of the robot.
+    target : tuple of float, m
+        Point to which it is pulled.
+    """
+
+    robot: int
+    target: Point
+
+
 class RunState(NamedTuple):
     """State of all panes at one step.
 
@@ -122,8 +137,8 @@ class RunState(NamedTuple):
         State of each pane, by its number.
     scenario : SessionScenario
         Map, controllers and properties at this step.
-    drag : tuple or None
-        Number of the dragged robot, and the point to which it is pulled, m.
+    drag : Drag or None
+        The dragged robot, if there is one.
     node : int
         Number of the node of the undo tree whose time span contains the step.
     """
@@ -131,5 +146,5 @@ class RunState(NamedTuple):
     step: int
     states: Mapping[int, PaneState]
     scenario: SessionScenario
-    drag: tuple[int, Point] | None = None
+    drag: Drag | None = None
     node: int = 0
