@@ -42,10 +42,19 @@ BUILD_GOALS_S = {(128, 200): 0.15, (512, 1000): 8.0}
 """Maximum times to build the cost, by lattice and vertices."""
 YARDSTICK = "scikit-fmm, order 2"
 _OBSTACLE_CORNERS = 5
+_BLOCKED_SHARE = 0.23
+"""Share of the area that the random obstacles block, without overlaps."""
+_MEAN_OBSTACLE_AREA_RADII2 = 2.2
+"""Mean area of an obstacle, in squares of the radius inside which its corners are not."""
+_MIN_OBSTACLE_AREA_RADII2 = 0.3
+"""Area below which an obstacle is drawn again, because it is a sliver."""
 _MIN_ROUNDS = 7
+_QUICK_DURATION_S = 0.3
+_FULL_DURATION_S = 1.0
+"""Minimum total time of the rounds of a case, s."""
 
 TREE = "k-d tree of the robots"
-BEFORE = {
+EARLIER_RATIOS = {
     ("rooms", 64, 6): 4.5,
     ("rooms", 128, 6): 2.8,
     ("rooms", 256, 6): 1.7,
@@ -66,9 +75,9 @@ BEFORE = {
     ("campus", 256, 50): 3.2,
     ("campus", 64, 1000): 136.8,
 }
-"""Earlier ratios to the time of the tree, by map, lattice and robots; see `Row.before`."""
+"""Earlier ratios to the time of the tree, by map, lattice and robots; see `Row.earlier_ratio`."""
 SPEEDUPS = {64: 4.0, 128: 2.5, 256: 1.7}
-"""Minimum speedups over the ratios in `BEFORE`, by lattice."""
+"""Minimum speedups over the ratios in `EARLIER_RATIOS`, by lattice."""
 _CAMPUS_FACTOR = 2.0
 _LARGE_TEAM = 1000
 _LARGE_TEAM_SPEEDUP = 10.0
@@ -84,7 +93,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 
 def list_map_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark cases of the cost on bundled maps; quick cases use the smallest lattice only."""
-    sizes = sorted({(name, lattice) for name, lattice, _ in BEFORE if not quick or lattice == 64})
+    sizes = sorted({(name, lattice) for name, lattice, _ in EARLIER_RATIOS if not quick or lattice == 64})
     return [partial(_measure_map, name, lattice, quick) for name, lattice in sizes]
 
 
@@ -96,15 +105,14 @@ def has_yardstick() -> bool:
 def build_random_map(vertices: int, seed: int = 0) -> Environment:
     """Build a unit square in which obstacles with five corners each block about a quarter of the area."""
     rng = np.random.default_rng(seed)
-    # 0.23: share of the area to block. 2.2: mean area of an obstacle in units of radius**2.
-    radius = np.sqrt(0.23 / (vertices / _OBSTACLE_CORNERS) / 2.2)
+    area_per_obstacle = _BLOCKED_SHARE / (vertices / _OBSTACLE_CORNERS)
+    radius = np.sqrt(area_per_obstacle / _MEAN_OBSTACLE_AREA_RADII2)
     obstacles: list[PolygonObstacle] = []
     while len(obstacles) < vertices // _OBSTACLE_CORNERS:
         angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, _OBSTACLE_CORNERS))
         directions = np.column_stack([np.cos(angle), np.sin(angle)])
         ring = rng.random(2) + radius * rng.uniform(1.0, 1.5) * directions
-        # Slivers are drawn again.
-        if shapely.Polygon(ring).area > 0.3 * radius**2:
+        if shapely.Polygon(ring).area > _MIN_OBSTACLE_AREA_RADII2 * radius**2:
             obstacles.append(PolygonObstacle(tuple((float(x), float(y)) for x, y in ring)))
     return Environment("random", ((0, 0), (1, 0), (1, 1), (0, 1)), tuple(obstacles))
 
@@ -150,27 +158,27 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     cost = CoverageCost(environment, lattice)
     build_time = perf_counter() - start
     size = {"lattice": lattice, "vertices": vertices}
-    build_goal = BUILD_GOALS_S.get((lattice, vertices))
-    yield Row("cost", "built, once a map", size, build_time, goal_seconds=build_goal)
+    max_build_time = BUILD_GOALS_S.get((lattice, vertices))
+    yield Row("cost", "built, once per map", size, build_time, max_seconds=max_build_time)
     team_sizes = QUICK_ROBOTS if quick else ROBOTS
     for robots in team_sizes:
         if robots > len(cost.points):
             continue
         moving = MovingRobots(cost, robots)
-        other = _measure_by_marching if has_yardstick() else None
-        times = _measure_costs(cost, moving, other, quick)
+        yardstick = _measure_by_marching if has_yardstick() else None
+        times = _measure_costs(cost, moving, yardstick, quick)
         row = Row("cost", "evaluated", size | {"robots": robots}, times["exact"])
-        if "other" in times:
-            goal = GOALS.get((lattice, vertices, robots))
-            row = replace(row, yardstick=YARDSTICK, yardstick_seconds=times["other"], goal=goal)
+        if yardstick is not None:
+            max_ratio = GOALS.get((lattice, vertices, robots))
+            row = replace(row, yardstick=YARDSTICK, yardstick_seconds=times["yardstick"], max_ratio=max_ratio)
         yield row
 
 
 def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
-    """Measure the cost on a bundled map for each team size in `BEFORE`, compared with a k-d tree."""
+    """Measure the cost on a bundled map for each team size in `EARLIER_RATIOS`, compared with a k-d tree."""
     cost = CoverageCost(load_map(name), lattice)
-    for (other_name, other_lattice, robots), before in BEFORE.items():
-        if (other_name, other_lattice) != (name, lattice):
+    for (map_name, map_lattice, robots), earlier_ratio in EARLIER_RATIOS.items():
+        if (map_name, map_lattice) != (name, lattice):
             continue
         times = _measure_costs(cost, MovingRobots(cost, robots), _measure_by_tree, quick)
         speedup = SPEEDUPS[lattice]
@@ -185,23 +193,24 @@ def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
             size,
             times["exact"],
             yardstick=TREE,
-            yardstick_seconds=times["other"],
-            goal=before / speedup,
-            before=before,
+            yardstick_seconds=times["yardstick"],
+            max_ratio=earlier_ratio / speedup,
+            earlier_ratio=earlier_ratio,
         )
 
 
 def _measure_costs(
     cost: CoverageCost,
     moving: MovingRobots,
-    other: Callable[[CoverageCost, MovingRobots], object] | None,
+    yardstick: Callable[[CoverageCost, MovingRobots], object] | None,
     quick: bool,
 ) -> dict[str, float]:
-    """Measure the "exact" cost and, if given, an "other" method in alternation; return median times, s."""
+    """Return the median times, s, of the "exact" cost and, if given, of the "yardstick" in alternation."""
     calls: dict[str, Call] = {"exact": lambda: cost(moving.positions).mean_distance}
-    if other is not None:
-        calls["other"] = partial(other, cost, moving)
-    return measure_in_alternation(calls, _MIN_ROUNDS, 0.3 if quick else 1.0, before=moving.move)
+    if yardstick is not None:
+        calls["yardstick"] = partial(yardstick, cost, moving)
+    duration = _QUICK_DURATION_S if quick else _FULL_DURATION_S
+    return measure_in_alternation(calls, _MIN_ROUNDS, duration, before_round=moving.move)
 
 
 def _measure_by_marching(cost: CoverageCost, moving: MovingRobots) -> float:

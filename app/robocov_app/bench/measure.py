@@ -3,7 +3,7 @@
 import gc
 import itertools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
 from typing import Any, TypeAlias
@@ -32,13 +32,13 @@ class Row:
         Name of the yardstick.
     yardstick_seconds : float, optional
         Median time of the yardstick, s.
-    goal : float, optional
-        Maximum ratio of the time to the yardstick's.
-    goal_seconds : float, optional
-        Maximum time, s.
+    max_ratio : float, optional
+        Goal: maximum ratio of the time to the yardstick's.
+    max_seconds : float, optional
+        Goal: maximum time, s.
     note : str
         The time in another unit, for example "95 x real time".
-    before : float, optional
+    earlier_ratio : float, optional
         Approximate ratio before any code was compiled (commit 8838167).
     """
 
@@ -48,10 +48,10 @@ class Row:
     seconds: float
     yardstick: str | None = None
     yardstick_seconds: float | None = None
-    goal: float | None = None
-    goal_seconds: float | None = None
+    max_ratio: float | None = None
+    max_seconds: float | None = None
     note: str = ""
-    before: float | None = None
+    earlier_ratio: float | None = None
 
     @property
     def ratio(self) -> float | None:
@@ -61,10 +61,13 @@ class Row:
         return self.seconds / self.yardstick_seconds
 
     @property
-    def met(self) -> bool | None:
+    def meets_goals(self) -> bool | None:
         """Whether all goals are met; None if there are none."""
-        limits = ((self.ratio, self.goal), (self.seconds, self.goal_seconds))
-        results = [value <= goal for value, goal in limits if value is not None and goal is not None]
+        results = []
+        if self.ratio is not None and self.max_ratio is not None:
+            results.append(self.ratio <= self.max_ratio)
+        if self.max_seconds is not None:
+            results.append(self.seconds <= self.max_seconds)
         if not results:
             return None
         return all(results)
@@ -84,16 +87,29 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row, with its ratio and result, as a dictionary for JSON."""
-        return asdict(self) | {"ratio": self.ratio, "met": self.met}
+        return {
+            "part": self.part,
+            "name": self.name,
+            "parameters": dict(self.parameters),
+            "seconds": self.seconds,
+            "yardstick": self.yardstick,
+            "yardstick_seconds": self.yardstick_seconds,
+            "goal": self.max_ratio,
+            "goal_seconds": self.max_seconds,
+            "note": self.note,
+            "before": self.earlier_ratio,
+            "ratio": self.ratio,
+            "met": self.meets_goals,
+        }
 
 
 def measure_in_alternation(
     calls: Mapping[str, Call],
-    count: int,
-    seconds: float = 0.0,
+    min_rounds: int,
+    min_duration: float = 0.0,
     *,
     clock: Callable[[], float] = perf_counter,
-    before: Call = lambda: None,
+    before_round: Call = lambda: None,
 ) -> dict[str, float]:
     """Time several calls in alternation, so that other programs slow all of them down equally.
 
@@ -103,13 +119,13 @@ def measure_in_alternation(
     ----------
     calls : Mapping
         The calls by name.
-    count : int
+    min_rounds : int
         Minimum number of rounds.
-    seconds : float
+    min_duration : float
         Minimum total time of the rounds, s.
     clock : callable
         Returns a time, s.
-    before : callable
+    before_round : callable
         Called before each round. Its time does not count.
 
     Returns
@@ -118,22 +134,22 @@ def measure_in_alternation(
         Median time of each call, s.
     """
     times: dict[str, list[float]] = {name: [] for name in calls}
-    is_collecting = gc.isenabled()
+    is_gc_enabled = gc.isenabled()
     gc.collect()
     gc.disable()
     try:
         for call in calls.values():
             call()
-        end = clock() + seconds
+        end = clock() + min_duration
         for rounds in itertools.count():
-            if rounds >= count and clock() >= end:
+            if rounds >= min_rounds and clock() >= end:
                 break
-            before()
+            before_round()
             for name, call in calls.items():
                 start = clock()
                 call()
                 times[name].append(clock() - start)
     finally:
-        if is_collecting:
+        if is_gc_enabled:
             gc.enable()
     return {name: median(measured) for name, measured in times.items()}

@@ -25,6 +25,10 @@ HEADINGS = {
 }
 """Heading of each part of the benchmark."""
 _WIDTH_PX = 1100
+_MARGIN_PX = 24
+_TITLE_CENTER_PX = 30
+_NOTE_CENTER_PX = 58
+"""Vertical positions of the title and of the note."""
 _TITLE_HEIGHT_PX = 92
 _ROW_HEIGHT_PX = 26
 _LEFT_PX = 400
@@ -33,7 +37,21 @@ _RIGHT_PX = 90
 """Width of the row values, right of the axes."""
 _HEADING_HEIGHT_PX = 66
 """Space above a part for its heading."""
+_HEADING_OFFSET_PX = 16
+"""Distance from the top of a part to the middle of its heading."""
 _PART_BOTTOM_PX = 16
+_TEXT_GAP_PX = 14
+"""Space between the axes and the texts of a row."""
+_GOAL_BAR_ROWS = 0.36
+"""Half the length of the bar at a goal, as a fraction of the height of a row."""
+_RATIO_LINE_WIDTH = 1.6
+_RATIO_LINE_OPACITY = 0.5
+_DOT_SIZE = 6.5
+_LOW_MARGIN = 0.75
+_HIGH_MARGIN = 1.35
+"""Factors from the smallest and the largest drawn value to the limits of the axes."""
+_DECADES = range(-4, 6)
+"""Powers of ten between which ticks are chosen."""
 _AXES_OFFSET_PX = 26
 _MAX_TICKS = 7
 
@@ -54,8 +72,10 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     height = _TITLE_HEIGHT_PX + sum(_compute_part_height(group) for _, group in parts)
     with plain_style():
         page = FigurePage((_WIDTH_PX, height), theme, scale=1.0)
-        page.write("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
-        page.write(NOTE, 24, 58, color=theme.faint)
+        page.write(
+            "Time as a multiple of the yardstick's", _MARGIN_PX, _TITLE_CENTER_PX, points=HEADING, bold=True
+        )
+        page.write(NOTE, _MARGIN_PX, _NOTE_CENTER_PX, color=theme.faint)
         top = float(_TITLE_HEIGHT_PX)
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)
@@ -69,7 +89,7 @@ def _compute_part_height(rows: Sequence[Row]) -> int:
 
 def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) -> None:
     """Draw the heading and the rows of a part, starting at the vertical position `top`, px."""
-    page.write(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
+    page.write(heading, _MARGIN_PX, top + _HEADING_OFFSET_PX, points=TEXT + 1.5, bold=True)
     axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
     width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
     axes = page.add_axes((_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
@@ -92,31 +112,37 @@ def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) 
 def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
     """Draw the dot of a row, a line from it to ratio 1, and a bar at its goal."""
     ratio = cast("float", row.ratio)
-    color = to_plot_color(theme.get_controller_color("rapf"))
-    if row.met is False:
-        # A missed goal has another color.
-        color = to_plot_color(theme.get_controller_color("rpf"))
-    axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
-    axes.plot(ratio, y, "o", color=color, markersize=6.5)
-    if row.goal is not None:
-        axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=to_plot_color(theme.ink), linewidth=2)
+    color = to_plot_color(theme.accent)
+    if row.meets_goals is False:
+        color = to_plot_color(theme.error)
+    axes.plot([1.0, ratio], [y, y], color=color, linewidth=_RATIO_LINE_WIDTH, alpha=_RATIO_LINE_OPACITY)
+    axes.plot(ratio, y, "o", color=color, markersize=_DOT_SIZE)
+    if row.max_ratio is not None:
+        bar = [y - _GOAL_BAR_ROWS, y + _GOAL_BAR_ROWS]
+        axes.plot([row.max_ratio] * 2, bar, color=to_plot_color(theme.ink), linewidth=2)
 
 
 def _draw_row_texts(page: FigurePage, row: Row, y: float) -> None:
     """Draw the label of a row to the left of the axes, and its ratio to the right."""
     label = ", ".join(text for text in (row.name, row.case) if text)
     page.write(
-        f"{label}  /  {row.yardstick}", _LEFT_PX - 14, y, points=SMALL, max_width=_LEFT_PX - 38, align="right"
+        f"{label}  /  {row.yardstick}",
+        _LEFT_PX - _TEXT_GAP_PX,
+        y,
+        points=SMALL,
+        max_width=_LEFT_PX - _MARGIN_PX - _TEXT_GAP_PX,
+        align="right",
     )
-    page.write(f"{row.ratio:.2f}", _WIDTH_PX - _RIGHT_PX + 14, y, points=SMALL, bold=row.met is False)
+    ratio_x = _WIDTH_PX - _RIGHT_PX + _TEXT_GAP_PX
+    page.write(f"{row.ratio:.2f}", ratio_x, y, points=SMALL, bold=row.meets_goals is False)
 
 
 def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:
     """Return horizontal limits that include all ratios, all goals and 1, with some margin."""
     values = [1.0]
     for row in rows:
-        values += [value for value in (row.ratio, row.goal) if value is not None]
-    return 0.75 * min(values), 1.35 * max(values)
+        values += [value for value in (row.ratio, row.max_ratio) if value is not None]
+    return _LOW_MARGIN * min(values), _HIGH_MARGIN * max(values)
 
 
 def _choose_ticks(low: float, high: float) -> list[float]:
@@ -127,7 +153,7 @@ def _choose_ticks(low: float, high: float) -> list[float]:
     """
     ticks: list[float] = []
     for leading_digits in ((1, 2, 5), (1, 3), (1,)):
-        numbers = [float(f"{digit}e{power}") for power in range(-4, 6) for digit in leading_digits]
+        numbers = [float(f"{digit}e{power}") for power in _DECADES for digit in leading_digits]
         ticks = [number for number in numbers if low <= number <= high]
         if len(ticks) <= _MAX_TICKS:
             break

@@ -26,6 +26,15 @@ FRAME_GOALS_S = {50: 4e-3}
 FRAME_YARDSTICK = "clear and flip"
 _FRAME_CASES = (("rooms", 6), ("rooms", 50), ("campus", 200))
 """Map and number of robots of each case."""
+_QUICK_FRAME_ROUNDS = 40
+_FULL_FRAME_ROUNDS = 150
+_ENCODED_MAP = "rooms"
+_ENCODED_ROBOTS = 6
+"""Map and number of robots of the encoded frames."""
+_QUICK_ENCODED_FRAMES = 60
+_FULL_ENCODED_FRAMES = 240
+_QUICK_ENCODING_ROUNDS = 1
+_FULL_ENCODING_ROUNDS = 3
 _RUN_DURATION_S = 5.0
 _WHITE = (255, 255, 255)
 
@@ -43,7 +52,7 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
     canvas = pygame.Surface(SIZE_PX)
     scenes = cycle([build_record_scene(record, k) for k in range(len(record))])
     calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": build_clearing_call(canvas)}
-    times = measure_in_alternation(calls, 40 if quick else 150)
+    times = measure_in_alternation(calls, _QUICK_FRAME_ROUNDS if quick else _FULL_FRAME_ROUNDS)
     yield Row(
         "render",
         "one frame",
@@ -51,7 +60,7 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
         times["frame"],
         yardstick=FRAME_YARDSTICK,
         yardstick_seconds=times["bare"],
-        goal_seconds=FRAME_GOALS_S.get(robots),
+        max_seconds=FRAME_GOALS_S.get(robots),
     )
 
 
@@ -64,9 +73,10 @@ def build_clearing_call(canvas: pygame.Surface | None) -> Call:
 
 def _measure_encoding(quick: bool) -> Iterator[Row]:
     """Measure the encoding of the frames of a run as a video and as PNGs, compared with drawing them."""
-    record = _simulate("rooms", 6)
+    record = _simulate(_ENCODED_MAP, _ENCODED_ROBOTS)
     settings = VideoSettings(colors="robots")
-    rows = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
+    frame_count = _QUICK_ENCODED_FRAMES if quick else _FULL_ENCODED_FRAMES
+    rows = np.linspace(0, len(record) - 1, frame_count).astype(np.intp)
     frames = list(draw_frames(record, settings, size=SIZE_PX, rows=rows))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "video.mp4"
@@ -75,7 +85,7 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
             "video": lambda: save_video(path, frames),
             "png": lambda: [encode_png(frame) for frame in frames],
         }
-        times = measure_in_alternation(calls, 1 if quick else 3)
+        times = measure_in_alternation(calls, _QUICK_ENCODING_ROUNDS if quick else _FULL_ENCODING_ROUNDS)
     for name, call in (("video encoded", "video"), ("PNGs encoded", "png")):
         yield Row(
             "render",
@@ -84,7 +94,7 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
             times[call],
             yardstick="drawing the frames",
             yardstick_seconds=times["draw"],
-            note=f"{len(frames) / times[call]:.0f} frames a second",
+            note=f"{len(frames) / times[call]:.0f} frames per second",
         )
 
 

@@ -30,13 +30,13 @@ GOALS = {
     1000: Ratios(triangulation=0.65, physics=16.0),
 }
 """Maximum ratios by number of robots: 1.5 times the ratios of an engine that bypasses pymunk's interface."""
-BEFORE = {
+EARLIER_RATIOS = {
     6: Ratios(triangulation=4.2, physics=80.0),
     50: Ratios(triangulation=2.6, physics=57.0),
     200: Ratios(triangulation=1.4, physics=38.0),
     1000: Ratios(triangulation=1.0, physics=31.0),
 }
-"""Earlier ratios; see `Row.before`."""
+"""Earlier ratios; see `Row.earlier_ratio`."""
 BATCH_RUNS = 64
 """Number of runs that are simulated together."""
 BATCH_GOAL = 5.0
@@ -48,9 +48,14 @@ TRIANGULATION = "Qhull's Delaunay"
 WARM_UP_STEPS = 120
 """Steps before the measurement: two seconds of simulation time, after which the team is moving."""
 _MIN_SPEED = 60.0
-"""Minimum ratio of simulation time to real time for six robots."""
+"""Minimum ratio of simulation time to real time for a team of `_REAL_TIME_ROBOTS`."""
+_REAL_TIME_ROBOTS = 6
+_QUICK_ROUNDS = 60
+_FULL_ROUNDS = 300
 _LARGE_TEAM = 500
 """Number of robots above which fewer rounds are measured."""
+_QUICK_LARGE_TEAM_ROUNDS = 30
+_FULL_LARGE_TEAM_ROUNDS = 100
 _ROBOT_RADIUS_M = 0.1
 
 
@@ -72,9 +77,9 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
     times = measure_in_alternation(calls, _get_rounds(robots, quick))
     step = times["step"]
     goals = GOALS[robots]
-    before = BEFORE[robots]
+    earlier_ratios = EARLIER_RATIOS[robots]
     max_step_s = None
-    if robots == 6:
+    if robots == _REAL_TIME_ROBOTS:
         max_step_s = simulation.dt / _MIN_SPEED
     yield Row(
         "step",
@@ -83,10 +88,10 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         step,
         yardstick=TRIANGULATION,
         yardstick_seconds=times["delaunay"],
-        goal=goals.triangulation,
-        goal_seconds=max_step_s,
+        max_ratio=goals.triangulation,
+        max_seconds=max_step_s,
         note=f"{simulation.dt / step:.0f} x real time",
-        before=before.triangulation,
+        earlier_ratio=earlier_ratios.triangulation,
     )
     yield Row(
         "step",
@@ -95,15 +100,15 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         step,
         yardstick=BARE_PHYSICS,
         yardstick_seconds=times["space"],
-        goal=goals.physics,
-        before=before.physics,
+        max_ratio=goals.physics,
+        earlier_ratio=earlier_ratios.physics,
     )
 
 
 def _get_rounds(robots: int, quick: bool) -> int:
     if robots > _LARGE_TEAM:
-        return 30 if quick else 100
-    return 60 if quick else 300
+        return _QUICK_LARGE_TEAM_ROUNDS if quick else _FULL_LARGE_TEAM_ROUNDS
+    return _QUICK_ROUNDS if quick else _FULL_ROUNDS
 
 
 def _measure_batch(quick: bool) -> Iterator[Row]:
@@ -119,16 +124,16 @@ def _measure_batch(quick: bool) -> Iterator[Row]:
             space.step(simulation.dt)
 
     calls: dict[str, Call] = {"step": simulation.step, "space": step_spaces}
-    times = measure_in_alternation(calls, 60 if quick else 300)
+    times = measure_in_alternation(calls, _get_rounds(BATCH_ROBOTS, quick))
     yield Row(
         "step",
-        "one step of one run",
-        {"robots": BATCH_ROBOTS, "runs together": BATCH_RUNS},
+        "one step per run",
+        {"robots": BATCH_ROBOTS, "runs": BATCH_RUNS},
         times["step"] / BATCH_RUNS,
         yardstick=BARE_PHYSICS,
         yardstick_seconds=times["space"] / BATCH_RUNS,
-        goal=BATCH_GOAL,
-        before=BEFORE[BATCH_ROBOTS].physics,
+        max_ratio=BATCH_GOAL,
+        earlier_ratio=EARLIER_RATIOS[BATCH_ROBOTS].physics,
     )
 
 

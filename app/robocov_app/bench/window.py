@@ -31,6 +31,8 @@ FRAME_GOALS_S = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 """Maximum total time of a frame (simulation, cost and drawing), by number of robots."""
 MAX_FRAME_S = 50e-3
 """Maximum time of the slowest frame."""
+_QUICK_DURATION_S = 4.0
+_FULL_DURATION_S = 15.0
 _MIN_CROWD = 100
 """Team size from which the robots are smaller, so that all of them fit on the map."""
 _CROWD_RADIUS_M = 0.05
@@ -51,7 +53,7 @@ class _Measurements:
 
 def list_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark cases of the window, one for each team size."""
-    seconds = 4.0 if quick else 15.0
+    seconds = _QUICK_DURATION_S if quick else _FULL_DURATION_S
     return [partial(_measure_window, robots, seconds) for robots in TEAM_SIZES]
 
 
@@ -76,15 +78,15 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
         bare = measure_in_alternation({"bare": clear_and_flip}, len(measured.frames))["bare"]
     figures = (
         (
-            "all of a frame",
+            "whole frame",
             median(measured.frames),
             FRAME_GOALS_S[robots],
-            f"{measured.costs / seconds:.0f} costs a second",
+            f"{measured.costs / seconds:.0f} costs per second",
         ),
         ("drawing", median(measured.drawing), DRAWING_GOALS_S.get(robots), ""),
-        ("the longest", max(measured.frames), MAX_FRAME_S, f"of {len(measured.frames)} frames"),
+        ("longest frame", max(measured.frames), MAX_FRAME_S, f"of {len(measured.frames)} frames"),
     )
-    for name, time, goal, note in figures:
+    for name, time, max_seconds, note in figures:
         yield Row(
             "window",
             name,
@@ -92,7 +94,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
             time,
             yardstick=FRAME_YARDSTICK,
             yardstick_seconds=bare,
-            goal_seconds=goal,
+            max_seconds=max_seconds,
             note=note,
         )
 

@@ -157,7 +157,7 @@ def _describe_machine() -> dict[str, Any]:
 def _print_machine(machine: dict[str, Any]) -> None:
     console = create_console()
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    console.print("before: about the ratio when nothing was compiled (commit 8838167)")
+    console.print("before: approximate ratio before any code was compiled (commit 8838167)")
     console.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {packages}")
 
 
@@ -188,7 +188,7 @@ def _format_measurement(row: Row) -> list[str]:
         format_duration(row.seconds),
         format_duration(row.yardstick_seconds),
         _format_ratio(row.ratio),
-        _format_ratio(row.before),
+        _format_ratio(row.earlier_ratio),
         format_goals(row),
         "" if row.yardstick is None else f"/ {row.yardstick}",
         row.note,
@@ -215,12 +215,12 @@ def format_goals(row: Row) -> str:
         An empty text if there are no goals.
     """
     goals = []
-    if row.goal is not None and row.ratio is not None:
-        goals.append(f"{row.goal:.3g}")
-    if row.goal_seconds is not None:
-        goals.append(format_duration(row.goal_seconds))
+    if row.max_ratio is not None and row.ratio is not None:
+        goals.append(f"{row.max_ratio:.3g}")
+    if row.max_seconds is not None:
+        goals.append(format_duration(row.max_seconds))
     text = ", ".join(goals)
-    if row.met is False:
+    if row.meets_goals is False:
         text += " missed"
     return text
 

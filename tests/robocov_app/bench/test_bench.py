@@ -50,7 +50,7 @@ def test_calls_alternate_and_have_median_times():
 
     calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
     prepared = partial(noted, "before", clock.work(*[100.0] * 3))
-    assert measure_in_alternation(calls, 3, clock=clock, before=prepared) == {"slow": 2.0, "quick": 0.5}
+    assert measure_in_alternation(calls, 3, clock=clock, before_round=prepared) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
     round_ = [("slow", False), ("quick", False)]
     assert order == [*round_, *[("before", False), *round_] * 3]
@@ -74,14 +74,14 @@ def test_rounds_continue_until_the_minimum_time():
 def test_a_goal_is_met_or_missed(goal, goal_seconds, met):
     row = Row("step", "one step", {"robots": 6}, 0.4, "yardstick", 0.2, goal, goal_seconds)
     assert row.ratio == 2.0
-    assert row.met is met
+    assert row.meets_goals is met
     assert ("missed" in bench.format_goals(row)) == (met is False)
     assert list(row.to_dict()) == KEYS
 
 
 def test_without_a_yardstick_there_is_no_ratio():
-    row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, goal=1.0)
-    assert (row.ratio, row.met) == (None, None)
+    row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, max_ratio=1.0)
+    assert (row.ratio, row.meets_goals) == (None, None)
     assert bench.format_goals(row) == ""
     assert row.case == "128 x 128, 6 robots"
 
@@ -98,7 +98,7 @@ def shrink_parts(monkeypatch):
     """Make every part a matter of a second or two."""
     monkeypatch.setattr(step, "GOALS", {6: step.GOALS[6]})
     monkeypatch.setattr(step, "BATCH_RUNS", 2)
-    monkeypatch.setattr(cost, "BEFORE", {("rooms", 64, 6): 4.5})
+    monkeypatch.setattr(cost, "EARLIER_RATIOS", {("rooms", 64, 6): 4.5})
     monkeypatch.setattr(learning, "ENVIRONMENTS", 2)
     monkeypatch.setattr(processes, "MAPS", ("square",))
     monkeypatch.setattr(processes, "DURATION_S", 1.0)
@@ -146,7 +146,7 @@ def test_the_cost_is_compared_with_its_yardstick(monkeypatch):
     shrink_parts(monkeypatch)
     built, few, many = cost._measure_size(128, 200, quick=True)
     assert built.yardstick is None
-    assert (few.goal, many.goal) == (cost.GOALS[128, 200, 6], cost.GOALS[128, 200, 50])
+    assert (few.max_ratio, many.max_ratio) == (cost.GOALS[128, 200, 6], cost.GOALS[128, 200, 50])
     assert few.ratio is not None
 
 
@@ -210,7 +210,7 @@ ROWS = [
         for k in (20, 1000)
         for r in (6, 50)
     ),
-    Row("cost", "built, once a map", {"lattice": 64, "vertices": 20}, 0.1),
+    Row("cost", "built, once per map", {"lattice": 64, "vertices": 20}, 0.1),
     Row("step", "one step", {"robots": 1000}, 3e-3, "a yardstick with a long name indeed", 1e-3, 1.2),
     Row("step", "one step", {"robots": 6}, 3e-4, "Qhull's Delaunay", 1e-3),
     Row("start", "robocov --help", {}, 0.2, "import numpy", 0.1, 2.0),
