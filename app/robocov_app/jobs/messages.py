@@ -36,10 +36,10 @@ class Service(Protocol):
         """
 
 
-class Wire:
+class Codec:
     """Converts questions before they are sent, and answers after they are received; by default not at all.
 
-    Each process has its own wire. Questions and answers are converted in order, each kind in its own thread.
+    Each process has its own codec. Questions and answers are converted in order, each kind in its own thread.
     """
 
     def encode(self, question: Any) -> object:
@@ -71,17 +71,30 @@ class Reply:
     number : int
         Number of the question.
     answer : object
-        The answer, or None if there is none. If the reply is not final, the progress so far.
+        The answer, or None if there is none.
     problem : str
         Reason why there is no answer.
-    is_final : bool
-        Whether the reply holds the answer, rather than progress.
     """
 
     number: int
     answer: Any
     problem: str = ""
-    is_final: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """Progress of the answer to a question, sent before the reply.
+
+    Attributes
+    ----------
+    number : int
+        Number of the question.
+    value : object
+        The progress, as reported by the service.
+    """
+
+    number: int
+    value: Any
 
 
 def answer_questions(service: Service, questions: list[tuple[int, Any]], channel: Channel) -> Reply:

@@ -8,7 +8,7 @@ import sys
 from contextlib import suppress
 from typing import IO
 
-from robocov_app.jobs.messages import READY, Reply, receive, send
+from robocov_app.jobs.messages import READY, Progress, Reply, receive, send
 
 _PIPE_BYTES = 1 << 20
 """Capacity of the pipe for answers. If a whole answer fits, its reader wakes up less often."""
@@ -74,7 +74,7 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
     with suppress(OSError):
         send(process.stdin, (0, question))
     reply = receive(process.stdout)
-    while reply == READY:
+    while reply == READY or isinstance(reply, Progress):
         reply = receive(process.stdout)
     if not isinstance(reply, Reply):
         return None

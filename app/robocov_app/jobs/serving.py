@@ -12,8 +12,12 @@ import threading
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from robocov_app.jobs.messages import READY, Channel, Reply, answer_questions, receive, send
+from robocov_app.jobs.messages import READY, Channel, Progress, answer_questions, receive, send
 
+_STDIN = 0
+_STDOUT = 1
+_STDERR = 2
+"""File descriptors of the standard streams."""
 _SET_DEATH_SIGNAL = 1
 """Value of PR_SET_PDEATHSIG in Linux: the signal that a process receives when its parent ends."""
 
@@ -34,7 +38,7 @@ class _PipeChannel(Channel):
 
     def report_progress(self, progress: object) -> None:
         """Send the progress of the current question."""
-        self.send(Reply(self._number, progress, is_final=False))
+        self.send(Progress(self._number, progress))
 
     def send(self, message: object) -> None:
         """Send a message, or end the process if its program has ended."""
@@ -103,8 +107,8 @@ def _take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
     Code that prints then writes to standard error instead of into the messages, and code that reads standard
     input gets no data.
     """
-    source = os.fdopen(os.dup(0), "rb")
-    target = os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)
+    source = os.fdopen(os.dup(_STDIN), "rb")
+    target = os.fdopen(os.dup(_STDOUT), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), _STDIN)
+    os.dup2(_STDERR, _STDOUT)
     return source, target

@@ -11,7 +11,17 @@ from contextlib import suppress
 from math import inf
 from typing import Any, Generic, TypeAlias, TypeVar
 
-from robocov_app.jobs.messages import READY, Channel, Reply, Service, Wire, answer_questions, receive, send
+from robocov_app.jobs.messages import (
+    READY,
+    Channel,
+    Codec,
+    Progress,
+    Reply,
+    Service,
+    answer_questions,
+    receive,
+    send,
+)
 from robocov_app.jobs.processes import start_process
 from robocov_app.terminal.supervision import describe_status
 
@@ -25,10 +35,10 @@ class LatestWorker(Generic[_Answer]):
     ----------
     service : str
         Class of the service as ``package.module:Class``.
-    task : str
-        What the service does, as a verb phrase for messages, such as ``measures the map``.
-    wire : type
-        Converts questions and answers; see `Wire`.
+    work_description : str
+        Work of the service as a verb phrase for messages, such as ``measures the map``.
+    codec : type
+        Converts questions and answers; see `Codec`.
     patience : float, s
         If a new question arrives after an older one has been unanswered for longer than this, the process is
         restarted.
@@ -41,19 +51,21 @@ class LatestWorker(Generic[_Answer]):
         Process of the service. One thread writes to it, and another one reads from it.
     """
 
-    def __init__(self, service: str, task: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
+    def __init__(
+        self, service: str, work_description: str, codec: type[Codec] = Codec, *, patience: float = inf
+    ) -> None:
         self.problem = ""
         self.process: subprocess.Popen[bytes] | None = None
         self._service = service
-        self._task = task
-        self._wire = wire
+        self._work_description = work_description
+        self._codec = codec
         self._patience = patience
         self._waiting_since = 0.0
         self._number = 0
         self._answered_number = 0
         self._has_ended = False
         self._is_ready = False
-        self._progress: Reply | None = None
+        self._progress: Progress | None = None
         self._replies: deque[Reply] = deque(maxlen=1)
         self._questions: deque[tuple[int, object]] = deque(maxlen=1)
         self._has_question = threading.Event()
@@ -75,7 +87,7 @@ class LatestWorker(Generic[_Answer]):
         latest = self._progress
         if latest is None or latest.number != self._number:
             return None
-        return latest.answer
+        return latest.value
 
     def put(self, question: object) -> None:
         """Ask a question without waiting for the answer. Older questions that were not sent yet are dropped.
@@ -84,35 +96,39 @@ class LatestWorker(Generic[_Answer]):
         ----------
         question : object
         """
+        try:
+            self._restart_if_needed()
+        except OSError as error:
+            # The system is out of memory or processes. The next question tries again.
+            self._number += 1
+            self._answered_number = self._number
+            reason = error.strerror or error
+            self.problem = f"the process that {self._work_description} cannot be started: {reason}"
+            return
+        self._number += 1
+        self._questions.append((self._number, question))
+        self._has_question.set()
+
+    def _restart_if_needed(self) -> None:
+        """Restart the process if it has ended, or has worked on a question for longer than the patience."""
         now = time.monotonic()
         if not self.is_busy:
             self._waiting_since = now
         if not self.is_alive or now - self._waiting_since > self._patience:
             self.close()
             self._waiting_since = now
-            try:
-                self._start()
-            except OSError as error:
-                # The system is out of memory or processes. The next question tries again.
-                self._number += 1
-                self._answered_number = self._number
-                reason = error.strerror or error
-                self.problem = f"the process that {self._task} cannot be started: {reason}"
-                return
-        self._number += 1
-        self._questions.append((self._number, question))
-        self._has_question.set()
+            self._start()
 
     def _start(self) -> None:
         """Start the process, and the two threads that write questions to it and read its replies."""
         process = start_process(self._service)
-        # A new wire, because it may remember what the previous process has received.
-        wire = self._wire()
+        # A new codec, because it may remember the data that the previous process has received.
+        codec = self._codec()
         self.process = process
         self._has_ended = False
         self._is_ready = False
         self._threads = [
-            threading.Thread(target=target, args=(process, wire), daemon=True)
+            threading.Thread(target=target, args=(process, codec), daemon=True)
             for target in (self._write, self._read)
         ]
         for thread in self._threads:
@@ -139,7 +155,7 @@ class LatestWorker(Generic[_Answer]):
             self._waiting_since = time.monotonic()
         if has_ended and self.is_busy:
             self._answered_number = self._number
-            self.problem = f"the process that {self._task} has ended{self._describe_end()}"
+            self.problem = f"the process that {self._work_description} has ended{self._describe_end()}"
             return None
         if reply is None:
             return None
@@ -172,7 +188,7 @@ class LatestWorker(Generic[_Answer]):
         self._questions.clear()
         self._replies.clear()
 
-    def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+    def _write(self, process: subprocess.Popen[bytes], codec: Codec) -> None:
         """Send the newest question whenever there is one; the target of the writing thread."""
         assert process.stdin is not None
         try:
@@ -182,28 +198,29 @@ class LatestWorker(Generic[_Answer]):
                     self._has_question.clear()
                     if self._questions:
                         number, question = self._questions.pop()
-                        send(stream, (number, wire.encode(question)))
+                        send(stream, (number, codec.encode(question)))
         except Exception:
-            # Nobody must wait for the answer to a question that cannot be sent.
+            # A question that cannot be sent gets no answer, so the window must not wait for one.
             traceback.print_exc()
             if self.process is process:
                 self._has_ended = True
 
-    def _read(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+    def _read(self, process: subprocess.Popen[bytes], codec: Codec) -> None:
         """Receive replies until the process ends; the target of the reading thread."""
         assert process.stdout is not None
         try:
             with process.stdout as stream:
                 self._is_ready = receive(stream) == READY
-                while (reply := receive(stream)) is not None:
-                    if not reply.is_final:
-                        self._progress = reply
+                while (message := receive(stream)) is not None:
+                    if isinstance(message, Progress):
+                        self._progress = message
                         continue
-                    if reply.answer is not None:
-                        reply = Reply(reply.number, wire.decode(reply.answer), reply.problem)
-                    self._replies.append(reply)
+                    answer = message.answer
+                    if answer is not None:
+                        answer = codec.decode(answer)
+                    self._replies.append(Reply(message.number, answer, message.problem))
         except Exception:
-            # Nobody must wait for an answer that cannot be read.
+            # The window must not wait for an answer that cannot be read.
             traceback.print_exc()
         finally:
             self._has_ended = True
@@ -215,8 +232,8 @@ class DirectWorker(Generic[_Answer]):
     Parameters
     ----------
     service : Service
-    wire : Wire or None
-        Converts questions and answers; see `Wire`.
+    codec : Codec or None
+        Converts questions and answers; see `Codec`.
 
     Attributes
     ----------
@@ -228,15 +245,15 @@ class DirectWorker(Generic[_Answer]):
     is_alive = True
     progress = None
 
-    def __init__(self, service: Service, wire: Wire | None = None) -> None:
+    def __init__(self, service: Service, codec: Codec | None = None) -> None:
         self.problem = ""
         self._service = service
-        self._wire = wire or Wire()
+        self._codec = codec or Codec()
         self._answer: Any = None
 
     def put(self, question: object) -> None:
         """Ask a question, and wait for the answer."""
-        reply = answer_questions(self._service, [(0, self._wire.encode(question))], Channel())
+        reply = answer_questions(self._service, [(0, self._codec.encode(question))], Channel())
         self.problem = reply.problem
         self._answer = reply.answer
 
@@ -246,7 +263,7 @@ class DirectWorker(Generic[_Answer]):
         self._answer = None
         if encoded is None:
             return None
-        answer: _Answer = self._wire.decode(encoded)
+        answer: _Answer = self._codec.decode(encoded)
         return answer
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from platformdirs import user_state_path
 
@@ -39,8 +39,13 @@ _open_savers_lock = threading.Lock()
 _Work = TypeVar("_Work")
 _Content: TypeAlias = Callable[[], Mapping[str, Any]]
 """Returns the content of a draft."""
-_Job: TypeAlias = tuple[Path | None, _Content | None]
-"""A draft to be written: file of the document (None if it has none), content (None if all is saved)."""
+
+
+class _PendingDraft(NamedTuple):
+    """A draft to be written: file of the document (None if it has none), content (None if all is saved)."""
+
+    path: Path | None
+    content: _Content | None
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class Autosaver:
         Kind of document, stored in each draft.
     path : Path or None
         File of the document; None if it has none yet.
-    resumed : Path or None
+    resumed_folder : Path or None
         Draft folder from which the document was recovered; the autosaver continues to use it.
 
     Attributes
@@ -85,22 +90,22 @@ class Autosaver:
     """
 
     def __init__(
-        self, folder: Path | None, kind: str, path: Path | None = None, resumed: Path | None = None
+        self, folder: Path | None, kind: str, path: Path | None = None, resumed_folder: Path | None = None
     ) -> None:
         self.problem = ""
         self._kind = kind
         self._path = path
         self._lock = ExitStack()
         self._changed = threading.Condition()
-        self._pending: _Job | None = None
+        self._pending: _PendingDraft | None = None
         self._is_writing = False
         self._is_closed = False
-        self._is_hurried = False
-        self._has_draft = resumed is not None
-        if resumed is not None:
-            self._lock.enter_context(lock_folder(resumed))
-        self._folder = resumed
-        if resumed is None and folder is not None:
+        self._skips_pause = False
+        self._has_draft = resumed_folder is not None
+        if resumed_folder is not None:
+            self._lock.enter_context(lock_folder(resumed_folder))
+        self._folder = resumed_folder
+        if resumed_folder is None and folder is not None:
             self._folder = self._create_folder(folder)
         if self._folder is None:
             return
@@ -108,7 +113,7 @@ class Autosaver:
         self._thread.start()
         with _open_savers_lock:
             _open_savers.append(self)
-        if resumed is None:
+        if resumed_folder is None:
             # An empty draft shows other programs that the file is open, see `is_open_elsewhere`.
             self.save_draft(None)
 
@@ -122,11 +127,17 @@ class Autosaver:
         """
         with self._changed:
             if self._folder is not None and not self._is_closed:
-                self._pending = (self._path, content)
+                self._pending = _PendingDraft(self._path, content)
                 self._changed.notify_all()
 
     def mark_saved(self, path: Path | None) -> None:
-        """Record that the document was saved in a file, so that there is nothing to recover."""
+        """Record that the document was saved, so that there is nothing to recover.
+
+        Parameters
+        ----------
+        path : Path or None
+            File in which it was saved; None if it has no file.
+        """
         self._path = path
         self.save_draft(None)
 
@@ -144,10 +155,10 @@ class Autosaver:
             Whether the draft is on disk.
         """
         with self._changed:
-            self._is_hurried = True
+            self._skips_pause = True
             self._changed.notify_all()
             self._changed.wait_for(
-                lambda: not (self._is_writing or (self._pending and self._is_hurried)), timeout
+                lambda: not (self._is_writing or (self._pending and self._skips_pause)), timeout
             )
             return self._pending is None and not self._is_writing and not self.problem
 
@@ -197,13 +208,13 @@ class Autosaver:
         """Write pending drafts until the saver is closed; the target of the background thread."""
         pause = 0.0
         while True:
-            job = self._wait_for_job(pause)
-            if job is None:
+            draft = self._wait_for_draft(pause)
+            if draft is None:
                 return
             start = time.perf_counter()
             problem = ""
             try:
-                self._write(*job)
+                self._write(draft)
             except Exception as error:
                 # The thread continues, because the next draft may succeed.
                 problem = f"drafts cannot be saved: {error}"
@@ -213,42 +224,42 @@ class Autosaver:
                 self.problem = problem
                 if problem and self._pending is None and not self._is_closed:
                     # There is no newer draft, so the same one is tried again.
-                    self._pending = job
+                    self._pending = draft
                     pause = _RETRY_S
                 self._changed.notify_all()
 
-    def _wait_for_job(self, pause: float) -> _Job | None:
+    def _wait_for_draft(self, pause: float) -> _PendingDraft | None:
         """Wait for `pause` seconds, then for a pending draft; return None if the saver is closed without one.
 
         `flush` and `close` cut the pause short.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._is_closed or self._is_hurried, pause)
+            self._changed.wait_for(lambda: self._is_closed or self._skips_pause, pause)
             self._changed.wait_for(lambda: self._is_closed or self._pending)
-            job = self._pending
+            draft = self._pending
             self._pending = None
-            if job is not None:
+            if draft is not None:
                 self._is_writing = True
-                self._is_hurried = False
-        return job
+                self._skips_pause = False
+        return draft
 
-    def _write(self, path: Path | None, content: _Content | None) -> None:
-        """Write the draft of the document `path` to the draft folder."""
+    def _write(self, draft: _PendingDraft) -> None:
+        """Write a draft to the draft folder."""
         assert self._folder is not None
         encoded_path = None
-        if path is not None:
-            encoded_path = _encode_path(path.absolute())
+        if draft.path is not None:
+            encoded_path = _encode_path(draft.path.absolute())
         record: dict[str, Any] = {
             "format": self._kind,
             "version": 1,
             "path": encoded_path,
             "when": datetime.now().astimezone().isoformat(timespec="seconds"),
         }
-        if content is not None:
-            record |= content()
+        if draft.content is not None:
+            record |= draft.content()
         with replace_file(self._folder / _FILE_NAME) as temporary:
             temporary.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
-        self._has_draft = content is not None
+        self._has_draft = draft.content is not None
 
 
 def flush_all(timeout: float) -> None:
@@ -310,20 +321,34 @@ def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | 
     """
     dated_works = []
     for draft_folder in _list_folders(folder):
-        # A draft that is locked by a running program, or cannot be read, is left alone.
-        with suppress(Exception):
-            with lock_folder(draft_folder):
-                draft: Draft | None = None
-                work: _Work | None = None
-                if (draft_folder / _FILE_NAME).exists():
-                    draft = read_draft(draft_folder, kind)
-                    work = read(draft)
-            if draft is not None and work is not None:
-                dated_works.append((draft.when, work))
+        try:
+            dated_work = _read_unlocked_draft(draft_folder, kind, read)
+            if dated_work is not None:
+                dated_works.append(dated_work)
             elif time.time() - draft_folder.stat().st_mtime > _MIN_ABANDONED_AGE_S:
                 remove_draft(draft_folder)
+        except Exception:
+            # A draft that is locked by a running program, or cannot be read, is left alone.
+            continue
     dated_works.sort(key=lambda pair: pair[0], reverse=True)
     return tuple(work for _, work in dated_works)
+
+
+def _read_unlocked_draft(
+    folder: Path, kind: str, read: Callable[[Draft], _Work | None]
+) -> tuple[datetime, _Work] | None:
+    """Return the time and the work of a draft, or None if there is nothing to recover.
+
+    Raises OutputError if a running program has locked the folder.
+    """
+    with lock_folder(folder):
+        if not (folder / _FILE_NAME).exists():
+            return None
+        draft = read_draft(folder, kind)
+        work = read(draft)
+    if work is None:
+        return None
+    return draft.when, work
 
 
 def remove_draft(folder: Path) -> None:
@@ -401,7 +426,7 @@ def read_draft(folder: Path, kind: str) -> Draft:
             path = _decode_path(record["path"])
         return Draft(folder, path, datetime.fromisoformat(record["when"]).astimezone(), content)
     except (TypeError, ValueError, KeyError, OverflowError, OSError) as error:
-        raise MapError(f"{file}: not a complete {kind}: {error}") from None
+        raise MapError(f"{file}: incomplete {kind}: {error}") from None
 
 
 def _encode_path(path: Path) -> str | dict[str, str]:

@@ -97,7 +97,7 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
 
 
 @contextmanager
-def keep_changes(
+def save_changed_settings(
     settings: SettingsType, file: Path | None, read: Callable[[SettingsType], SettingsType]
 ) -> Iterator[None]:
     """Save the settings that change while the block runs; save nothing if it raises.

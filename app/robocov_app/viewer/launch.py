@@ -11,8 +11,8 @@ from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import find_draft_folder
 from robocov_app.storage.settings import (
     find_settings_file,
-    keep_changes,
     load_settings,
+    save_changed_settings,
 )
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
@@ -128,7 +128,7 @@ class ViewerLauncher:
                 window.viewer.show_message(message)
                 self._offer_help(window, file)
                 try:
-                    with keep_changes(settings, file, partial(self._read_settings, window)):
+                    with save_changed_settings(settings, file, partial(self._read_settings, window)):
                         yield window
                 finally:
                     window.viewer.files.workspace.close()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import properties, transform
 from robocov_app.editor.model.measurement import (
-    MeasurementWire,
+    MeasurementCodec,
     SketchMeasurer,
     create_measurement_worker,
     measure,
@@ -64,12 +64,12 @@ def test_the_worker_agrees_with_the_function_after_every_change():
 @given(st.data())
 def test_changes_are_enough_to_rebuild_the_sketch(data):
     measuring = SketchMeasurer()
-    wire = MeasurementWire()
+    codec = MeasurementCodec()
     sketch = data.draw(valid_sketches(least=1))
     known = {}
     questions = []
     for _ in range(4):
-        questions.append(wire.encode((sketch, 0.2)))
+        questions.append(codec.encode((sketch, 0.2)))
         assert [item.key for item in questions[-1][0].obstacles] == [
             item.key for item in sketch.obstacles if known.get(item.key) is not item
         ]

@@ -13,7 +13,7 @@ import pytest
 from slow_service import Doubling
 
 from robocov_app.jobs import workers as module
-from robocov_app.jobs.messages import READY, Wire, receive, send
+from robocov_app.jobs.messages import READY, Codec, receive, send
 from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.jobs.workers import DirectWorker, LatestWorker
 
@@ -118,8 +118,8 @@ def test_no_call_of_a_worker_blocks(monkeypatch, worker):
     assert all(was_opened), "no message had to wait until the time limit"
 
 
-def test_each_process_has_its_own_wire():
-    class CountingWire(Wire):
+def test_each_process_has_its_own_codec():
+    class CountingCodec(Codec):
         def __init__(self):
             self.encoded = 0
 
@@ -130,11 +130,11 @@ def test_each_process_has_its_own_wire():
         def decode(self, answer):
             return -answer
 
-    with closing(LatestWorker(SERVICE, "doubles", CountingWire)) as worker:
+    with closing(LatestWorker(SERVICE, "doubles", CountingCodec)) as worker:
         assert [ask(worker, 1), ask(worker, 1)] == [-2, -4]
         worker.close()
         assert ask(worker, 1) == -2
-    direct = DirectWorker(Doubling(), CountingWire())
+    direct = DirectWorker(Doubling(), CountingCodec())
     direct.put(10)
     assert (direct.poll(), direct.poll(), direct.is_busy) == (-20, None, False)
 

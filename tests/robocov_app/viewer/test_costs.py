@@ -59,7 +59,7 @@ class StubWorker:
         self.is_alive = True
         self.progress = None
         self.problem = ""
-        self._service = DirectWorker(CostService(), module._CostWire())
+        self._service = DirectWorker(CostService(), module._CostCodec())
         self._answer = None
 
     def put(self, question) -> None:

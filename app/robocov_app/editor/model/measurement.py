@@ -13,7 +13,7 @@ from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, fin
 from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, find_problems, format_position
-from robocov_app.jobs.messages import Channel, Wire
+from robocov_app.jobs.messages import Channel, Codec
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
 _WALL_TOLERANCE_M = 1e-5
@@ -227,8 +227,8 @@ Question: TypeAlias = tuple[Sketch, tuple[int, ...], float]
 """A sketch with only new or changed obstacles, the keys of all its obstacles in order, and a radius, m."""
 
 
-class MeasurementWire(Wire):
-    """Wire that sends only the obstacles that have changed since the previous sketch."""
+class MeasurementCodec(Codec):
+    """Codec that sends only the obstacles that have changed since the previous sketch."""
 
     def __init__(self) -> None:
         self._known: dict[int, Item] = {}
@@ -266,5 +266,5 @@ def create_measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
         Whether to measure immediately in this process instead of in a separate one.
     """
     if direct:
-        return DirectWorker(SketchMeasurer(), MeasurementWire())
-    return LatestWorker(f"{__name__}:{SketchMeasurer.__name__}", "measures the map", MeasurementWire)
+        return DirectWorker(SketchMeasurer(), MeasurementCodec())
+    return LatestWorker(f"{__name__}:{SketchMeasurer.__name__}", "measures the map", MeasurementCodec)

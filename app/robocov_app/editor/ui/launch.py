@@ -25,8 +25,8 @@ from robocov_app.formats import Importer
 from robocov_app.storage.autosave import find_draft_folder, remove_draft
 from robocov_app.storage.settings import (
     find_settings_file,
-    keep_changes,
     load_settings,
+    save_changed_settings,
 )
 from robocov_app.toolkit.dialogs import create_recovery_question
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
@@ -105,7 +105,7 @@ class EditorLauncher:
                 window.documents.ask_import(self.path, opened)
             is_discarded = False
             try:
-                with keep_changes(settings, file, partial(read_settings, window)):
+                with save_changed_settings(settings, file, partial(read_settings, window)):
                     yield window
                 is_discarded = window.documents.may_close
             finally:

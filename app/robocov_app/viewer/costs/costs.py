@@ -15,7 +15,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
-from robocov_app.jobs.messages import Channel, Wire
+from robocov_app.jobs.messages import Channel, Codec
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_map.field import DistanceField
 from robocov_app.render.distance_map.lattice import FieldLattice
@@ -122,10 +122,10 @@ class Costs:
         self.known: dict[int, KnownCost] = {}
         self.state = ""
         self.lattice = lattice
-        self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostWire())
+        self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostCodec())
         if not direct:
             service = "robocov_app.viewer.costs.costs:CostService"
-            self._worker = LatestWorker(service, "computes the cost", _CostWire)
+            self._worker = LatestWorker(service, "computes the cost", _CostCodec)
         self._map_question: CostQuestion | None = None
         self._asked: CostQuestion | None = None
         self._map_number = 0
@@ -255,7 +255,7 @@ class _Answer(NamedTuple):
     travel_time: float | None = None
 
 
-class _CostWire(Wire):
+class _CostCodec(Codec):
     """Encoding that sends each map and each set of shared data only once."""
 
     def __init__(self) -> None:
