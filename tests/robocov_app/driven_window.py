@@ -103,7 +103,7 @@ class Driver:
 
     def __init__(self, window: ViewerWindow) -> None:
         self.window = window
-        window.contains_faults = False
+        window.catches_exceptions = False
         self.viewer = window.viewer
         self.at = (5, 5)
 

@@ -206,7 +206,7 @@ class RandomEvents:
             self.post(pygame.KEYUP, **content)
 
     def press_key_of_command(self) -> None:
-        commands: Any = (self.window.inner or self.window).commands  # type: ignore[attr-defined]
+        commands: Any = (self.window.replacement or self.window).commands  # type: ignore[attr-defined]
         pairs = [(command.name, key) for command in commands.commands for key in command.keys]
         name, key = self.random.choice(pairs)
         self.pressed[name] = self.pressed.get(name, 0) + 1
@@ -248,7 +248,7 @@ class RandomEvents:
         dice = self.random.random()
         if dice < 0.04:
             return self.random.choice((-(2**15), -1, 0, 10**5)), self.random.choice((-(2**15), -1, 0, 10**5))
-        panel = getattr(self.window.inner or self.window, "panel", None)
+        panel = getattr(self.window.replacement or self.window, "panel", None)
         if dice < 0.45 and panel is not None and panel.ui.widgets:
             box = self.random.choice(list(panel.ui.widgets.values())).rect
             return self.random.randint(box.left, box.right), self.random.randint(box.top, box.bottom)

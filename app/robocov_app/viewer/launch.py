@@ -16,7 +16,7 @@ from robocov_app.storage.settings import (
 )
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
-from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 from robocov_app.viewer.costs.costs import Costs
@@ -166,8 +166,8 @@ class ViewerLauncher:
         try:
             viewer = self._build_presenter(costs, settings)
             window = ViewerWindow(viewer, size, scale, is_unattended=self.headless)
-            window.faults = FaultLog(self._draft_folder)
-            window.contains_faults = not self.headless
+            window.exceptions = ExceptionLog(self._draft_folder)
+            window.catches_exceptions = not self.headless
         except BaseException:
             costs.close()
             raise

@@ -8,7 +8,7 @@ from driven_editor import EditorDriver, open_editor, sheet
 from PIL import Image
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 
 
 @pytest.fixture
@@ -237,14 +237,14 @@ def test_measuring_shows_lengths_and_changes_nothing(driver: EditorDriver) -> No
     before = driver.sketch
     driver.press_key("m")
     driver.drag_at((1, 1), (3, 3), (4, 5))
-    preview = driver.editor.tool.build_draw_state(driver.editor)
+    preview = driver.editor.tool.build_overlay(driver.editor)
     assert preview.line == ((1, 1), (4, 5)) and "5.00 m" in preview.label
     assert "Δx 3.00  Δy 4.00" in preview.label
     driver.click_all((1, 1), (4, 1), (4, 5))
     driver.press_key("return")
-    assert "7.00 m in all" in driver.editor.tool.build_draw_state(driver.editor).label
+    assert "7.00 m in all" in driver.editor.tool.build_overlay(driver.editor).label
     driver.press_key("escape")
-    assert driver.editor.tool.build_draw_state(driver.editor) == EditorDrawState() and driver.sketch is before
+    assert driver.editor.tool.build_overlay(driver.editor) == EditorToolOverlay() and driver.sketch is before
 
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDriver, tmp_path: Path) -> None:
@@ -287,4 +287,4 @@ def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:
     assert driver.message == "map turned by -20.56°"
     (_, ay), (bx, by) = driver.shapes[0].points
     assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
-    assert driver.editor.tool.build_draw_state(driver.editor) == EditorDrawState()
+    assert driver.editor.tool.build_overlay(driver.editor) == EditorToolOverlay()

@@ -95,7 +95,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
     ("point", "kinds", "where", "words"),
     [
         ((1.05, 0.96), ("vertex", "edge", "grid"), (1.0, 1.0), "vertex"),
-        ((2.51, 1.03), ("middle", "edge", "grid"), (2.5, 1.0), "middle of an edge"),
+        ((2.51, 1.03), ("midpoint", "edge", "grid"), (2.5, 1.0), "midpoint of an edge"),
         ((7.0, 5.0), ("center", "grid"), (7.03, 5.04), "center"),
         ((2.2, 1.07), ("edge",), (2.2, 1.0), "edge"),
         ((2.21, 1.07), ("edge", "grid"), (2.2, 1.0), "edge"),
@@ -128,9 +128,9 @@ def test_crossings_of_lines_win_over_single_lines(targets):
 def test_crossings_of_edges_are_targets():
     plank = PolygonObstacle(((0.0, 1.9), (8.0, 1.9), (8.0, 2.1), (0.0, 2.1)))
     targets = collect_snap_targets(Sketch().with_obstacles([BOX, plank])[0])
-    snap = snap_point((4.05, 2.06), targets, build_settings("crossing", "edge"))
+    snap = snap_point((4.05, 2.06), targets, build_settings("intersection", "edge"))
     assert snap.point == pytest.approx((4.0, 2.1))
-    assert snap.guides[0].kind == "crossing"
+    assert snap.guides[0].kind == "intersection"
 
 
 def test_angles_and_grid_are_combined(targets):
@@ -175,10 +175,10 @@ def test_dragged_objects_are_no_targets():
         == "grid"
     )
     one = collect_snap_targets(sketch, without=[Vertex(key, 0, 0)])
-    assert snap_point(near, one, build_settings("vertex", "edge", "middle")).guides == ()
+    assert snap_point(near, one, build_settings("vertex", "edge", "midpoint")).guides == ()
     assert snap_point((4.02, 2.97), one, build_settings("vertex")).point == (4.0, 3.0)
     # its edges go with it, the others stay
-    assert snap_point((2.2, 1.02), one, build_settings("edge", "middle")).guides == ()
+    assert snap_point((2.2, 1.02), one, build_settings("edge", "midpoint")).guides == ()
     assert snap_point((2.2, 2.98), one, build_settings("edge")).point == pytest.approx((2.2, 3.0))
     # The same holds for the positions of a start.
     without_first = collect_snap_targets(sketch, without=[Vertex("two", 0, 0)])

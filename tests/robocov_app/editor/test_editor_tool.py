@@ -18,8 +18,8 @@ from robocov_app.editor.model.geometry import (
 )
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import format_position, translate_message
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
@@ -78,4 +78,4 @@ def test_a_plain_tool_does_nothing() -> None:
     tool = EditorTool()
     assert not tool.is_busy and tool.origin is None and tool.snap_points == ()
     assert tool.finish(None) is None and not tool.remove_last(None) and not tool.cancel(None)
-    assert tool.build_draw_state(None) == EditorDrawState()
+    assert tool.build_overlay(None) == EditorToolOverlay()

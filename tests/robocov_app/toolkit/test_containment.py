@@ -15,10 +15,10 @@ from sample_sessions import start_session
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.toolkit.widgets.text_edit import MAX_CHARS, TextEdit
-from robocov_app.toolkit.window import faults
+from robocov_app.toolkit.window import exceptions
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.display import open_display, set_title
-from robocov_app.toolkit.window.faults import LOG_FILE, FaultLog
+from robocov_app.toolkit.window.exceptions import LOG_FILE, ExceptionLog
 from robocov_app.toolkit.window.input import clean_event
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.session.session import Session
@@ -63,7 +63,7 @@ class Fragile(BaseWindow):
         value = self.value
         return lambda: setattr(self, "value", value)
 
-    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+    def report_exception(self, message: str, *, in_drawing: bool) -> None:
         self.reports.append(message)
 
 
@@ -72,7 +72,7 @@ def window(tmp_path: Path) -> Iterator[Fragile]:
     with open_display(headless=True):
         pygame.event.clear()
         fragile = Fragile()
-        fragile.faults = FaultLog(tmp_path)
+        fragile.exceptions = ExceptionLog(tmp_path)
         yield fragile
 
 
@@ -138,8 +138,8 @@ def test_a_lost_display_ends_the_window(window: Fragile) -> None:
 
 
 def test_a_log_file_stays_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(faults, "_MAX_LOG_BYTES", 5_000)
-    log = FaultLog(tmp_path)
+    monkeypatch.setattr(exceptions, "_MAX_LOG_BYTES", 5_000)
+    log = ExceptionLog(tmp_path)
     for k in range(300):
         error = type(f"Error{k}", (Exception,), {})("x" * 500)
         log.record(error, "testing")
@@ -151,7 +151,7 @@ def test_a_log_file_stays_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_standard_error_replaces_an_unwritable_log_file(tmp_path: Path, capsys) -> None:
     (tmp_path / "file").write_text("")
-    sentence = FaultLog(tmp_path / "file").record(ValueError("boom\x1b[31m"), "testing")
+    sentence = ExceptionLog(tmp_path / "file").record(ValueError("boom\x1b[31m"), "testing")
     assert sentence == "Internal error while testing (ValueError: boom[31m). Details: the terminal."
     assert "ValueError: boom" in capsys.readouterr().err
 
@@ -193,7 +193,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
     with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:
         window = driver.window
         editor = driver.editor
-        window.contains_faults = True
+        window.catches_exceptions = True
         editor.apply(add_circle(editor.sketch, (2.0, 2.0), 0.5))
         before = editor.sketch
 
@@ -216,7 +216,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
 
 def test_a_dialog_that_cannot_be_drawn_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_editor(tmp_path) as driver:
-        driver.window.contains_faults = True
+        driver.window.catches_exceptions = True
         driver.press_key("ctrl+k")
         palette = driver.editor.dialogs.current
         assert palette is not None
@@ -237,7 +237,7 @@ def test_an_edit_of_a_session_that_raises_is_reverted(
     with open_viewer(tmp_path) as driver:
         window = driver.window
         session = driver.session
-        window.contains_faults = True
+        window.catches_exceptions = True
         for _ in range(20):
             session.playback.step()
         session.fail_robot(2)
@@ -278,7 +278,7 @@ def test_a_step_that_raises_is_reverted_and_pauses_the_session(
     with open_viewer(tmp_path) as driver:
         window = driver.window
         session = driver.session
-        window.contains_faults = True
+        window.catches_exceptions = True
         for _ in range(20):
             session.playback.step()
         pane = session.timeline.panes[0]

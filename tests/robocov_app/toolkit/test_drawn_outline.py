@@ -17,7 +17,7 @@ def test_a_repeated_point_completes_a_line():
 
 
 def test_the_first_point_completes_a_ring():
-    outline = DrawnOutline(min_points=3, closes=True)
+    outline = DrawnOutline(min_points=3, can_close=True)
     assert press_points(outline, (0, 0), (1, 0), (0, 0.1), (0.1, 0)) == [False, False, False, True]
     assert len(outline.take_points()) == 3
 
@@ -28,7 +28,7 @@ def test_the_first_point_completes_a_ring():
     ((3, 0), True, False),
 ])  # fmt: skip
 def test_a_long_drag_completes_a_line(to, clicked, ended):
-    outline = DrawnOutline(drags=True)
+    outline = DrawnOutline(can_drag=True)
     press_points(outline, (0, 0))
     assert outline.is_dragging
     assert outline.release(to, to, 0.5, clicked=clicked) == ended
@@ -37,7 +37,7 @@ def test_a_long_drag_completes_a_line(to, clicked, ended):
 
 
 def test_a_rectangle_is_complete_after_two_points():
-    outline = DrawnOutline(max_points=2, drags=True)
+    outline = DrawnOutline(max_points=2, can_drag=True)
     assert press_points(outline, (0, 0)) == [False]
     assert outline.release((0.1, 0), (0.1, 0), 0.5)
     assert outline.take_points() == [(0, 0), (0.1, 0)]

@@ -32,7 +32,7 @@ class RecordedPointer(Pointer):
 
     def send(self, kind: int, pixel: tuple[int, int], button: int = 1, now: float = 0.0) -> None:
         """Handle an event at a pixel."""
-        rel = (pixel[0] - self.at[0], pixel[1] - self.at[1])
+        rel = (pixel[0] - self.pixel[0], pixel[1] - self.pixel[1])
         self.handle_event(pygame.event.Event(kind, pos=pixel, rel=rel, button=button), now)
 
     def drag(self, *pixels: tuple[int, int], button: int = 1) -> None:

@@ -25,13 +25,14 @@ def test_a_requested_scale_has_priority_over_the_display() -> None:
 
 
 @pytest.mark.parametrize(
-    ("others", "ending"), [(0, "Draft."), (1, "\n1 more is kept."), (3, "\n3 more are kept.")]
+    ("other_count", "ending"),
+    [(0, "Draft."), (1, "\n1 more draft is available."), (3, "\n3 more drafts are available.")],
 )
-def test_the_recovery_question_counts_other_drafts(others: int, ending: str) -> None:
+def test_the_recovery_question_counts_other_drafts(other_count: int, ending: str) -> None:
     calls: list[str] = []
     question = create_recovery_question(
         "Draft.",
-        others=others,
+        other_count=other_count,
         recover=lambda: calls.append("recover"),
         discard=lambda: calls.append("discard"),
         postpone=lambda: calls.append("postpone"),

@@ -10,7 +10,7 @@ from driven_window import open_viewer
 from PIL import Image
 
 from robocov_app.toolkit.window.display import open_display
-from robocov_app.toolkit.window.window import CALM_S, BaseWindow
+from robocov_app.toolkit.window.window import IDLE_S, BaseWindow
 
 
 class Counting(BaseWindow):
@@ -51,7 +51,7 @@ def window():
 
 def rest_window(window: Counting) -> None:
     for _ in range(4):
-        window.run_frame(CALM_S / 2)
+        window.run_frame(IDLE_S / 2)
     window.drawn = 0
 
 
@@ -59,23 +59,23 @@ def test_a_window_rests_without_changes_and_wakes_up(window: Counting) -> None:
     window.lasts = 60.0
     rest_window(window)
     window.run_frame(0.1)
-    assert window.is_resting
+    assert window.is_idle
     assert window.drawn == 0
     window.shows = "something else"
     window.run_frame(0.1)
     window.run_frame(0.1)
-    assert window.is_resting
+    assert window.is_idle
     assert window.drawn == 1, "it is drawn once, and continues to rest"
     pygame.event.post(pygame.event.Event(pygame.MOUSEMOTION, pos=(1, 1), rel=(1, 1), buttons=(0, 0, 0)))
     window.run_frame(0.1)
-    assert not window.is_resting
+    assert not window.is_idle
     assert window.drawn == 2
     assert pygame.MOUSEMOTION in window.events
     rest_window(window)
     window.shows = "moves"
     for _ in range(30):
-        window.run_frame(CALM_S)
-    assert not window.is_resting
+        window.run_frame(IDLE_S)
+    assert not window.is_idle
     assert window.drawn == 30
 
 
@@ -112,7 +112,7 @@ def test_a_paused_window_is_drawn_only_after_changes(tmp_path: Path) -> None:
         driver.run_frames(120)
         drawn.clear()
         driver.run_frames(20)
-        assert window.is_resting
+        assert window.is_idle
         assert not drawn
         viewer.show_message("something")
         driver.run_frames(5)
@@ -120,10 +120,10 @@ def test_a_paused_window_is_drawn_only_after_changes(tmp_path: Path) -> None:
         driver.session.playback.is_playing = True
         driver.run_frames(5)
         assert len(drawn) == 6
-        assert not window.is_resting
+        assert not window.is_idle
         driver.session.timeline.is_settled = True  # time goes on, and nothing moves
         assert window.get_visible_state() is not None
-        window._calm_s = CALM_S
+        window._idle_s = IDLE_S
         before = driver.session.displayed.time
         window.advance(0.5)
         assert driver.session.displayed.time == pytest.approx(before + 0.5, abs=0.05)

@@ -254,10 +254,10 @@ class RecordedCommands:
 
 def test_keys_run_commands_once_and_disabled_commands_report_why() -> None:
     recorded = RecordedCommands()
-    command = recorded.commands.press_key(build_key_event("space"))
+    command = recorded.commands.take_command(build_key_event("space"))
     assert command is not None
     assert command.name == "pause"
-    assert recorded.commands.press_key(build_key_event("space")) is None, "it is held down"
+    assert recorded.commands.take_command(build_key_event("space")) is None, "it is held down"
     recorded.commands.release_key(build_key_event("space"))
     recorded.commands.run("pause")
     recorded.commands.run("undo")

@@ -15,7 +15,7 @@ from random_events import RandomEvents
 from robocov.environment import Environment
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.history import UndoHistory
-from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.costs.costs import Costs
 
@@ -30,19 +30,19 @@ def _work_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def contain_faults(window: BaseWindow, folder: Path) -> FaultLog:
+def contain_faults(window: BaseWindow, folder: Path) -> ExceptionLog:
     """Let a window continue after a fault, so that one run finds all faults."""
-    window.contains_faults = True
-    window.faults = FaultLog(folder / "faults")
-    return window.faults
+    window.catches_exceptions = True
+    window.exceptions = ExceptionLog(folder / "faults")
+    return window.exceptions
 
 
-def assert_no_fault(log: FaultLog) -> None:
+def assert_no_fault(log: ExceptionLog) -> None:
     assert log.file is not None
     assert log.count == 0, log.file.read_text()
 
 
-def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
+def play_editor(folder: Path, seed: int, events: int) -> ExceptionLog:
     with open_editor(folder, drafts=folder / "drafts") as driver:
         log = contain_faults(driver.window, folder)
         fuzz = RandomEvents(driver.window, folder / "odd", seed)
@@ -71,7 +71,7 @@ class CostsOfSmallMaps(Costs):
             self._map_question = None
 
 
-def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
+def play_viewer(folder: Path, seed: int, events: int) -> ExceptionLog:
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         patch.setattr("driven_window.Costs", CostsOfSmallMaps)
         driver = stack.enter_context(open_viewer(folder, lattice=4, robots=2))

@@ -177,7 +177,7 @@ def list_state(driver: Driver) -> list[object]:
         viewer.view.fades_trajectories,
         viewer.view.has_panel,
         viewer.tool,
-        viewer.tool.build_draw_state(session),
+        viewer.tool.build_overlay(session),
         viewer.active_pane,
         viewer.inspection.selected,
         viewer.message,

@@ -23,7 +23,7 @@ from robocov_app.viewer.session.map_edits import (
     build_paintable_raster,
 )
 from robocov_app.viewer.tools.brush import BrushTool
-from robocov_app.viewer.tools.tool import ViewerDrawState
+from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 
 class Clock:
@@ -135,7 +135,7 @@ def test_a_stroke_can_be_cancelled():
     assert session.displayed.environment == before
     assert session.timeline.head.parent is None
     assert brush.release(session, build_event((1.0, 1.0)), clicked=False) is None
-    assert brush.build_draw_state(session) == ViewerDrawState()
+    assert brush.build_overlay(session) == ViewerToolOverlay()
 
 
 def test_a_stroke_moves_no_robots():
@@ -199,7 +199,7 @@ def test_the_density_under_the_brush_is_displayed():
     brush = BrushTool()
     session = start_session()
     brush.move(session, build_event((1.0, 1.0)))
-    state = brush.build_draw_state(session)
+    state = brush.build_overlay(session)
     assert state.label == "φ 1"
     assert not state.has_marks
 

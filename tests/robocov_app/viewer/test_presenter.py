@@ -15,7 +15,7 @@ from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import MAX_ROBOTS
-from robocov_app.viewer.tools.tool import ViewerDrawState
+from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 
 def draw_circle(viewer: Presenter, center: tuple[float, float], rim: tuple[float, float]) -> None:
@@ -357,9 +357,9 @@ def test_choosing_a_tool_discards_the_drawing_and_shows_a_hint() -> None:
     run_command(viewer, "tool:polygon")
     assert viewer.message == f"Polygon: {viewer.tool.hint}"
     viewer.tool.press(viewer.session, build_event((1.0, 3.0)))
-    assert viewer.tool.build_draw_state(viewer.session).line
+    assert viewer.tool.build_overlay(viewer.session).line
     run_command(viewer, "tool:wall")
-    assert viewer.toolbox.by_name["polygon"].build_draw_state(viewer.session) == ViewerDrawState()
+    assert viewer.toolbox.by_name["polygon"].build_overlay(viewer.session) == ViewerToolOverlay()
     run_command(viewer, "cancel")
     assert viewer.tool is viewer.toolbox.hand
 
@@ -370,7 +370,7 @@ def test_cancel_discards_the_drawing_then_returns_to_the_hand() -> None:
     viewer.tool.press(viewer.session, build_event((1.0, 3.0)))
     run_command(viewer, "cancel")
     assert viewer.tool.name == "wall"
-    assert viewer.tool.build_draw_state(viewer.session) == ViewerDrawState()
+    assert viewer.tool.build_overlay(viewer.session) == ViewerToolOverlay()
     run_command(viewer, "cancel")
     assert viewer.tool is viewer.toolbox.hand
 

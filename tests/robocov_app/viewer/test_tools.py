@@ -25,7 +25,7 @@ from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.hand import HandTool
 from robocov_app.viewer.tools.outlines import DEFAULT_WALL_WIDTH_M, AddPolygonTool, AddWallTool
 from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
-from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerTool
+from robocov_app.viewer.tools.tool import ViewerTool, ViewerToolOverlay
 from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
 
@@ -77,7 +77,7 @@ def test_an_unused_tool_does_nothing(name):
     assert tool.release(session, build_event((1.0, 1.0)), clicked=False) is None
     assert tool.finish(session) is None
     assert not tool.cancel(session)
-    assert tool.build_draw_state(session) == ViewerDrawState()
+    assert tool.build_overlay(session) == ViewerToolOverlay()
     assert describe_state(session) == before
 
 
@@ -167,16 +167,16 @@ def test_the_hand_moves_obstacles():
     session = start_session()
     hand.press(session, build_event((4.2, 1.2)))
     assert hand.obstacle == 0
-    assert hand.build_draw_state(session) == ViewerDrawState()
+    assert hand.build_overlay(session) == ViewerToolOverlay()
     hand.move(session, build_event((4.5, 2.2)))
-    state = hand.build_draw_state(session)
+    state = hand.build_overlay(session)
     assert state.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
     assert state.line == ((4.2, 1.2), (4.5, 2.2))
     assert state.label == "1.04 m"
     assert session.displayed.environment is HALL
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) == "circle “pillar” moved"
     assert session.displayed.environment.obstacles == (state.obstacle, HALL.obstacles[1])
-    assert hand.build_draw_state(session) == ViewerDrawState()
+    assert hand.build_overlay(session) == ViewerToolOverlay()
     assert session.undo() == "circle “pillar” moved"
     assert session.displayed.environment == HALL
 
@@ -197,12 +197,12 @@ def test_the_map_can_change_while_an_obstacle_is_dragged():
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "obstacles reversed")
-    assert hand.build_draw_state(session) == ViewerDrawState()
+    assert hand.build_overlay(session) == ViewerToolOverlay()
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=()), "obstacles deleted")
-    assert hand.build_draw_state(session) == ViewerDrawState()
+    assert hand.build_overlay(session) == ViewerToolOverlay()
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
     assert session.displayed.environment.obstacles == ()
 
@@ -231,7 +231,7 @@ def test_enter_closes_a_polygon():
     assert session.displayed.environment is HALL
     assert tool.finish(session) == "polygon drawn"
     assert session.displayed.environment.obstacles[-1] == PolygonObstacle(CORNERS)
-    assert tool.build_draw_state(session) == ViewerDrawState()
+    assert tool.build_overlay(session) == ViewerToolOverlay()
     assert tool.finish(session) is None
 
 
@@ -247,15 +247,15 @@ def test_an_unfinished_polygon_is_shown():
     session = start_session()
     click(tool, session, CORNERS[0])
     tool.move(session, build_event((3.2, 3.7)))
-    state = tool.build_draw_state(session)
+    state = tool.build_overlay(session)
     assert state.line == ((3.2, 3.2), (3.2, 3.7))
     assert not state.is_closed
     assert state.label == "0.50 m"
     click(tool, session, CORNERS[1])
-    assert tool.build_draw_state(session).is_closed
+    assert tool.build_overlay(session).is_closed
     assert tool.cancel(session)
     assert not tool.cancel(session)
-    assert tool.build_draw_state(session) == ViewerDrawState()
+    assert tool.build_overlay(session) == ViewerToolOverlay()
 
 
 def test_a_double_click_closes_a_polygon_and_adds_one_corner():
@@ -286,7 +286,7 @@ def test_enter_ends_a_wall():
     session = start_session()
     click(tool, session, (3.2, 3.2), (3.2, 3.8))
     tool.move(session, build_event((3.8, 3.8)))
-    state = tool.build_draw_state(session)
+    state = tool.build_overlay(session)
     assert state.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
     assert state.label == "0.60 m, 0.1 m wide"
     assert tool.finish(session) == "wall drawn"
@@ -330,7 +330,7 @@ def test_a_wall_requires_two_points():
     tool = AddWallTool()
     session = start_session()
     click(tool, session, (3.2, 3.2))
-    assert tool.build_draw_state(session).obstacle is None
+    assert tool.build_overlay(session).obstacle is None
     with pytest.raises(MapError, match="two points that are apart"):
         tool.finish(session)
     assert session.displayed.environment is HALL
@@ -343,10 +343,10 @@ def test_a_circle_is_drawn_from_its_center():
     tool = AddCircleTool()
     session = start_session()
     tool.press(session, build_event((3.5, 3.2)))
-    assert tool.build_draw_state(session).obstacle is None
+    assert tool.build_overlay(session).obstacle is None
     tool.move(session, build_event((3.5, 3.5)))
-    assert tool.build_draw_state(session).label == "radius 0.30 m"
-    assert tool.build_draw_state(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
+    assert tool.build_overlay(session).label == "radius 0.30 m"
+    assert tool.build_overlay(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
     assert tool.release(session, build_event((3.5, 3.5)), clicked=False) == "circle drawn"
     assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
     assert tool.release(session, build_event((3.5, 3.5)), clicked=False) is None
@@ -420,14 +420,14 @@ def test_the_ruler_measures_a_distance():
     before = describe_state(session)
     tool.press(session, build_event((1.0, 1.0)))
     tool.move(session, build_event((4.0, 5.0)))
-    assert tool.build_draw_state(session).line == ((1.0, 1.0), (4.0, 5.0))
-    assert tool.build_draw_state(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
+    assert tool.build_overlay(session).line == ((1.0, 1.0), (4.0, 5.0))
+    assert tool.build_overlay(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
     tool.release(session, build_event((4.0, 5.0)), clicked=False)
     # The measured line stays.
     tool.move(session, build_event((2.0, 2.0)))
-    assert tool.build_draw_state(session).line == ((1.0, 1.0), (4.0, 5.0))
+    assert tool.build_overlay(session).line == ((1.0, 1.0), (4.0, 5.0))
     assert tool.cancel(session)
-    assert tool.build_draw_state(session) == ViewerDrawState()
+    assert tool.build_overlay(session) == ViewerToolOverlay()
     assert not tool.cancel(session)
     assert describe_state(session) == before
 
@@ -487,5 +487,5 @@ def test_tools_may_be_used_in_any_order(actions):
             assert message
             assert message == " ".join(message.split())
         for other in tools.values():
-            assert len(other.build_draw_state(session).line) != 1
+            assert len(other.build_overlay(session).line) != 1
     assert compute_penetration(session) < 2e-3

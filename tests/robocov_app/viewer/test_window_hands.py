@@ -202,7 +202,7 @@ def test_an_obstacle_that_covers_the_floor_is_refused(driver: Driver) -> None:
 def test_the_ruler_measures_a_distance(driver: Driver) -> None:
     driver.press_key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
-    state = driver.viewer.tool.build_draw_state(driver.session)
+    state = driver.viewer.tool.build_overlay(driver.session)
     assert state.label.startswith("2.0")
 
 

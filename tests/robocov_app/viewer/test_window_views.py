@@ -9,7 +9,7 @@ import pytest
 from driven_window import MIDDLE, Driver, open_viewer
 from sample_sessions import RAPF, RPF
 
-from robocov_app.viewer.tools.tool import ViewerDrawState
+from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 # time line
 
@@ -113,7 +113,7 @@ def test_other_buttons_pan_with_any_tool(button: int, driver: Driver) -> None:
     before = driver.find_pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
     assert np.allclose(driver.find_pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
-    assert driver.viewer.tool.build_draw_state(driver.session) == ViewerDrawState()
+    assert driver.viewer.tool.build_overlay(driver.session) == ViewerToolOverlay()
 
 
 def test_panning_back_to_the_start_completes_no_drawing(driver: Driver) -> None:

@@ -20,7 +20,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
-from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import legend_strip, scale_bar
 from robocov_app.render.camera import Camera
@@ -263,7 +263,7 @@ class EditorCanvas:
         """Build the scene of one frame, with the state of the active tool and of a drag."""
         editor = self.editor
         view = self._build_view()
-        state = editor.tool.build_draw_state(editor)
+        state = editor.tool.build_overlay(editor)
         sketch, selection = editor.displayed
         return EditorScene(
             screen=screen,
@@ -323,7 +323,7 @@ class EditorCanvas:
         canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
 
 
-def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
+def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorToolOverlay) -> frozenset[int]:
     """Return the keys of obstacles to leave out of the sheet: those that are dragged, changed or removed."""
     carried = state.carried
     if carried is not None and not carried.are_copies:

@@ -15,8 +15,8 @@ from robocov_app.editor.canvas.sheet import Sheet
 from robocov_app.editor.edits import paths
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
-from robocov_app.editor.tools.draw_state import CarriedItems
 from robocov_app.editor.tools.handles import compute_frame, list_handles
+from robocov_app.editor.tools.tool_overlay import CarriedItems
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas

@@ -17,8 +17,8 @@ from robocov_app.editor.canvas.view import View, compute_pixel_box
 from robocov_app.editor.model.geometry import distance, format_length
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.handles import KNOB_HEIGHT_PX, Handle
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
@@ -173,7 +173,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         draw_dashes(canvas, line, color)
         if line:
             end = (line[-1][0], line[-1][1])
-            if guide.kind in ("vertex", "middle", "center", "crossing", "edge"):
+            if guide.kind in ("vertex", "midpoint", "center", "intersection", "edge"):
                 draw_ring(canvas, end, 5.0, color, 1.6)
         if guide.kind != "grid" and guide.label not in labels:
             labels.append(guide.label)
@@ -281,7 +281,7 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
         canvas.draw_outline(corners, accent, canvas.scale_width(1.5))
 
 
-def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -> None:
+def draw_preview(canvas: Canvas, state: EditorToolOverlay, cursor: Point | None) -> None:
     """Draw the preview of a tool; its label is next to the cursor, px."""
     floor = canvas.theme.background
     accent = canvas.theme.final
@@ -307,7 +307,7 @@ def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
     return cursor[0] + dx * canvas.scale, cursor[1] + dy * canvas.scale
 
 
-def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
+def _draw_preview_line(canvas: Canvas, state: EditorToolOverlay) -> None:
     """Draw the line that is being drawn, with its vertices, closing edge and lengths."""
     accent = canvas.theme.final
     line = to_pixels(canvas, state.line)

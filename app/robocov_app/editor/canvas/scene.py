@@ -12,7 +12,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
-from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.render.canvas import Canvas
 
 
@@ -30,7 +30,7 @@ class EditorScene:
         The view of the sheet.
     editor : Editor
         The editor.
-    state : EditorDrawState
+    state : EditorToolOverlay
         Draw state of the tool.
     saved : Sketch
         The map without the changes of the current drag.
@@ -52,7 +52,7 @@ class EditorScene:
     canvas: Canvas
     view: View
     editor: Editor
-    state: EditorDrawState
+    state: EditorToolOverlay
     saved: Sketch
     sketch: Sketch
     selection: Selection

@@ -78,13 +78,18 @@ class EditorContext(WindowModel):
         return SnapSettings(SNAP_REACH_FRACTION * reach, self.grid, self.snap_angle, kinds)
 
     def snap(
-        self, raw: Point, reach: float, origin: Point | None = None, more: Ring = (), without: Dragged = ()
+        self,
+        unsnapped: Point,
+        reach: float,
+        origin: Point | None = None,
+        more: Ring = (),
+        without: Dragged = (),
     ) -> Snap:
         """Snap a position of the pointer to the map.
 
         Parameters
         ----------
-        raw : Point
+        unsnapped : Point
             Position of the pointer, m.
         reach : float
             Distance within which the pointer picks things, m.
@@ -98,12 +103,12 @@ class EditorContext(WindowModel):
         Returns
         -------
         Snap
-            The snapped point. While the targets of a large map are being computed, this is the raw point.
+            The snapped point, or the unsnapped one while the targets of a large map are being computed.
         """
         targets = self.snapper.find_targets(self.sketch, without, more)
         if targets is None:
-            return Snap(raw)
-        return snap_point(raw, targets, self.build_snap_settings(reach), origin)
+            return Snap(unsnapped)
+        return snap_point(unsnapped, targets, self.build_snap_settings(reach), origin)
 
     def apply(self, change: Change, *, drag: Hashable | None = None) -> None:
         """Apply a change; consecutive changes of the same `drag` are undone together."""

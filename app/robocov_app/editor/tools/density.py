@@ -12,8 +12,8 @@ from robocov_app.editor.edits import density
 from robocov_app.editor.model.geometry import build_rectangle, distance, format_length
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.tool import CursorShape
 
 DEFAULT_WEIGHT = 4.0  # of new features, until another weight is typed
@@ -114,19 +114,19 @@ class DensityTool(EditorTool):
             context.apply(density.set_weight(context.sketch, self.chosen, weight))
         self.weight = weight
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return outlines, centers and corners of all features, and the weight of the chosen one."""
         pending = self.pending
         features = density.list_features(pending or context.sketch)
         label = self._build_label(features)
         if not features and not label:
-            return EditorDrawState(pending=pending)
+            return EditorToolOverlay(pending=pending)
         dots = [_find_center(feature) for feature in features]
         for feature in features:
             if isinstance(feature, WeightedArea):
                 dots += feature.vertices
         rings = tuple(_build_outline(feature) for feature in features)
-        return EditorDrawState(
+        return EditorToolOverlay(
             pending=pending, label=label, rings=rings, dots=tuple(dots), chosen=self.chosen
         )
 
@@ -175,21 +175,23 @@ class DensityTool(EditorTool):
 
 def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEvent) -> _Hit:
     """Find the feature at the pointer: first by centers, then by rims and corners, then inside areas."""
-    centers = [(distance(_find_center(feature), event.raw), k) for k, feature in enumerate(features)]
+    centers = [
+        (distance(_find_center(feature), event.unsnapped_point), k) for k, feature in enumerate(features)
+    ]
     if centers and min(centers)[0] < event.reach:
         return _Hit(min(centers)[1])
     edges: list[tuple[float, int, int]] = []  # distance in m, feature, corner
     for number, feature in enumerate(features):
         if isinstance(feature, WeightedArea):
             for corner, point in enumerate(feature.vertices):
-                edges.append((distance(point, event.raw), number, corner))
+                edges.append((distance(point, event.unsnapped_point), number, corner))
         elif feature.sigma is not None:
-            edges.append((abs(distance(feature.center, event.raw) - feature.sigma), number, 0))
+            edges.append((abs(distance(feature.center, event.unsnapped_point) - feature.sigma), number, 0))
     if edges:
         gap, number, corner = min(edges)
         if gap < RIM_REACH_FRACTION * event.reach:
             return _Hit(number, corner)
-    pointer = shapely.Point(event.raw)
+    pointer = shapely.Point(event.unsnapped_point)
     # Later areas are on top.
     for number in reversed(range(len(features))):
         feature = features[number]

@@ -5,8 +5,8 @@ from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import parse_length
 from robocov_app.editor.model.geometry import distance, format_length
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 
 DEFAULT_DOOR_WIDTH_M = 0.9
 WALL_REACH_FRACTION = 0.6  # of the pointer's reach: walls are picked within this distance
@@ -37,14 +37,18 @@ class DoorTool(EditorTool):
         """Choose the wall under the pointer."""
         self.pressed = event
         self.cursor = event.point
-        self._wall = create.find_wall(context.sketch, event.raw, WALL_REACH_FRACTION * event.reach)
+        self._wall = create.find_wall(
+            context.sketch, event.unsnapped_point, WALL_REACH_FRACTION * event.reach
+        )
         require(self._wall is not None, "click a wall: doors are opened in walls")
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Move the preview of the door."""
         self.cursor = event.point
         if self.pressed is None:
-            self._wall = create.find_wall(context.sketch, event.raw, WALL_REACH_FRACTION * event.reach)
+            self._wall = create.find_wall(
+                context.sketch, event.unsnapped_point, WALL_REACH_FRACTION * event.reach
+            )
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Cut an opening into the wall: a door at a click, or everything between both ends of a drag."""
@@ -65,15 +69,15 @@ class DoorTool(EditorTool):
         self.width = create.check_door_width(parse_length(text))
         context.show_message(f"doors are {format_length(self.width)} wide")
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the preview of the opening, with its width."""
         sketch = context.sketch
         wall = self._wall
         if wall is None or wall not in sketch.index_by_key:
-            return EditorDrawState()
+            return EditorToolOverlay()
         start, end = create.compute_door_ends(sketch, wall, self.cursor, self.width)
         pressed = self.pressed
         if pressed is not None and distance(pressed.point, self.cursor) > MIN_DRAG_FRACTION * self.width:
             start = create.project_on_wall(sketch, wall, pressed.point)
             end = create.project_on_wall(sketch, wall, self.cursor)
-        return EditorDrawState(line=(start, end), label=f"door, {format_length(distance(start, end))}")
+        return EditorToolOverlay(line=(start, end), label=f"door, {format_length(distance(start, end))}")

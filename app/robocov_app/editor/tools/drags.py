@@ -11,9 +11,9 @@ from robocov_app.editor.model.coordinates import parse_angle, parse_length, pars
 from robocov_app.editor.model.hit_test import find_in_box, find_vertices_in_box
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position, list_vertices
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import CarriedItems, EditorDrawState
 from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.tool import EditorPointerEvent
+from robocov_app.editor.tools.tool_overlay import CarriedItems, EditorToolOverlay
 from robocov_app.toolkit.tools.geometry import compute_bearing
 from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tools.tool import CursorShape
@@ -73,9 +73,9 @@ class Drag:
         """Set the drag to a value that the user typed; raise MapError if the value is invalid."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
-    def build_draw_state(self) -> EditorDrawState:
+    def build_overlay(self) -> EditorToolOverlay:
         """Return what the drag shows on the sheet."""
-        return EditorDrawState(label=self.label, carried=self.carried, shows_handles=True)
+        return EditorToolOverlay(label=self.label, carried=self.carried, shows_handles=True)
 
     def end(self) -> None:
         """Apply the change, if there is one."""
@@ -118,9 +118,9 @@ class MoveDrag(Drag):
         """Update the drag after a move of the pointer."""
         self._copies = event.alt
         self.guides = ()
-        end = event.raw
+        end = event.unsnapped_point
         if event.shift:
-            end = geometry.constrain_angle(self._start, event.raw)
+            end = geometry.constrain_angle(self._start, event.unsnapped_point)
         dx = end[0] - self._start[0]
         dy = end[1] - self._start[1]
         context = self.context
@@ -188,9 +188,9 @@ class VertexDrag(Drag):
         """Update the drag after a move of the pointer."""
         if event.shift and self._origin is not None:
             self.guides = ()
-            self._place(geometry.constrain_angle(self._origin, event.raw))
+            self._place(geometry.constrain_angle(self._origin, event.unsnapped_point))
         else:
-            self._place(self._snap(event, event.raw, self._origin))
+            self._place(self._snap(event, event.unsnapped_point, self._origin))
 
     def _place(self, position: Point) -> None:
         self._end = position
@@ -219,7 +219,7 @@ class TurnDrag(Drag):
 
     def follow(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
-        bearing = compute_bearing(self._center, event.raw)
+        bearing = compute_bearing(self._center, event.unsnapped_point)
         # Between -180 and 180 degrees.
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
         if event.shift:
@@ -256,7 +256,7 @@ class ScaleDrag(Drag):
 
     def follow(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
-        pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
+        pointer = (event.unsnapped_point[0] - self._margin[0], event.unsnapped_point[1] - self._margin[1])
         position = self._snap(event, pointer)
         center = self._fixed
         if event.alt:
@@ -325,7 +325,7 @@ class BoxDrag(Drag):
 
     def follow(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
-        self._end = event.raw
+        self._end = event.unsnapped_point
 
     def find_selection(self) -> Selection:
         """Return what the box selects: objects or, if it contains only some of the shown vertices, these."""
@@ -346,7 +346,7 @@ class BoxDrag(Drag):
         if self._start != self._end:
             self.context.select(self._previous.union(self.find_selection()))
 
-    def build_draw_state(self) -> EditorDrawState:
+    def build_overlay(self) -> EditorToolOverlay:
         """Return the box for drawing."""
         box = (self._start, self._end)
-        return EditorDrawState(box=box, box_selects_touched=self._selects_touched, shows_handles=True)
+        return EditorToolOverlay(box=box, box_selects_touched=self._selects_touched, shows_handles=True)

@@ -14,8 +14,8 @@ from robocov_app.editor.model.coordinates import parse_length, parse_next_point,
 from robocov_app.editor.model.geometry import build_rectangle, distance, format_bearing, format_length
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.drawn_outline import SAME_POINT_M, DrawnOutline
 
 CLOSING_FRACTION = 0.7  # of the pointer's reach: a click this close to the first point closes the outline
@@ -50,13 +50,13 @@ class LineTool(EditorTool, ABC):
     def finish(self, context: EditorContext) -> None:
         """Complete the drawing with the points drawn so far."""
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the preview of an unfinished drawing; the last of the points, m, is the cursor."""
         is_closed = self.closes and len(points) > 2
         label = format_bearing(points[-2], points[-1])
         if is_closed:
             label += f"   {shapely.Polygon(points).area:.2f} m²"
-        return EditorDrawState(line=points, is_closed=is_closed, shows_lengths=True, label=label)
+        return EditorToolOverlay(line=points, is_closed=is_closed, shows_lengths=True, label=label)
 
     def choose_point(self, event: EditorPointerEvent) -> Point:
         """Return the position of the next point, m; with Shift, the angle is constrained."""
@@ -92,7 +92,9 @@ class LineTool(EditorTool, ABC):
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Add a point."""
-        if self.outline.press(self.choose_point(event), event.raw, CLOSING_FRACTION * event.reach):
+        if self.outline.press(
+            self.choose_point(event), event.unsnapped_point, CLOSING_FRACTION * event.reach
+        ):
             self.finish(context)
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
@@ -109,7 +111,9 @@ class LineTool(EditorTool, ABC):
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Complete the drawing if it was drawn with a drag."""
-        if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
+        if self.outline.release(
+            self.choose_point(event), event.unsnapped_point, event.reach, clicked=clicked
+        ):
             self._finish_drag(context, self.outline.cursor)
 
     def remove_last(self, context: EditorContext) -> bool:
@@ -137,10 +141,10 @@ class LineTool(EditorTool, ABC):
         self.outline.points.append(self.outline.cursor)
         self.outline.is_dragging = False
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the preview of the unfinished drawing, up to the cursor."""
         if not self.points:
-            return EditorDrawState()
+            return EditorToolOverlay()
         return self.build_preview(context, (*self.points, self.outline.cursor))
 
     def _finish_drag(self, context: EditorContext, end: Point) -> None:
@@ -208,14 +212,14 @@ class WallTool(DrawTool):
         """Return the change that adds the wall."""
         return create.add_wall(context.sketch, points, context.wall_width)
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the line, and the wall with its width."""
         line = points
         if distance(points[-2], points[-1]) <= SAME_POINT_M:
             line = points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
-        return EditorDrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
+        return EditorToolOverlay(line=points, shows_lengths=True, shapes=shapes, label=label)
 
 
 class MeasureTool(LineTool):
@@ -249,13 +253,13 @@ class MeasureTool(LineTool):
         self.clicked = []
         return super().cancel(context) or had_line
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the line with its length and, from three points on, the area that it encloses."""
         points = self.clicked
         if self.points:
             points = [*self.points, self.outline.cursor]
         if len(points) < 2:
-            return EditorDrawState()
+            return EditorToolOverlay()
         start, end = points[-2], points[-1]
         dx = end[0] - start[0]
         dy = end[1] - start[1]
@@ -263,7 +267,7 @@ class MeasureTool(LineTool):
         if len(points) > 2:
             total = sum(distance(a, b) for a, b in pairwise(points))
             label += f"   {format_length(total)} in all, {shapely.Polygon(points).area:.2f} m²"
-        return EditorDrawState(line=tuple(points), shows_lengths=True, label=label)
+        return EditorToolOverlay(line=tuple(points), shows_lengths=True, label=label)
 
 
 class PlacesTool(DrawTool):
@@ -279,10 +283,10 @@ class PlacesTool(DrawTool):
         """Return the change that adds the start."""
         return create.add_points_start(context.sketch, points)
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the start with the positions clicked so far."""
         label = f"{format_count(len(points) - 1, 'robot')}; Enter ends it"
-        return EditorDrawState(start=PointsStart(points[:-1]), label=label)
+        return EditorToolOverlay(start=PointsStart(points[:-1]), label=label)
 
 
 class BoundaryTool(DrawTool):
@@ -313,13 +317,13 @@ class BoundaryTool(DrawTool):
             return None
         return self._find_far_corner(text)
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the outline or, during a drag, the rectangle."""
         if not self.outline.is_dragging:
             return super().build_preview(context, points)
         (ax, ay), (bx, by) = points
         label = f"{format_length(abs(bx - ax))} x {format_length(abs(by - ay))}"
-        return EditorDrawState(line=build_rectangle(*points), is_closed=True, label=label)
+        return EditorToolOverlay(line=build_rectangle(*points), is_closed=True, label=label)
 
 
 class RectangleTool(DrawTool):
@@ -349,7 +353,7 @@ class RectangleTool(DrawTool):
         side = max(abs(to_x - x), abs(to_y - y))
         return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the rectangle with its size and area."""
         (ax, ay), (bx, by) = points
         width = abs(bx - ax)
@@ -357,7 +361,7 @@ class RectangleTool(DrawTool):
         ring = build_rectangle(*points)
         shapes = (PolygonObstacle(ring),) if min(width, height) > SAME_POINT_M else ()
         label = f"{format_length(width)} x {format_length(height)}   {width * height:.2f} m²"
-        return EditorDrawState(line=ring, is_closed=True, shapes=shapes, label=label)
+        return EditorToolOverlay(line=ring, is_closed=True, shapes=shapes, label=label)
 
 
 class CircleTool(DrawTool):
@@ -378,11 +382,11 @@ class CircleTool(DrawTool):
         """Return the rightmost point of a circle with a typed radius."""
         return self.points[0][0] + parse_length(text), self.points[0][1]
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the circle with its radius."""
         radius = distance(*points)
         shapes = (CircleObstacle(points[0], radius),) if radius > SAME_POINT_M else ()
-        return EditorDrawState(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
+        return EditorToolOverlay(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
 
 
 class DiscTool(CircleTool):
@@ -397,8 +401,8 @@ class DiscTool(CircleTool):
         """Return the change that adds the start."""
         return create.add_disc_start(context.sketch, points[0], distance(*points))
 
-    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the disc with its radius."""
         radius = distance(*points)
         start = DiscStart(points[0], radius) if radius > SAME_POINT_M else None
-        return EditorDrawState(line=points, start=start, label=f"radius {format_length(radius)}")
+        return EditorToolOverlay(line=points, start=start, label=f"radius {format_length(radius)}")

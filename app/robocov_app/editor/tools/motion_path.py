@@ -8,8 +8,8 @@ from robocov_app.editor.model.geometry import format_bearing
 from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.tool import CursorShape
 
 WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach: waypoints are picked within this distance
@@ -66,11 +66,13 @@ class MotionPathTool(EditorTool):
         self.change = None
         self._dragged = None
         if path is not None:
-            self._dragged = paths.find_waypoint(path, event.raw, WAYPOINT_REACH_FRACTION * event.reach)
+            self._dragged = paths.find_waypoint(
+                path, event.unsnapped_point, WAYPOINT_REACH_FRACTION * event.reach
+            )
         if self._dragged is not None:
             self.chosen = self._dragged
             return
-        obstacles = find_obstacles(context.sketch, event.raw, 0.0)
+        obstacles = find_obstacles(context.sketch, event.unsnapped_point, 0.0)
         if obstacles and subject not in obstacles:
             self.chosen = None
             context.select(Selection.of(obstacles[0]))
@@ -90,7 +92,7 @@ class MotionPathTool(EditorTool):
         index = None
         last = 1  # index of the waypoint in a new path, whose first waypoint is the obstacle
         if path is not None:
-            index = paths.find_leg(path, event.raw, LEG_REACH_FRACTION * event.reach)
+            index = paths.find_leg(path, event.unsnapped_point, LEG_REACH_FRACTION * event.reach)
             last = len(path.points)
         point = event.point
         if index is None:
@@ -168,21 +170,21 @@ class MotionPathTool(EditorTool):
             context.apply(paths.set_speed(context.sketch, Selection.of(subject), speed))
         self.speed = speed
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the waypoints with the speed and length of the path."""
         pending = self.pending
         subject, path = _find_subject(context)
         if subject is None:
-            return EditorDrawState(pending=pending)
+            return EditorToolOverlay(pending=pending)
         if pending is not None:
             path = pending.get_item(subject).shape.path
         if path is None:
-            return EditorDrawState(pending=pending, label=f"where it goes, {self.speed:g} m/s")
+            return EditorToolOverlay(pending=pending, label=f"where it goes, {self.speed:g} m/s")
         label = paths.describe_path(path)
         if self._dragged:
             leg = format_bearing(path.points[self._dragged - 1], path.points[self._dragged])
             label = f"{leg}; {label}"
-        return EditorDrawState(pending=pending, label=label, dots=path.points, chosen=self.chosen)
+        return EditorToolOverlay(pending=pending, label=label, dots=path.points, chosen=self.chosen)
 
     def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""

@@ -9,8 +9,8 @@ from robocov_app.editor.model.background import Background, level_background, sc
 from robocov_app.editor.model.coordinates import parse_length
 from robocov_app.editor.model.geometry import distance, format_length
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 
 CORNER_DECIMALS = 4  # decimal places of the position of a picture, m
 
@@ -44,12 +44,16 @@ class ReferenceImageTool(EditorTool):
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag the image."""
-        self.cursor = event.raw
+        self.cursor = event.unsnapped_point
         background = context.sketch.background
-        if self.pressed is None or background is None or not event.has_moved_from(self.pressed.raw):
+        if (
+            self.pressed is None
+            or background is None
+            or not event.has_moved_from(self.pressed.unsnapped_point)
+        ):
             return
-        dx = event.raw[0] - self.pressed.raw[0]
-        dy = event.raw[1] - self.pressed.raw[1]
+        dx = event.unsnapped_point[0] - self.pressed.unsnapped_point[0]
+        dy = event.unsnapped_point[1] - self.pressed.unsnapped_point[1]
         corner = (background.corner[0] + dx, background.corner[1] + dy)
         self.moved = replace(background, corner=corner)
 
@@ -66,7 +70,7 @@ class ReferenceImageTool(EditorTool):
             corner = (round(x, CORNER_DECIMALS), round(y, CORNER_DECIMALS))
             context.apply(set_background(context.sketch, replace(moved, corner=corner)))
             return
-        self.clicked = [*self.clicked[-1:], event.raw]
+        self.clicked = [*self.clicked[-1:], event.unsnapped_point]
         if len(self.clicked) == 2:
             context.show_message(
                 "type how many meters apart the points are; Enter alone makes their line level"
@@ -95,12 +99,12 @@ class ReferenceImageTool(EditorTool):
         self.moved = None
         return super().cancel(context)
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the dragged image, and the line between the points."""
         if not self.clicked:
-            return EditorDrawState(background=self.moved)
+            return EditorToolOverlay(background=self.moved)
         line = (*self.clicked, self.cursor)[:2]
         label = f"now {format_length(distance(*line))}"
         if len(self.clicked) == 2:
             label += "; type their distance, or Enter makes them level"
-        return EditorDrawState(background=self.moved, line=line, label=label)
+        return EditorToolOverlay(background=self.moved, line=line, label=label)

@@ -8,9 +8,9 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, ScaleDrag, TurnDrag, VertexDrag
-from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.handles import Handle, find_handle
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.tool import CursorShape
 
 HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach: handles and edges are picked within this distance
@@ -107,7 +107,7 @@ class SelectTool(EditorTool):
             if self.hovered_handle is None:
                 self.hovered = next(iter(_find_owners(context, event)), None)
             return
-        if self.drag is None and event.has_moved_from(self.pressed.raw):
+        if self.drag is None and event.has_moved_from(self.pressed.unsnapped_point):
             self.drag = self._start_drag(context, self.pressed)
         if self.drag is not None:
             self.drag.follow(event)
@@ -120,12 +120,12 @@ class SelectTool(EditorTool):
         if handle is not None and handle.vertex is not None:
             return VertexDrag(context, handle.vertex, context.selection)
         if handle is not None and handle.kind == "turn":
-            return TurnDrag(context, objects, pressed.raw)
+            return TurnDrag(context, objects, pressed.unsnapped_point)
         if handle is not None:
             return ScaleDrag(context, objects, handle)
         if any(owner in objects.owners for owner in _find_owners(context, pressed)):
-            return MoveDrag(context, objects, pressed.raw)
-        return BoxDrag(context, pressed.raw, adds=pressed.shift)
+            return MoveDrag(context, objects, pressed.unsnapped_point)
+        return BoxDrag(context, pressed.unsnapped_point, adds=pressed.shift)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """End the drag, or handle the click."""
@@ -154,7 +154,7 @@ class SelectTool(EditorTool):
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Insert a vertex into the edge under the pointer; if there is none, handle it like a press."""
         owners = context.vertex_owners or _find_owners(context, event)[:1]
-        edge = find_edge(context.sketch, event.raw, HANDLE_REACH_FRACTION * event.reach, owners)
+        edge = find_edge(context.sketch, event.unsnapped_point, HANDLE_REACH_FRACTION * event.reach, owners)
         if edge is None or self._find_handle(context, event) is not None:
             self.press(context, event)
             return
@@ -191,11 +191,11 @@ class SelectTool(EditorTool):
         self.drag = None
         self.guides = ()
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return the state of the drag, or the handle and object under the cursor."""
         if self.drag is not None:
-            return replace(self.drag.build_draw_state(), hovered_handle=self.hovered_handle)
-        return EditorDrawState(
+            return replace(self.drag.build_overlay(), hovered_handle=self.hovered_handle)
+        return EditorToolOverlay(
             hovered=self.hovered,
             hovered_handle=self.hovered_handle,
             shows_handles=True,
@@ -218,11 +218,11 @@ class SelectTool(EditorTool):
         return "hand"
 
     def _find_handle(self, context: EditorContext, event: EditorPointerEvent) -> Handle | None:
-        return find_handle(context.handles, event.raw, HANDLE_REACH_FRACTION * event.reach)
+        return find_handle(context.handles, event.unsnapped_point, HANDLE_REACH_FRACTION * event.reach)
 
 
 def _find_owners(context: EditorContext, event: EditorPointerEvent) -> tuple[Owner, ...]:
-    return find_owners(context.sketch, event.raw, OBJECT_REACH_FRACTION * event.reach)
+    return find_owners(context.sketch, event.unsnapped_point, OBJECT_REACH_FRACTION * event.reach)
 
 
 class PanTool(EditorTool):

@@ -22,7 +22,7 @@ class SnapMode(NamedTuple):
 
 SNAPS: dict[str, SnapMode] = {
     "grid": SnapMode("Grid", frozenset({"grid"})),
-    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "center", "crossing"})),
+    "vertices": SnapMode("Vertices", frozenset({"vertex", "midpoint", "center", "intersection"})),
     "edges": SnapMode("Edges", frozenset({"edge"})),
     "angles": SnapMode("Angles", frozenset({"angle"})),
     "alignment": SnapMode("Alignment", frozenset({"aligned"})),

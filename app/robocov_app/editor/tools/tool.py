@@ -8,7 +8,7 @@ from robocov_app.editor.model.geometry import constrain_angle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.snapping import Guide
 from robocov_app.toolkit.tools.tool import PointerEvent, Tool
 
@@ -20,7 +20,7 @@ class EditorPointerEvent(PointerEvent):
     def constrain(self, origin: Point | None) -> Point:
         """Return the snapped point; with Shift, the nearest point at a round angle from `origin`."""
         if self.shift and origin is not None:
-            return constrain_angle(origin, self.raw)
+            return constrain_angle(origin, self.unsnapped_point)
         return self.point
 
 
@@ -118,6 +118,6 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         """Handle a value that the user typed; raise MapError if it is invalid."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
-    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
+    def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return what the tool shows on the sheet."""
-        return EditorDrawState()
+        return EditorToolOverlay()

@@ -30,7 +30,7 @@ from robocov_app.storage.settings import (
 )
 from robocov_app.toolkit.dialogs import create_recovery_question
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
-from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.window_settings import limit_window_size
 
 NO_DISPLAY = (
@@ -153,8 +153,8 @@ class EditorLauncher:
         scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
         size = self._choose_size(settings)
         window = EditorWindow(editor, size, scale, drafts, waits_for_workers=self.headless)
-        window.faults = FaultLog(drafts)
-        window.contains_faults = not self.headless
+        window.exceptions = ExceptionLog(drafts)
+        window.catches_exceptions = not self.headless
         window.panel.show_tab(settings.tab)
         if editor.document.path is not None:
             window.documents.remember(editor.document.path)
@@ -185,7 +185,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
     editor = window.editor
     question = create_recovery_question(
         f"An editor ended without saving: {draft.describe()}.",
-        others=len(others),
+        other_count=len(others),
         recover=partial(editor.attempt, partial(window.documents.recover, draft)),
         discard=partial(editor.attempt, discard),
         postpone=lambda: None,

@@ -140,29 +140,29 @@ class EditorPointer(Pointer):
         editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))
         editor.document.history.starts_new_step = True
 
-    def turn_wheel(self, event: pygame.event.Event) -> None:
+    def handle_wheel(self, event: pygame.event.Event) -> None:
         """Zoom about the mouse position, by the notches that the wheel has turned."""
-        if self.canvas.contains(self.at):
-            self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), self.at)
+        if self.canvas.contains(self.pixel):
+            self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), self.pixel)
 
     def _build_event(self, pixel: Pixel) -> EditorPointerEvent:
         """Build the event of the pointer at a pixel; its point snaps unless the tool or Ctrl prevents it."""
         editor = self.editor
         tool = editor.tool
-        raw = self.canvas.to_world(pixel)
+        unsnapped = self.canvas.to_world(pixel)
         reach = REACH_PX * editor.pixel
         modifiers = pygame.key.get_mods()
         has_ctrl = bool(modifiers & (pygame.KMOD_CTRL | pygame.KMOD_META))
-        point = raw
+        point = unsnapped
         if tool.snaps:
-            snap = Snap(raw)
+            snap = Snap(unsnapped)
             if editor.snaps and not has_ctrl:
-                snap = editor.snap(raw, reach, tool.origin, tool.snap_points)
+                snap = editor.snap(unsnapped, reach, tool.origin, tool.snap_points)
             point = snap.point
             tool.guides = snap.guides
         return EditorPointerEvent(
             point=point,
-            raw=raw,
+            unsnapped_point=unsnapped,
             reach=reach,
             shift=bool(modifiers & pygame.KMOD_SHIFT),
             alt=bool(modifiers & pygame.KMOD_ALT),

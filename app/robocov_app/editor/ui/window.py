@@ -109,7 +109,7 @@ class EditorWindow(CommandWindow):
             try_map=self.try_it,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
-            open_menu=lambda: self.open_menu(self.pointer.at),
+            open_menu=lambda: self.open_menu(self.pointer.pixel),
             hold_pan=lambda: self.pointer.hold_pan(),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
@@ -236,7 +236,7 @@ class EditorWindow(CommandWindow):
             editor.show_message(team.message, is_error=True)
 
     def _choose_cursor(self) -> CursorShape:
-        if not self.canvas.contains(self.pointer.at):
+        if not self.canvas.contains(self.pointer.pixel):
             return "arrow"
         if self.pointer.is_panning:
             return "move"
@@ -313,7 +313,7 @@ class EditorWindow(CommandWindow):
         trial.windowed_size = self.windowed_size
         trial.cursor = self.cursor
         self.trial = trial
-        self.inner = trial
+        self.replacement = trial
 
     def _update_trial(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen = self.screen
@@ -330,7 +330,7 @@ class EditorWindow(CommandWindow):
         trial.close()
         trial.run_saver.finish()
         self.trial = None
-        self.inner = None
+        self.replacement = None
         self.adopt_display()
         self.windowed_size = trial.windowed_size
         editor = self.editor
@@ -358,7 +358,7 @@ class EditorWindow(CommandWindow):
         if is_space_released or event.type == pygame.WINDOWFOCUSLOST:
             self.pointer.pans_with_left = False
         if event.type in MOUSE_EVENTS and event.type != pygame.MOUSEWHEEL:
-            self.pointer.at = event.pos
+            self.pointer.pixel = event.pos
         if event.type == pygame.KEYDOWN and event.key == pygame.K_F12:
             self.do("screenshot")
         else:

@@ -12,14 +12,6 @@ from robocov_app.toolkit.window.input import format_key, get_key_name
 Action = Callable[..., object]
 
 
-def _list_nothing() -> Iterable[str]:
-    return ()
-
-
-def _give_no_reason() -> str:
-    return ""
-
-
 @dataclass(frozen=True)
 class Argument:
     """Argument that is typed after the name of a command.
@@ -36,7 +28,7 @@ class Argument:
 
     description: str
     parse: Callable[[str], object] = str
-    list_values: Callable[[], Iterable[str]] = _list_nothing
+    list_values: Callable[[], Iterable[str]] = tuple
 
 
 @dataclass(frozen=True)
@@ -69,7 +61,7 @@ class Command:
     group: str
     run: Action
     keys: tuple[str, ...] = ()
-    get_disabled_reason: Callable[[], str] = _give_no_reason
+    get_disabled_reason: Callable[[], str] = str  # returns ""
     argument: Argument | None = None
     repeats: bool = False
     hidden: bool = False
@@ -87,13 +79,13 @@ class Command:
             return self.title
         return f"{self.title} ({keys})"
 
-    def run_now(self, *texts: str) -> object:
-        """Run the command.
+    def execute(self, argument: str | None = None) -> object:
+        """Run the command, unless it is disabled.
 
         Parameters
         ----------
-        *texts : str
-            The typed argument, if the command has one.
+        argument : str, optional
+            The typed argument, if the command takes one.
 
         Raises
         ------
@@ -103,9 +95,9 @@ class Command:
         reason = self.get_disabled_reason()
         if reason:
             raise InputError(reason)
-        if self.argument is None:
+        if self.argument is None or argument is None:
             return self.run()
-        return self.run(*[self.argument.parse(text) for text in texts])
+        return self.run(self.argument.parse(argument))
 
 
 class CommandGroup:
@@ -162,10 +154,6 @@ class CommandGroup:
         self.commands.append(command)
 
 
-def _list_no_commands() -> Iterable[Command]:
-    return ()
-
-
 class CommandTable:
     """The commands of a window.
 
@@ -187,7 +175,7 @@ class CommandTable:
         self,
         commands: Iterable[Command],
         attempt: Callable[[Callable[[], object]], object],
-        list_temporary: Callable[[], Iterable[Command]] = _list_no_commands,
+        list_temporary: Callable[[], Iterable[Command]] = tuple,
     ) -> None:
         """Index the commands by name and by key."""
         self.commands = list(commands)
@@ -206,10 +194,10 @@ class CommandTable:
 
     def attempt(self, command: Command) -> object:
         """Run a command, which may be temporary, and show its message or error."""
-        return self._attempt(command.run_now)
+        return self._attempt(command.execute)
 
-    def press_key(self, event: pygame.event.Event) -> Command | None:
-        """Return the command of a pressed key; None while the key is held, unless the command repeats."""
+    def take_command(self, event: pygame.event.Event) -> Command | None:
+        """Note a pressed key, and return its command; None if it is already held and does not repeat."""
         command = self._by_key.get(get_key_name(event))
         is_held = event.key in self._held_keys
         self._held_keys.add(event.key)
@@ -258,7 +246,7 @@ class CommandTable:
         commands = self._list_with_argument()
         if name not in commands:
             raise InputError(describe_unknown_name("command", name, list(commands)))
-        return commands[name].run_now(argument)
+        return commands[name].execute(argument)
 
     def search(self, text: str) -> list[Command]:
         """Return the commands, except for hidden ones, that match what the user typed."""

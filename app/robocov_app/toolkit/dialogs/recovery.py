@@ -8,7 +8,7 @@ from robocov_app.toolkit.dialogs.question import Answer, Question
 def create_recovery_question(
     text: str,
     *,
-    others: int,
+    other_count: int,
     recover: Callable[[], object],
     discard: Callable[[], object],
     postpone: Callable[[], object],
@@ -19,7 +19,7 @@ def create_recovery_question(
     ----------
     text : str
         Describes the unsaved work.
-    others : int
+    other_count : int
         Number of other windows that left unsaved work, too.
     recover, discard : callable
         Open the unsaved work, and delete it.
@@ -30,9 +30,10 @@ def create_recovery_question(
     -------
     Question
     """
-    if others:
-        verb = "is" if others == 1 else "are"
-        text += f"\n{others} more {verb} kept."
+    if other_count == 1:
+        text += "\n1 more draft is available."
+    elif other_count > 1:
+        text += f"\n{other_count} more drafts are available."
     answers = [
         Answer("Recover", recover, "r"),
         Answer("Discard", discard, "d"),

@@ -19,9 +19,9 @@ class DrawnOutline:
     ----------
     min_points, max_points : int
         Number of points the outline needs at least, and the number at which it is complete.
-    closes : bool
+    can_close : bool
         Whether pressing on the first point again completes the outline.
-    drags : bool
+    can_drag : bool
         Whether the outline can also be drawn with a single drag.
     points : list of (x, y), m
     cursor : (x, y), m
@@ -32,21 +32,23 @@ class DrawnOutline:
 
     min_points: int = 2
     max_points: int = _UNLIMITED
-    closes: bool = False
-    drags: bool = False
+    can_close: bool = False
+    can_drag: bool = False
     points: list[Point] = field(default_factory=list)
     cursor: Point = (0.0, 0.0)
     is_dragging: bool = False
     _pressed_at: Point = (0.0, 0.0)
 
-    def press(self, point: Point, raw: Point, closing_reach: float, same_point: float = SAME_POINT_M) -> bool:
+    def press(
+        self, point: Point, unsnapped: Point, closing_reach: float, same_point: float = SAME_POINT_M
+    ) -> bool:
         """Add a point, or complete the outline.
 
         Parameters
         ----------
         point : (x, y), m
             Position of the mouse after snapping.
-        raw : (x, y), m
+        unsnapped : (x, y), m
             Position of the mouse before snapping.
         closing_reach : float, m
             Distance from the first point within which a press completes a closed outline.
@@ -60,21 +62,21 @@ class DrawnOutline:
         """
         self.cursor = point
         has_enough = len(self.points) >= self.min_points
-        if self.closes and has_enough and dist(point, self.points[0]) < closing_reach:
+        if self.can_close and has_enough and dist(point, self.points[0]) < closing_reach:
             return True
         if self.points and dist(point, self.points[-1]) < same_point:
             return has_enough
         self.points.append(point)
-        self._pressed_at = raw
-        self.is_dragging = self.drags and len(self.points) == 1
+        self._pressed_at = unsnapped
+        self.is_dragging = self.can_drag and len(self.points) == 1
         return len(self.points) == self.max_points
 
-    def release(self, point: Point, raw: Point, reach: float, *, clicked: bool = False) -> bool:
+    def release(self, point: Point, unsnapped: Point, reach: float, *, clicked: bool = False) -> bool:
         """End a drag.
 
         Parameters
         ----------
-        point, raw : (x, y), m
+        point, unsnapped : (x, y), m
             Position of the mouse after and before snapping.
         reach : float, m
             Minimum length of a drag, so that a shaky click draws nothing. It does not apply to outlines of
@@ -93,7 +95,7 @@ class DrawnOutline:
         if not was_dragging or not self.points or clicked:
             return False
         self.cursor = point
-        return self.max_points == 2 or dist(self._pressed_at, raw) >= reach
+        return self.max_points == 2 or dist(self._pressed_at, unsnapped) >= reach
 
     def take_points(self) -> list[Point]:
         """Return the points and start over. If only the second of two points is missing, it is the cursor."""

@@ -74,7 +74,7 @@ class _Press(NamedTuple):
 
     time_s: float = _NEVER_S
     pixel: Pixel = (0, 0)
-    in_a_row: int = 0  # number of quick presses at the same pixel up to this one
+    click_count: int = 0  # number of quick presses at the same pixel up to this one
 
 
 class Pointer:
@@ -87,14 +87,14 @@ class Pointer:
 
     Attributes
     ----------
-    at : tuple of int
+    pixel : tuple of int
         Pixel under the mouse.
     gesture : Gesture or None
         Gesture of the button that is held down.
     """
 
     def __init__(self, panel: SidePanel) -> None:
-        self.at: Pixel = (0, 0)
+        self.pixel: Pixel = (0, 0)
         self.gesture: Gesture | None = None
         self._panel = panel
         self._button = 0
@@ -118,7 +118,7 @@ class Pointer:
     def leave(self) -> None:
         """React when the mouse leaves the map."""
 
-    def turn_wheel(self, event: pygame.event.Event) -> None:
+    def handle_wheel(self, event: pygame.event.Event) -> None:
         """Handle a turn of the mouse wheel."""
 
     # Events
@@ -136,7 +136,7 @@ class Pointer:
     def handle_event(self, event: pygame.event.Event, now: float) -> None:
         """Handle a mouse event that arrives at time `now`, s."""
         if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
+            self.pixel = event.pos
         is_for_panel = not self.is_busy and self._panel.handle_event(event)
         if event.type == pygame.MOUSEMOTION:
             self.move(event)
@@ -148,7 +148,7 @@ class Pointer:
             self._panel.ui.stop_typing()
             self.press(event, now)
         else:
-            self.turn_wheel(event)
+            self.handle_wheel(event)
 
     def press(self, event: pygame.event.Event, now: float) -> None:
         """Handle a button press at time `now`, s; ignore it while another button is held."""
@@ -180,7 +180,7 @@ class Pointer:
         last = self._last_press
         is_quick = now - last.time_s < DOUBLE_CLICK_S
         is_same_place = self._is_near(last.pixel, event.pos)
-        count = last.in_a_row + 1 if is_quick and is_same_place else 1
+        count = last.click_count + 1 if is_quick and is_same_place else 1
         self._last_press = _Press(now, event.pos, count)
         return count
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from robocov.arrays import Array
 from robocov_app.toolkit.tools.geometry import Point, find_nearest_on_edges
 
-PointKind: TypeAlias = Literal["vertex", "center", "middle"]
+PointKind: TypeAlias = Literal["vertex", "center", "midpoint"]
 MAX_EDGES = 8  # nearest edges that are considered; where there are more, they are too close to distinguish
 
 
@@ -46,7 +46,7 @@ class SnapTargets:
     def __init__(self, vertices: Array, centers: Array, edges: Edges, outlines: Edges = _NO_EDGES) -> None:
         """Index the points by kind, the bounding boxes of the edges, and the coordinates for alignment."""
         middles = (edges.starts + edges.ends) / 2
-        points_by_kind = {"vertex": vertices, "center": centers, "middle": middles}
+        points_by_kind = {"vertex": vertices, "center": centers, "midpoint": middles}
         self._trees = {
             kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
         }

@@ -12,7 +12,9 @@ import shapely
 from robocov_app.toolkit.tools.geometry import Point, compute_bearing, compute_cos_sin
 from robocov_app.toolkit.tools.snap_targets import PointKind, SnapTargets
 
-SnapKind: TypeAlias = Literal["vertex", "middle", "center", "crossing", "edge", "angle", "aligned", "grid"]
+SnapKind: TypeAlias = Literal[
+    "vertex", "midpoint", "center", "intersection", "edge", "angle", "aligned", "grid"
+]
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
 
@@ -123,7 +125,7 @@ def snap_move(
     best_rank = (math.inf, math.inf)
     best = Snap((dx, dy))
     # Among many points, some lie near the grid by chance, which is no reason to snap.
-    kinds_of_others = settings.kinds - {"grid", "angle", "middle", "crossing"}
+    kinds_of_others = settings.kinds - {"grid", "angle", "midpoint", "intersection"}
     settings_of_others = replace(settings, kinds=kinds_of_others)
     for number, (x, y) in enumerate(_choose_moved_points(points)):
         moved = (x + dx, y + dy)
@@ -205,7 +207,7 @@ class _SnapLine:
         """Return the point at a distance from the origin along the line, m."""
         return self.origin[0] + along * self.direction[0], self.origin[1] + along * self.direction[1]
 
-    def find_crossing(self, other: Self) -> Point | None:
+    def find_intersection(self, other: Self) -> Point | None:
         """Return the intersection with another line; None if there is none."""
         ux, uy = self.direction
         vx, vy = other.direction
@@ -268,7 +270,7 @@ class _SnapSearch:
         """Return the best snap within reach: vertices rank before other marks, lines and the grid."""
         groups = (
             self.list_marks("vertex"),
-            self.list_marks_and_crossings(),
+            self.list_marks_and_intersections(),
             self.list_line_snaps(),
             self.list_grid_snaps(),
         )
@@ -297,25 +299,27 @@ class _SnapSearch:
             if mark is not None:
                 yield _snap_to_mark(kind, mark)
 
-    def list_marks_and_crossings(self) -> Iterator[Snap]:
+    def list_marks_and_intersections(self) -> Iterator[Snap]:
         """Yield the snaps to centers, midpoints of edges and intersections of edges."""
-        yield from self.list_marks("center", "middle")
-        if "crossing" in self.settings.kinds:
+        yield from self.list_marks("center", "midpoint")
+        if "intersection" in self.settings.kinds:
             for edge, other in combinations(self.list_edges(), 2):
-                crossing = other.find_crossing(edge)
-                if crossing is not None:
-                    yield _snap_to_mark("crossing", crossing)
+                intersection = other.find_intersection(edge)
+                if intersection is not None:
+                    yield _snap_to_mark("intersection", intersection)
 
     def list_line_snaps(self) -> Iterator[Snap]:
         """Yield the snaps to lines, to their intersections, and to grid points on lines."""
         lines: list[_SnapLine] = []
         for line in self.list_lines():
             for other in lines:
-                # Intersections of two edges are a kind of snap of their own, "crossing".
+                # Intersections of two edges are a kind of snap of their own, "intersection".
                 are_edges = line.kind == other.kind == "edge"
-                crossing = None if are_edges else line.find_crossing(other)
-                if crossing is not None:
-                    yield Snap(crossing, (other.build_guide(crossing), line.build_guide(crossing)))
+                intersection = None if are_edges else line.find_intersection(other)
+                if intersection is not None:
+                    yield Snap(
+                        intersection, (other.build_guide(intersection), line.build_guide(intersection))
+                    )
             lines.append(line)
             foot = line.find_foot(self.point)
             if "grid" in self.settings.kinds:
@@ -366,8 +370,8 @@ class _SnapSearch:
 
 def _snap_to_mark(kind: SnapKind, mark: Point) -> Snap:
     label: str = kind
-    if kind == "middle":
-        label = "middle of an edge"
+    if kind == "midpoint":
+        label = "midpoint of an edge"
     return Snap(mark, (Guide(kind, (mark,), label),))
 
 

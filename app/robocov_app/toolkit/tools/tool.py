@@ -21,7 +21,7 @@ class PointerEvent:
     ----------
     point : (x, y), m
         Position after snapping.
-    raw : (x, y), m
+    unsnapped_point : (x, y), m
         Position before snapping.
     reach : float, m
         Distance within which the pointer grabs an object.
@@ -30,7 +30,7 @@ class PointerEvent:
     """
 
     point: Point
-    raw: Point
+    unsnapped_point: Point
     reach: float
     shift: bool = False
     alt: bool = False
@@ -38,11 +38,11 @@ class PointerEvent:
 
     def has_moved_from(self, position: Point) -> bool:
         """Return whether the pointer has moved deliberately since it was pressed at a position, m."""
-        return dist(position, self.raw) >= MOVED_FRACTION * self.reach
+        return dist(position, self.unsnapped_point) >= MOVED_FRACTION * self.reach
 
 
 @dataclass(frozen=True)
-class DrawState:
+class ToolOverlay:
     """The overlay of a tool on the map.
 
     Attributes
@@ -116,9 +116,9 @@ class Tool(Generic[ContextT, EventT]):
         """Cancel the action in progress, as Escape does; return whether there was one."""
         return False
 
-    def build_draw_state(self, context: ContextT) -> DrawState:
+    def build_overlay(self, context: ContextT) -> ToolOverlay:
         """Return the overlay that the tool shows on the map."""
-        return DrawState()
+        return ToolOverlay()
 
     def choose_cursor(self, context: ContextT) -> CursorShape:
         """Return the shape of the cursor over the map."""

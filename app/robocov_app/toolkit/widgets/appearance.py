@@ -28,7 +28,7 @@ def get_text_size(*, small: bool) -> float:
     return TEXT_PX
 
 
-def is_drawn(page: Page, rect: Rect) -> bool:
+def is_visible(page: Page, rect: Rect) -> bool:
     """Return whether the page is being drawn and a rectangle is at least partly visible."""
     return page.surface is not None and bool(rect.colliderect(page.clip))
 
@@ -148,7 +148,7 @@ def draw_text(
     align : str
         "left", "center" or "right".
     """
-    if page.surface is None or not text or not is_drawn(page, rect):
+    if page.surface is None or not text or not is_visible(page, rect):
         return
     pixels = page.px(size)
     image = render_text(shorten_to_width(text, pixels, rect.width, bold), pixels, color, bold)

@@ -18,7 +18,7 @@ from robocov_app.toolkit.widgets.appearance import (
     draw_focus_ring,
     draw_text,
     get_text_size,
-    is_drawn,
+    is_visible,
     shade,
 )
 from robocov_app.toolkit.widgets.page import Page, Widget
@@ -71,7 +71,7 @@ def show_button(
     rect = page.cell()
     rect.height = min(rect.height, page.px(_MAX_BUTTON_HEIGHT_PX))
     is_clicked = page.add_clickable(Widget("button", key, rect, text, chosen, tip), disabled_reason)
-    if is_drawn(page, rect):
+    if is_visible(page, rect):
         ink = draw_face(page, rect, key, chosen=chosen, enabled=not disabled_reason)
         size = get_text_size(small=small)
         inner = rect.inflate(-page.px(6), 0)
@@ -104,7 +104,7 @@ def show_option(
     """
     rect = page.cell()
     is_clicked = page.add_clickable(Widget("option", key, rect, text, chosen), disabled_reason)
-    if not is_drawn(page, rect):
+    if not is_visible(page, rect):
         return is_clicked
     if chosen:
         draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.2))
@@ -201,7 +201,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     key = key or text
     rect = page.cell()
     is_clicked = page.add_clickable(Widget("check", key, rect, text, value, tip))
-    if is_drawn(page, rect):
+    if is_visible(page, rect):
         box = Rect(0, 0, page.px(_CHECK_BOX_PX), page.px(_CHECK_BOX_PX))
         box.midleft = rect.midleft
         _draw_check_box(page, box, is_hovered=page.is_hovered(rect), value=value)

@@ -6,7 +6,7 @@ import pygame
 from pygame import Rect
 
 from robocov_app.render.fonts import measure_text
-from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_drawn
+from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_visible
 from robocov_app.toolkit.widgets.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
 from robocov_app.toolkit.widgets.page import Page, Widget
 
@@ -37,7 +37,7 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
         page.focus = key
         page.edit = None
         page.consume_event()
-    if is_drawn(page, rect):
+    if is_visible(page, rect):
         _draw_menu(page, key, value, rect)
     if picked == value:
         return None

@@ -6,7 +6,7 @@ import pygame
 from pygame import Rect
 
 from robocov_app.look.colors import mix
-from robocov_app.toolkit.widgets.appearance import draw_box, draw_focus_ring, is_drawn, shade
+from robocov_app.toolkit.widgets.appearance import draw_box, draw_focus_ring, is_visible, shade
 from robocov_app.toolkit.widgets.page import Page, Widget
 
 # Lengths in pixels at scale 1.
@@ -90,7 +90,7 @@ def show_slider(
     if new_value != value:
         new_value = values.limit(new_value)
     page.add_widget(Widget("slider", key, track, value=new_value), disabled_reason)
-    if is_drawn(page, rect):
+    if is_visible(page, rect):
         _draw_slider(page, key, values, values.compute_fraction(new_value), enabled=not disabled_reason)
     if new_value == value:
         return None

@@ -8,7 +8,7 @@ from pygame import Rect, Surface
 from robocov_app.look.colors import Color, mix
 from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import get_field_color
-from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_drawn, shade
+from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_visible, shade
 from robocov_app.toolkit.widgets.page import Page, Widget
 from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.window.input import ENTER_KEYS
@@ -50,7 +50,7 @@ def show_text_field(
         entered_text = edit.text
     shown_text = text if edit is None else edit.text
     page.add_widget(Widget("entry", key, rect, shown_text, text, tip))
-    if page.surface is not None and is_drawn(page, rect):
+    if page.surface is not None and is_visible(page, rect):
         _draw_field(page, rect, is_edited=edit is not None)
         if edit is None:
             draw_text(page, text or placeholder, _get_inner(page, rect), _get_text_color(page, text), TEXT_PX)

@@ -181,15 +181,15 @@ class CommandWindow(BaseWindow):
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press: as input for the panel, or by running the command of that key."""
         if not self.use_key(event):
-            command = self.commands.press_key(event)
+            command = self.commands.take_command(event)
             if command is not None:
                 self.do(command.name)
         # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
         self.dialogs.ignore_letter(event.unicode)
 
-    # Faults and drawing
+    # Exceptions and drawing
 
-    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+    def report_exception(self, message: str, *, in_drawing: bool) -> None:
         """Show a message about an unexpected exception; close what may have caused it in drawing."""
         if in_drawing:
             self.restore_view()

@@ -56,10 +56,10 @@ def ending_on_signals() -> Iterator[None]:
         watcher.start()
         yield
     except BaseException:
-        watcher.handle_closing(failed=True)
+        watcher.note_closed(failed=True)
         raise
     else:
-        watcher.handle_closing(failed=False)
+        watcher.note_closed(failed=False)
     finally:
         if not watcher.number:  # After a signal, the watcher still has to end the process.
             watcher.stop()
@@ -90,7 +90,7 @@ class _Watcher:
         self._previous_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
         self._thread.start()
 
-    def handle_closing(self, *, failed: bool) -> None:
+    def note_closed(self, *, failed: bool) -> None:
         """Let the process end soon after a signal, because everything is closed and saved."""
         if self.number:
             with suppress(OSError, ValueError):

@@ -14,7 +14,7 @@ from robocov_app.look.theme import LIGHT
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_window
-from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.input import clean_event, drop_late_repeats
 from robocov_app.toolkit.window.layout import Box
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
@@ -22,15 +22,15 @@ from robocov_app.toolkit.window.termination import is_ending
 
 FPS = 60
 """Frames per second on a screen while something moves."""
-CALM_S = 0.8
+IDLE_S = 0.8
 """Time without changes after which the loop waits for events; longer than the delay of tool tips."""
 MAX_WAIT_S = 0.1
 """Maximum time between two checks for changes while the loop waits."""
 
 _MIN_SURFACE_PX = (320, 240)
 """Minimum size of the surface that is drawn, however small the window is."""
-_MAX_FAULTS_IN_A_ROW = 5
-"""Consecutive faults of an action after which it is tried only every `_RETRY_S` seconds."""
+_MAX_CONSECUTIVE_EXCEPTIONS = 5
+"""Number of consecutive exceptions of an action after which it is tried only every `_RETRY_S` seconds."""
 _RETRY_S = 1.0
 _RATE_WEIGHT = 0.05
 """Weight of the last frame in the moving average of the frame rate."""
@@ -64,8 +64,8 @@ class Remote(Protocol):
 class BaseWindow:
     """A window that is redrawn while something moves, and otherwise only when something has changed.
 
-    An unexpected exception does not end it. The exception is logged by `faults` and reported in the window,
-    the changes made by the event are reverted, and the loop continues.
+    An unexpected exception does not end it. The exception is logged by `exceptions` and reported in the
+    window, the changes made by the event are reverted, and the loop continues.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class BaseWindow:
 
     Attributes
     ----------
-    contains_faults : bool
+    catches_exceptions : bool
         Whether unexpected exceptions are reported instead of raised. Tests set it to False.
     screen : pygame.Surface
         Surface on which the window is drawn.
@@ -83,32 +83,32 @@ class BaseWindow:
         Size before full screen, px; None if the window does not fill the screen.
     closed : bool
         Whether the window is closed, which ends the loop.
-    inner : BaseWindow or None
+    replacement : BaseWindow or None
         Window that is temporarily shown and used in its place.
     remote : Remote or None
         Where the window is displayed, if not on the screen.
     cursor : MouseCursor
-    faults : FaultLog
+    exceptions : ExceptionLog
     frame_rate : float
         Mean number of frames per second.
     """
 
-    contains_faults = True
+    catches_exceptions = True
 
     def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
         """Open a window of the given size, or draw on an existing surface."""
         self.screen = screen or open_window(size)
         self.windowed_size: tuple[int, int] | None = None
         self.closed = False
-        self.inner: BaseWindow | None = None
+        self.replacement: BaseWindow | None = None
         self.remote: Remote | None = None
         self._held_keys: set[int] = set()
         self.cursor = MouseCursor()
-        self.faults = FaultLog()
+        self.exceptions = ExceptionLog()
         self.frame_rate = float(FPS)
-        self._faults_in_a_row: dict[str, int] = {}
+        self._exception_counts: dict[str, int] = {}
         self._retry_at_s: dict[str, float] = {}
-        self._calm_s = 0.0
+        self._idle_s = 0.0
         self._had_events = False
         self._drawn_state: object = None
 
@@ -146,7 +146,7 @@ class BaseWindow:
         """Return a function that reverts all later changes; it is called if handling an event raises."""
         return _revert_nothing
 
-    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+    def report_exception(self, message: str, *, in_drawing: bool) -> None:
         """Show a message about an unexpected exception; close what may have caused it in drawing."""
 
     # Loop
@@ -163,46 +163,46 @@ class BaseWindow:
                     previous_s = now_s
                     self._wait(clock, now_s)
         finally:
-            self._run_contained("closing", self.close)
+            self._run_safely("closing", self.close)
 
     def _wait(self, clock: pygame.time.Clock, frame_start_s: float) -> None:
-        """Wait until the next frame is due; while the window rests, until an event arrives."""
+        """Wait until the next frame is due; while the window is idle, until an event arrives."""
         if self.remote is not None:
             wait_s = 1.0 / self.remote.fps
-            if self.is_resting:
+            if self.is_idle:
                 wait_s = MAX_WAIT_S
             self.remote.wait(frame_start_s + wait_s - perf_counter())
             return
         clock.tick(FPS)
         # SDL's own function for this polls a thousand times per second.
-        while self.is_resting and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
+        while self.is_idle and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
             clock.tick(FPS)
 
     @property
-    def is_resting(self) -> bool:
+    def is_idle(self) -> bool:
         """Whether nothing has changed for a while."""
-        return self._calm_s >= CALM_S
+        return self._idle_s >= IDLE_S
 
     def run_frame(self, seconds: float) -> None:
         """Handle all events, advance by a time, s, and draw the window if something has changed."""
-        was_resting = self.is_resting
+        was_idle = self.is_idle
         self.advance(seconds)
         if self.closed:
             return
-        self._run_contained("drawing", lambda: self._draw_if_changed(seconds, was_resting=was_resting))
+        self._run_safely("drawing", lambda: self._draw_if_changed(seconds, was_idle=was_idle))
         remote = self.remote
         if remote is not None:
-            self._run_contained("sending a picture", lambda: remote.send(self.screen, self.cursor.shape))
+            self._run_safely("sending a picture", lambda: remote.send(self.screen, self.cursor.shape))
 
-    def _draw_if_changed(self, seconds: float, *, was_resting: bool) -> None:
+    def _draw_if_changed(self, seconds: float, *, was_idle: bool) -> None:
         """Draw the window unless its visible state is unchanged, and measure how long nothing has changed."""
-        window = self.inner or self
+        window = self.replacement or self
         state = window.get_visible_state()
         if self._had_events or state is None:
-            self._calm_s = 0.0
+            self._idle_s = 0.0
         else:
-            self._calm_s += seconds
-        is_unchanged = was_resting and self.is_resting and state == self._drawn_state
+            self._idle_s += seconds
+        is_unchanged = was_idle and self.is_idle and state == self._drawn_state
         if not is_unchanged:
             self._drawn_state = None  # If drawing raises, the next frame draws again.
             window.draw()
@@ -212,7 +212,7 @@ class BaseWindow:
         """Handle all events that have arrived, and update the window for a time, s."""
         remote = self.remote
         if remote is not None:
-            self._run_contained("receiving messages of a page", lambda: remote.receive(self))
+            self._run_safely("receiving messages of a page", lambda: remote.receive(self))
         events = drop_late_repeats(pygame.event.get(), self._held_keys)
         self._had_events = bool(events)
         for event in events:
@@ -221,22 +221,20 @@ class BaseWindow:
             self._handle_safely(event)
         if self.closed:
             return
-        if seconds > 0 and not self.is_resting:
+        if seconds > 0 and not self.is_idle:
             self.frame_rate += _RATE_WEIGHT * (min(1.0 / seconds, _MAX_RATE) - self.frame_rate)
-        window = self.inner or self
-        self._run_contained(
-            "updating", lambda: self.update(seconds), create_save_point=window.create_save_point
-        )
+        window = self.replacement or self
+        self._run_safely("updating", lambda: self.update(seconds), create_save_point=window.create_save_point)
 
-    # Faults
+    # Exceptions
 
     def _handle_safely(self, event: pygame.event.Event) -> None:
         """Handle an event, and revert its changes if it raises; closing the window always succeeds."""
         cleaned_event = clean_event(event)
         if cleaned_event is None:
             return
-        window = self.inner or self
-        succeeded = self._run_contained(
+        window = self.replacement or self
+        succeeded = self._run_safely(
             f"handling {pygame.event.event_name(event.type)}",
             lambda: window.handle_event(cleaned_event),
             create_save_point=window.create_save_point,
@@ -244,7 +242,7 @@ class BaseWindow:
         if event.type == pygame.QUIT and not succeeded:
             self.closed = True  # Drafts are kept.
 
-    def _run_contained(
+    def _run_safely(
         self,
         action: str,
         call: Callable[[], object],
@@ -263,7 +261,7 @@ class BaseWindow:
         """
         if perf_counter() < self._retry_at_s.get(action, 0.0):
             return False
-        if not self.contains_faults:
+        if not self.catches_exceptions:
             call()
             return True
         roll_back: RollBack | None = None
@@ -276,40 +274,40 @@ class BaseWindow:
         except Exception as error:
             if not pygame.display.get_init():
                 raise
-            self._handle_fault(error, action, roll_back)
+            self._handle_exception(error, action, roll_back)
             return False
-        self._faults_in_a_row.pop(action, None)
+        self._exception_counts.pop(action, None)
         self._retry_at_s.pop(action, None)
         return True
 
-    def _handle_fault(self, error: Exception, action: str, roll_back: RollBack | None) -> None:
+    def _handle_exception(self, error: Exception, action: str, roll_back: RollBack | None) -> None:
         """Log an exception, revert the changes before it, and report it in the window."""
-        count = self._faults_in_a_row.get(action, 0) + 1
-        self._faults_in_a_row[action] = count
-        if count >= _MAX_FAULTS_IN_A_ROW:
+        count = self._exception_counts.get(action, 0) + 1
+        self._exception_counts[action] = count
+        if count >= _MAX_CONSECUTIVE_EXCEPTIONS:
             self._retry_at_s[action] = perf_counter() + _RETRY_S
-        message = self.faults.record(error, action)
+        message = self.exceptions.record(error, action)
         if roll_back is not None and self._revert(roll_back):
             message += " The action was undone."
         message += " Save your work."
         in_drawing = action == "drawing"
         try:
-            (self.inner or self).report_fault(message, in_drawing=in_drawing)
+            (self.replacement or self).report_exception(message, in_drawing=in_drawing)
             if in_drawing:
-                self._draw_fault(message)
+                self._draw_error_message(message)
         except Exception as second_error:
-            self.faults.record(second_error, "reporting an error")
+            self.exceptions.record(second_error, "reporting an error")
 
     def _revert(self, roll_back: RollBack) -> bool:
         """Revert changes; return whether that succeeded."""
         try:
             roll_back()
         except Exception as error:
-            self.faults.record(error, "undoing an action")
+            self.exceptions.record(error, "undoing an action")
             return False
         return True
 
-    def _draw_fault(self, message: str) -> None:
+    def _draw_error_message(self, message: str) -> None:
         """Draw a message over the incomplete frame."""
         width, height = self.screen.get_size()
         draw_message(self.screen, message, Box(0, 0, width, height), LIGHT, 1.0, is_error=True)

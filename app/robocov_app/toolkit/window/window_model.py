@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from robocov.errors import RobocovError
-from robocov_app.toolkit.window.faults import describe_os_error
+from robocov_app.toolkit.window.exceptions import describe_os_error
 
 MESSAGE_S = 5.0
 """Time for which a status message is shown."""

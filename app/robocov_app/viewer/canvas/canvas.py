@@ -28,7 +28,7 @@ from robocov_app.viewer.canvas.tool_overlay import (
     draw_drag,
     draw_failed_selection,
     draw_hovered_robot,
-    draw_tool_state,
+    draw_tool_overlay,
 )
 from robocov_app.viewer.costs.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
@@ -319,7 +319,7 @@ class ViewerCanvas:
         draw_failed_selection(canvas, scene, self.viewer.selected_robot)
         if self.hovered is not None and self.hovered.pane == pane:
             draw_hovered_robot(canvas, scene, self.hovered.number)
-        draw_tool_state(canvas, self.viewer.tool.build_draw_state(session))
+        draw_tool_overlay(canvas, self.viewer.tool.build_overlay(session))
         surface.set_clip(None)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:

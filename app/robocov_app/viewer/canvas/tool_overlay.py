@@ -14,7 +14,7 @@ from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.viewer.session.past.states import Drag
-from robocov_app.viewer.tools.tool import ViewerDrawState
+from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 # Lengths in pixels at scale 1.
 FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
@@ -61,7 +61,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
     canvas.draw_sprite(partial(sprites.render_ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
 
 
-def draw_tool_state(canvas: Canvas, state: ViewerDrawState) -> None:
+def draw_tool_overlay(canvas: Canvas, state: ViewerToolOverlay) -> None:
     """Draw the overlay of a tool in a pane."""
     if state.obstacle is not None:
         _draw_obstacle(canvas, state.obstacle)

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.environment import Point, Ring
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay
 
 DEFAULT_RADIUS_FRACTION = 0.1  # of the map's diameter
 MIN_RADIUS_FRACTION = 1 / 200
@@ -73,8 +73,8 @@ class BrushTool(ViewerTool):
         """Start a stroke; with the right button, it lowers the density."""
         self.lowers = event.is_right
         self.is_painting = True
-        self._cursor = event.raw
-        self._dabs = [event.raw]
+        self._cursor = event.unsnapped_point
+        self._dabs = [event.unsnapped_point]
         self._boundary = session.displayed.environment.boundary
         self._stroke += 1
         self._apply(session)
@@ -83,13 +83,13 @@ class BrushTool(ViewerTool):
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Continue the stroke with equally spaced dabs; without a stroke, only move the brush."""
         if not self.is_painting or self._cursor is None:
-            self._cursor = event.raw
+            self._cursor = event.unsnapped_point
             return
         # Another map may have been opened during the stroke.
         if session.displayed.environment.boundary != self._boundary:
             self.is_painting = False
             return
-        self._add_dabs(self._cursor, event.raw, DAB_SPACING_FRACTION * self.get_radius(session))
+        self._add_dabs(self._cursor, event.unsnapped_point, DAB_SPACING_FRACTION * self.get_radius(session))
         if self._dabs and self.clock() - self._applied_at >= APPLY_INTERVAL_S:
             self._apply(session)
 
@@ -123,10 +123,10 @@ class BrushTool(ViewerTool):
             session.undo()
         return was_painting
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return the outline of the brush, labeled with the density at the cursor."""
         if self._cursor is None:
-            return ViewerDrawState()
+            return ViewerToolOverlay()
         angles = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS + 1)
         radius = self.get_radius(session)
         x = self._cursor[0] + radius * np.cos(angles)
@@ -134,7 +134,7 @@ class BrushTool(ViewerTool):
         ring = tuple(zip(x.tolist(), y.tolist(), strict=True))
         density = session.displayed.environment.density
         value = 1.0 if density is None else float(density.evaluate(np.array([self._cursor]))[0])
-        return ViewerDrawState(ring, label=f"φ {value:.2g}", has_marks=False)
+        return ViewerToolOverlay(ring, label=f"φ {value:.2g}", has_marks=False)
 
     def _apply(self, session: Session) -> None:
         """Apply the dabs that have not been applied yet."""

@@ -22,7 +22,7 @@ class EraserTool(ViewerTool):
             session.remove_robot(event.robot)
             return f"robot {event.robot} removed"
         reach = ERASE_REACH_FRACTION * event.reach
-        index = map_edits.find_obstacle(session.displayed.environment, event.raw, reach)
+        index = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point, reach)
         if index is None:
             return None
         obstacle = session.displayed.environment.obstacles[index]
@@ -41,7 +41,7 @@ class AddRobotTool(ViewerTool):
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a robot at the free position nearest to the cursor."""
-        return f"robot {session.add_robot(event.raw)} joined"
+        return f"robot {session.add_robot(event.unsnapped_point)} joined"
 
 
 class FailureTool(ViewerTool):

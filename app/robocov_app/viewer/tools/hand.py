@@ -10,7 +10,7 @@ from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, change_map
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay, change_map
 
 MIN_DRAG_M = 0.02  # a shorter move counts as part of a click
 _MIN_SHIFT_M = 1e-3  # an obstacle that is moved by less stays where it is
@@ -46,14 +46,14 @@ class HandTool(ViewerTool):
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Grab the robot or the obstacle under the cursor."""
-        self._pressed_at = event.raw
-        self._cursor = event.raw
+        self._pressed_at = event.unsnapped_point
+        self._cursor = event.unsnapped_point
         self._drags = False
         self._obstacles = session.displayed.environment.obstacles
         self.robot = event.robot
         self.obstacle = None
         if event.robot is None:
-            self.obstacle = map_edits.find_obstacle(session.displayed.environment, event.raw)
+            self.obstacle = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point)
         else:
             self.inspection.selected = event.robot
         return None
@@ -65,18 +65,18 @@ class HandTool(ViewerTool):
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Drag the held robot; a held obstacle is moved only when the button is released."""
-        self._cursor = event.raw
-        if dist(self._pressed_at, event.raw) > MIN_DRAG_M:
+        self._cursor = event.unsnapped_point
+        if dist(self._pressed_at, event.unsnapped_point) > MIN_DRAG_M:
             self._drags = True
         if self.robot is None or not self._drags:
             return
         # The robot may have been removed while it was held.
         if self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers:
-            session.drag_robot(self.robot, event.raw)
+            session.drag_robot(self.robot, event.unsnapped_point)
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Let go of the held robot, or move the held obstacle to its new position."""
-        self._cursor = event.raw
+        self._cursor = event.unsnapped_point
         index = self.obstacle
         moved = self._move_obstacle(session)
         if self.robot is not None:
@@ -99,14 +99,14 @@ class HandTool(ViewerTool):
         session.release()
         return True
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return a preview of the held obstacle at its new position."""
         moved = self._move_obstacle(session)
         if moved is None:
-            return ViewerDrawState()
+            return ViewerToolOverlay()
         distance = dist(self._pressed_at, self._cursor)
         line = (self._pressed_at, self._cursor)
-        return ViewerDrawState(line, obstacle=moved, label=f"{distance:.2f} m")
+        return ViewerToolOverlay(line, obstacle=moved, label=f"{distance:.2f} m")
 
     def choose_cursor(self, session: Session) -> CursorShape:
         """Return the shape of the cursor where there is no robot."""

@@ -12,7 +12,7 @@ from robocov.errors import RobocovError
 from robocov_app.toolkit.tools.drawn_outline import SAME_POINT_M, DrawnOutline
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, add_obstacle
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay, add_obstacle
 
 DEFAULT_WALL_WIDTH_M = 0.1
 MIN_WALL_WIDTH_M = 0.02
@@ -44,7 +44,7 @@ class OutlineTool(ViewerTool, ABC):
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a point, or complete the obstacle."""
         same_point = max(SAME_POINT_M, self.end_fraction * event.reach)
-        is_complete = self.outline.press(event.point, event.raw, event.reach, same_point)
+        is_complete = self.outline.press(event.point, event.unsnapped_point, event.reach, same_point)
         if is_complete:
             return self.finish(session)
         return None
@@ -59,7 +59,7 @@ class OutlineTool(ViewerTool, ABC):
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Complete the obstacle if it was drawn with a single drag."""
-        is_complete = self.outline.release(event.point, event.raw, event.reach, clicked=clicked)
+        is_complete = self.outline.release(event.point, event.unsnapped_point, event.reach, clicked=clicked)
         if not is_complete:
             return None
         self.outline.points.append(self.outline.cursor)
@@ -76,13 +76,13 @@ class OutlineTool(ViewerTool, ABC):
         """Discard the points; return whether there were any."""
         return self.outline.cancel()
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return the line up to the cursor, with the length of its last edge."""
         if not self.outline.points:
-            return ViewerDrawState()
+            return ViewerToolOverlay()
         line = (*self.outline.points, self.outline.cursor)
         label = f"{dist(line[-2], line[-1]):.2f} m"
-        return ViewerDrawState(line, is_closed=len(line) > 2, label=label)
+        return ViewerToolOverlay(line, is_closed=len(line) > 2, label=label)
 
 
 @dataclass
@@ -94,7 +94,9 @@ class AddPolygonTool(OutlineTool):
     key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
 
-    outline: DrawnOutline = field(default_factory=lambda: DrawnOutline(min_points=3, closes=True), repr=False)
+    outline: DrawnOutline = field(
+        default_factory=lambda: DrawnOutline(min_points=3, can_close=True), repr=False
+    )
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the polygon with these corners, m."""
@@ -118,16 +120,16 @@ class AddWallTool(OutlineTool):
     is_resizable = True
     end_fraction = WALL_END_FRACTION
 
-    outline: DrawnOutline = field(default_factory=lambda: DrawnOutline(drags=True), repr=False)
+    outline: DrawnOutline = field(default_factory=lambda: DrawnOutline(can_drag=True), repr=False)
     width: float = DEFAULT_WALL_WIDTH_M
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the wall with these points, m."""
         return map_edits.build_wall(points, self.width)
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return a preview of the wall up to the cursor."""
-        state = super().build_draw_state(session)
+        state = super().build_overlay(session)
         if not state.line:
             return state
         wall: Obstacle | None = None
@@ -135,7 +137,7 @@ class AddWallTool(OutlineTool):
         with suppress(RobocovError):
             wall = self.build_obstacle(list(state.line))
         label = f"{state.label}, {self.width:g} m wide"
-        return ViewerDrawState(state.line, obstacle=wall, label=label)
+        return ViewerToolOverlay(state.line, obstacle=wall, label=label)
 
     def resize(self, session: Session, factor: float) -> str:
         """Multiply the width of new walls by a factor, and return a message."""

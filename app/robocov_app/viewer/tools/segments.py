@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, Point
 from robocov.errors import RobocovError
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, add_obstacle
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay, add_obstacle
 
 
 @dataclass
@@ -66,12 +66,12 @@ class SegmentTool(ViewerTool):
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Start a segment."""
-        self.segment.press(event.raw)
+        self.segment.press(event.unsnapped_point)
         return None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Drag the end of the segment to the cursor."""
-        self.segment.move(event.raw)
+        self.segment.move(event.unsnapped_point)
 
     def cancel(self, session: Session) -> bool:
         """Discard the segment; return whether there was one."""
@@ -92,15 +92,15 @@ class RulerTool(SegmentTool):
         self.segment.release()
         return None
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return the segment with its length and its components."""
         start = self.segment.start
         if start is None:
-            return ViewerDrawState()
+            return ViewerToolOverlay()
         end = self.segment.end
         dx = end[0] - start[0]
         dy = end[1] - start[1]
-        return ViewerDrawState((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
+        return ViewerToolOverlay((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
 
 
 @dataclass
@@ -118,16 +118,16 @@ class AddCircleTool(SegmentTool):
         self.segment.clear()
         if center is None:
             return None
-        return add_obstacle(session, map_edits.build_circle(center, event.raw), self.name)
+        return add_obstacle(session, map_edits.build_circle(center, event.unsnapped_point), self.name)
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return a preview of the circle up to the cursor."""
         center = self.segment.start
         if center is None:
-            return ViewerDrawState()
+            return ViewerToolOverlay()
         rim = self.segment.end
         circle: CircleObstacle | None = None
         # A circle whose radius is almost zero is not an obstacle yet.
         with suppress(RobocovError):
             circle = map_edits.build_circle(center, rim)
-        return ViewerDrawState((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")
+        return ViewerToolOverlay((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from robocov.environment import Environment, Obstacle
-from robocov_app.toolkit.tools.tool import DrawState, PointerEvent, Tool
+from robocov_app.toolkit.tools.tool import PointerEvent, Tool, ToolOverlay
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.passages import describe_passage_changes
 from robocov_app.viewer.session.session import Session
@@ -15,7 +15,7 @@ class ViewerPointerEvent(PointerEvent):
 
     Attributes
     ----------
-    point, raw, reach, shift, alt, ctrl
+    point, unsnapped_point, reach, shift, alt, ctrl
         See `PointerEvent`.
     robot : int or None
         Number of the robot under the pointer.
@@ -28,13 +28,13 @@ class ViewerPointerEvent(PointerEvent):
 
 
 @dataclass(frozen=True)
-class ViewerDrawState(DrawState):
+class ViewerToolOverlay(ToolOverlay):
     """The overlay of a tool of the viewer in a pane.
 
     Attributes
     ----------
     line, is_closed, label
-        See `DrawState`.
+        See `ToolOverlay`.
     obstacle : Obstacle or None
         Preview of the obstacle that is being drawn or moved.
     has_marks : bool
@@ -68,9 +68,9 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
     is_resizable = False
     is_painting = False
 
-    def build_draw_state(self, session: Session) -> ViewerDrawState:
+    def build_overlay(self, session: Session) -> ViewerToolOverlay:
         """Return the overlay of the tool in a pane."""
-        return ViewerDrawState()
+        return ViewerToolOverlay()
 
     def resize(self, session: Session, factor: float) -> str:
         """Multiply the size of the tool by a factor; return a message."""

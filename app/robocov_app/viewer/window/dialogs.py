@@ -93,7 +93,7 @@ def build_recovery_offer(
 
     return create_recovery_question(
         f"A window ended without saving: {describe_draft(newest)}.",
-        others=len(others),
+        other_count=len(others),
         recover=recover,
         discard=discard,
         postpone=play,

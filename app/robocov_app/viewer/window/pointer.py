@@ -61,14 +61,14 @@ class ViewerPointer(Pointer):
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas
-        pane = canvas.find_pane(self.at) if inspection.cursor is not None else None
+        pane = canvas.find_pane(self.pixel) if inspection.cursor is not None else None
         number: int | None = None
         if pane is not None:
             # The camera may have moved even if the mouse has not.
-            inspection.cursor = canvas.to_world(self.at, pane)
+            inspection.cursor = canvas.to_world(self.pixel, pane)
             inspection.cursor_pane = pane
             if viewer.tool.takes_robots:
-                number = canvas.find_robot(self.at, pane)
+                number = canvas.find_robot(self.pixel, pane)
         canvas.hovered = None
         if pane is not None and number is not None:
             canvas.hovered = HoveredRobot(pane, number)
@@ -83,28 +83,28 @@ class ViewerPointer(Pointer):
             return viewer.tool.choose_cursor(viewer.session)
         if not self._is_over_time():
             return "arrow"
-        if self._chart.is_on_switch(self.at):
+        if self._chart.is_on_switch(self.pixel):
             return "hand"
         return "sideways"
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
-        return is_inside(layout.track, self.at) or is_inside(layout.chart, self.at)
+        return is_inside(layout.track, self.pixel) or is_inside(layout.chart, self.pixel)
 
     def leave(self) -> None:
         """React when the mouse leaves the panes."""
         self._viewer.inspection.cursor = None
         self._chart.hover = None
 
-    def turn_wheel(self, event: pygame.event.Event) -> None:
+    def handle_wheel(self, event: pygame.event.Event) -> None:
         """Zoom the map, or change the size of the tool."""
-        if self._canvas.find_pane(self.at) is None:
+        if self._canvas.find_pane(self.pixel) is None:
             return
         factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
         if self._viewer.tool.uses_wheel:
             self._viewer.resize_tool(factor)
         else:
-            self._canvas.zoom(factor, self.at)
+            self._canvas.zoom(factor, self.pixel)
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
         """Start a gesture on the chart, with the tool, or for panning."""
@@ -174,13 +174,13 @@ class ViewerPointer(Pointer):
         canvas = self._canvas
         viewer = self._viewer
         pane = min(pane, len(canvas.layout.panes) - 1)
-        raw = canvas.to_world(pixel, pane)
+        unsnapped = canvas.to_world(pixel, pane)
         reach = canvas.get_reach(pane)
-        point = raw
+        point = unsnapped
         if viewer.tool.snaps:
-            point = self._snapper.snap(viewer.session.displayed.environment, raw, reach)
+            point = self._snapper.snap(viewer.session.displayed.environment, unsnapped, reach)
         robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
-        return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
+        return ViewerPointerEvent(point, unsnapped, reach, robot=robot, is_right=is_right)
 
     def move_tool(self, event: pygame.event.Event, pane: int) -> None:
         """Pass a move of the mouse in a pane to the tool."""

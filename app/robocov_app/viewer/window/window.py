@@ -235,7 +235,7 @@ class ViewerWindow(CommandWindow):
         self.lesson.advance(seconds)
         # After a wait for events, the elapsed time is simulated in slices of one frame each, because the
         # clock limits the time of a single frame.
-        slices = max(round(seconds * FPS), 1) if self.is_resting else 1
+        slices = max(round(seconds * FPS), 1) if self.is_idle else 1
         self._runner.advance(seconds, slices)
 
     def _arrange(self) -> None:
@@ -326,8 +326,8 @@ class ViewerWindow(CommandWindow):
         """Zoom by a factor about the mouse if it is over a pane, else about the center of the first pane."""
         left, top, width, height = self.layout.panes[0]
         center: tuple[float, float] = (left + width / 2, top + height / 2)
-        if self.canvas.find_pane(self.pointer.at) is not None:
-            center = self.pointer.at
+        if self.canvas.find_pane(self.pointer.pixel) is not None:
+            center = self.pointer.pixel
         self.canvas.zoom(factor, center)
 
     def quit(self) -> None:

@@ -7,7 +7,7 @@ from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle
-from robocov_app.toolkit.tools.tool import DrawState
+from robocov_app.toolkit.tools.tool import ToolOverlay
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class CarriedItems:
 
 
 @dataclass(frozen=True)
-class EditorDrawState(DrawState):
+class EditorToolOverlay(ToolOverlay):
     """Everything that a tool of the editor shows on the sheet.
 
     Attributes
     ----------
     line, is_closed, label
-        See `DrawState`. The label is next to the cursor.
+        See `ToolOverlay`. The label is next to the cursor.
     shows_lengths : bool
         Whether the length of each edge is written next to the line.
     shapes : tuple of Obstacle

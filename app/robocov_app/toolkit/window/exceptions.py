@@ -21,7 +21,7 @@ _MAX_LEVELS = 30
 """Maximum number of traceback entries that are logged; infinite recursion has thousands."""
 
 
-class FaultLog:
+class ExceptionLog:
     """Logs unexpected exceptions of a window.
 
     The same exception may be raised in every frame. Only its 1st, 10th, 100th, ... occurrence is logged.
@@ -29,7 +29,7 @@ class FaultLog:
     Parameters
     ----------
     folder : Path, optional
-        Folder for the log file. By default faults are written to standard error.
+        Folder for the log file. By default exceptions are written to standard error.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
