@@ -50,7 +50,7 @@ def draw_episode(
         of the map. ``start_seed``: seed of the positions, as in `robocov run`. ``positions``: the positions
         themselves, (n, 2) m. ``conditions_seed``: seed of the task's conditions.
     shared_run : SharedRun, optional
-        Place in a simulation that is shared with other episodes on the same map.
+        Position in a simulation that is shared with other episodes on the same map.
 
     Returns
     -------
@@ -66,35 +66,45 @@ def draw_episode(
     options = options or {}
     environment = sampler.draw(rng)
     if "map" in options:
+        # The map of the sampler was drawn all the same, and the new one takes another random number.
         environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))
     random_values = _RandomValues.draw(rng, environment)
+    scenario = _build_scenario(task, environment, random_values, options)
+    return Episode(task, scenario, sampler.get_cost(environment), shared_run)
+
+
+def _build_scenario(
+    task: CoverageTask, environment: Environment, random_values: _RandomValues, options: Mapping[str, Any]
+) -> Scenario:
+    """Build the scenario of an episode, which starts at given positions or at a start of the map."""
     conditions = task.conditions
     if conditions is not None:
         conditions_seed = options.get("conditions_seed", random_values.conditions_seed)
         conditions = replace(conditions, seed=conditions_seed)
-    scenario = Scenario(
-        environment,
-        team=task.whole_team,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=conditions,
-        **_choose_start(task, environment, random_values, options),
-    )
-    return Episode(task, scenario, sampler.get_cost(environment), shared_run)
-
-
-def _choose_start(
-    task: CoverageTask, environment: Environment, random_values: _RandomValues, options: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return the `Scenario` arguments for the start: a start of the map with a seed, or given positions."""
     name = options.get("start", task.start)
     if name == "*":
         name = random_values.start
     # This checks the name even if positions are given.
     start = environment.start(name)
     if "positions" in options:
-        return {"start": None, "seed": None, "starts": _parse_positions(options["positions"])}
-    return {"start": start.name, "seed": options.get("start_seed", random_values.start_seed)}
+        return Scenario(
+            environment,
+            team=task.whole_team,
+            starts=_parse_positions(options["positions"]),
+            seed=None,
+            duration=task.duration,
+            dt=task.dt,
+            conditions=conditions,
+        )
+    return Scenario(
+        environment,
+        team=task.whole_team,
+        start=start.name,
+        seed=options.get("start_seed", random_values.start_seed),
+        duration=task.duration,
+        dt=task.dt,
+        conditions=conditions,
+    )
 
 
 class _RandomValues(NamedTuple):
@@ -232,7 +242,7 @@ class EpisodeEnv:
             trail=trail,
             trail_time=np.arange(float(len(trail))) * episode.task.period,
             label=f"action {episode.cycle} of {episode.task.cycles}",
-            cost=f"mean distance {episode.result.mean_distance:.3f} m",
+            cost=f"mean distance {episode.coverage.mean_distance:.3f} m",
         )
 
     def _update_window(self) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -19,7 +19,7 @@ from robocov.scenario import Scenario
 from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
 from robocov_app.learning.actions import check_actions
-from robocov_app.learning.motion import hold_actions
+from robocov_app.learning.motion import execute_actions
 from robocov_app.learning.observation_layout import Rows, normalize_positions
 from robocov_app.learning.rewards import compute_reference_distance, share_reward
 from robocov_app.learning.task import CoverageTask
@@ -62,6 +62,7 @@ class ActionOutcome:
     Parameters
     ----------
     rewards : (n,) array
+        In units of the reference distance of the episode.
     contact_time : (n,) array, s
         Time in contact with a wall or another robot.
     """
@@ -114,7 +115,7 @@ class SharedSimulation:
         self._simulation.restart(run, positions)
         return self._simulation
 
-    def advance(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, ActionOutcome]:
+    def step(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, ActionOutcome]:
         """Advance all episodes by one action period.
 
         Parameters
@@ -129,16 +130,16 @@ class SharedSimulation:
             Outcomes of these episodes, by index.
         """
         assert self._simulation is not None
-        contact_time = hold_actions(self._task, self._simulation, actions)
+        contact_time = execute_actions(self._task, self._simulation, actions)
         due = [run for run, episode in episodes.items() if episode.is_reward_due()]
-        results: dict[int, CoverageResult] = {}
+        coverage_by_run: dict[int, CoverageResult] = {}
         if due:
             # All episodes are on the same map, so the cost of any of them can be used.
             cost = episodes[due[0]].cost
-            costs = cost.evaluate_teams(self._simulation.positions[due])
-            results = dict(zip(due, costs, strict=True))
+            results = cost.evaluate_teams(self._simulation.positions[due])
+            coverage_by_run = dict(zip(due, results, strict=True))
         return {
-            run: episode.finish_action(contact_time[run], run in results, results.get(run))
+            run: episode.finish_action(contact_time[run], run in coverage_by_run, coverage_by_run.get(run))
             for run, episode in episodes.items()
         }
 
@@ -146,7 +147,7 @@ class SharedSimulation:
         """Return the current observation rows of all episodes, (count, n, size)."""
         assert self._simulation is not None
         observations = self._simulation.observe()
-        # The simulation returns the same object until it advances, so each episode may ask again.
+        # The simulation returns the same object until it advances, so the rows are computed only once.
         if observations is not self._observed:
             rows = self._task.observation.build_rows(observations, self._joint_team)
             self._rows = rows.reshape(self._count, -1, rows.shape[1])
@@ -155,7 +156,7 @@ class SharedSimulation:
 
 
 class SharedRun(NamedTuple):
-    """Place of an episode in a shared simulation."""
+    """Position of an episode in a shared simulation."""
 
     simulation: SharedSimulation
     run: int
@@ -173,15 +174,15 @@ class Episode:
     cost : CoverageCost
         Coverage cost of the map.
     shared_run : SharedRun, optional
-        Place in a shared simulation, which is used if it is on the same map.
+        Position in a shared simulation, which is used if it is on the same map.
 
     Attributes
     ----------
     working : (n,) array of bool
         Which robots have joined and not failed.
-    result, initial : CoverageResult
+    coverage, initial_coverage : CoverageResult
         Coverage cost when it was last evaluated, and at the start.
-    reference : float
+    reference_distance : float
         Unit of rewards, m.
     trail : list of (n, 2) arrays, m
         Positions at each decision so far.
@@ -218,17 +219,17 @@ class Episode:
         self.working = self.simulation.working[self._index]
         self.cost = cost
         self._cost_over_time = TimeVaryingCost(cost)
-        self._always_counts_all = scenario.conditions is None and not self.environment.has_moving_obstacles
+        self._has_constant_team = scenario.conditions is None and not self.environment.has_moving_obstacles
         self._available = self._cost_over_time.find_available_robots(0.0, self.positions, self.working)
-        result = self._cost_over_time(0.0, self.positions, self.working)
-        if result is None or not result.mean_distance > 0.0:
+        coverage = self._cost_over_time(0.0, self.positions, self.working)
+        if coverage is None or not coverage.mean_distance > 0.0:
             raise ParameterError(
                 f"lattice: expected a finer lattice for map {self.environment.name!r}, got {task.lattice}"
             )
-        self.initial = result
-        self.result = result
-        covered_area = self.environment.free_area - result.uncovered_area
-        self.reference = compute_reference_distance(covered_area, scenario.robots)
+        self.initial_coverage = coverage
+        self.coverage = coverage
+        covered_area = self.environment.free_area - coverage.uncovered_area
+        self.reference_distance = compute_reference_distance(covered_area, scenario.robots)
         self.trail = [self.positions]
         self._rewarded_cycle = 0
         self._scans = self.simulation.observe().scans
@@ -283,8 +284,8 @@ class Episode:
         """Return time, mean distance and uncovered area for the info dictionary of an environment."""
         return {
             "time_s": self.time,
-            "mean_distance_m": self.result.mean_distance,
-            "uncovered_area_m2": self.result.uncovered_area,
+            "mean_distance_m": self.coverage.mean_distance,
+            "uncovered_area_m2": self.coverage.uncovered_area,
         }
 
     def advance(self, actions: Array, *, is_last: bool = False) -> ActionOutcome:
@@ -298,7 +299,7 @@ class Episode:
         """
         snapshots = self._snapshots if self.task.recording else None
         checked = check_actions(actions, len(self.team))
-        contact_time = hold_actions(self.task, self.simulation, checked, snapshots)
+        contact_time = execute_actions(self.task, self.simulation, checked, snapshots)
         self.working = self.simulation.working[self._index]
         self._scans = self.simulation.observe().scans
         return self.finish_action(contact_time, is_last or self.is_reward_due())
@@ -309,7 +310,7 @@ class Episode:
         return actions >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 
     def finish_action(
-        self, contact_time: Array, is_rewarded: bool, result: CoverageResult | None = None
+        self, contact_time: Array, is_rewarded: bool, coverage: CoverageResult | None = None
     ) -> ActionOutcome:
         """Record the positions after an action, and compute its rewards.
 
@@ -319,51 +320,61 @@ class Episode:
             Time in contact during the action.
         is_rewarded : bool
             Whether the cost is evaluated and its change rewarded.
-        result : CoverageResult, optional
+        coverage : CoverageResult, optional
             The current cost, if it has been computed already.
         """
         self.trail.append(self.positions)
-        shares = self._share_cost_change(is_rewarded, result) / self.reference
+        shares = self._share_cost_change(is_rewarded, coverage) / self.reference_distance
         penalties = self.task.contact_penalty * contact_time
         return ActionOutcome(np.asarray(shares - penalties), contact_time)
 
-    def _share_cost_change(self, is_rewarded: bool, result: CoverageResult | None) -> Array:
+    def _share_cost_change(self, is_rewarded: bool, coverage: CoverageResult | None) -> Array:
         """Evaluate the cost, and split its change since the last reward among the robots, (n,) m.
 
         Robots must not be rewarded or punished because others join or fail. If that happens, the cost is
         evaluated as soon as it does, and the change is computed for only those robots that were available
         before and after. The other robots get 0.
         """
+        previously_available = self._available
+        self._update_available_robots()
+        has_changed = not np.array_equal(self._available, previously_available)
         shares = np.zeros(len(self.team))
-        time = self.time
-        positions = self.trail[-1]
-        previous_positions = self.trail[self._rewarded_cycle]
-        # Robots that were available both at the last reward and now.
-        remaining = self._available
-        has_changed = False
-        if not self._always_counts_all:
-            available = self._cost_over_time.find_available_robots(time, positions, self.working)
-            has_changed = not np.array_equal(available, self._available)
-            remaining = available & self._available
-            self._available = available
         if not (is_rewarded or has_changed):
             return shares
-        cycles = self.cycle - self._rewarded_cycle
-        self._rewarded_cycle = self.cycle
-        before = self.result
+        previous_coverage = self.coverage
         if self._available.any():
-            self.result = result or self._cost_over_time.get_cost(time)(positions[self._available])
-        after = self.result
-        if not remaining.any():
-            return shares
-        if has_changed:
-            # Both costs are computed again for the same robots, so that they can be compared.
-            previous_time = time - cycles * self.task.period
-            before = self._cost_over_time.get_cost(previous_time)(previous_positions[remaining])
-            after = self._cost_over_time.get_cost(time)(positions[remaining])
-        elapsed_fraction = cycles / self.task.cycles
-        shares[remaining] = share_reward(self.task.reward, before, after, elapsed_fraction)
+            self.coverage = coverage or self._evaluate_cost(self.time, self.cycle, self._available)
+        remaining = self._available & previously_available
+        if remaining.any():
+            before, after = previous_coverage, self.coverage
+            if has_changed:
+                before, after = self._compare_costs(remaining)
+            shares[remaining] = self._share_change(before, after)
+        self._rewarded_cycle = self.cycle
         return shares
+
+    def _update_available_robots(self) -> None:
+        """Determine the robots that count in the cost now."""
+        if not self._has_constant_team:
+            self._available = self._cost_over_time.find_available_robots(
+                self.time, self.positions, self.working
+            )
+
+    def _evaluate_cost(self, time: float, cycle: int, robots: BoolArray) -> CoverageResult:
+        """Evaluate the cost at a time, in s, for some robots at their positions after a number of actions."""
+        return self._cost_over_time.get_cost(time)(self.trail[cycle][robots])
+
+    def _compare_costs(self, robots: BoolArray) -> tuple[CoverageResult, CoverageResult]:
+        """Evaluate the costs at the last reward and now for the same robots, so that they are comparable."""
+        elapsed_time = (self.cycle - self._rewarded_cycle) * self.task.period
+        before = self._evaluate_cost(self.time - elapsed_time, self._rewarded_cycle, robots)
+        after = self._evaluate_cost(self.time, self.cycle, robots)
+        return before, after
+
+    def _share_change(self, before: CoverageResult, after: CoverageResult) -> Array:
+        """Share the change in the cost since the last reward among the robots of both costs, m."""
+        elapsed_fraction = (self.cycle - self._rewarded_cycle) / self.task.cycles
+        return share_reward(self.task.reward, before, after, elapsed_fraction)
 
     def record(self) -> Record:
         """Build a record of the episode so far; the forces of its last step are zero.

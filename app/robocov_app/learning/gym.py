@@ -257,7 +257,7 @@ class CoverageVectorEnv(SyncVectorEnv):
             if environment.episode is not None and environment.episode.shared is not None:
                 shared_episodes[run] = environment.episode
         if self._shared is not None and shared_episodes:
-            for run, outcome in self._shared.advance(checked, shared_episodes).items():
+            for run, outcome in self._shared.step(checked, shared_episodes).items():
                 self._environments[run].next_outcome = outcome
         # Each environment returns the outcome that was stored above, or advances by itself.
         return super().step(checked)

@@ -16,7 +16,7 @@ _REACH_MARGIN = 1.001
 """Factor by which the search radius for contacts is enlarged, as a margin for rounding errors."""
 
 
-def hold_actions(
+def execute_actions(
     task: CoverageTask,
     simulation: Simulation | SimulationBatch,
     actions: Array,
@@ -51,16 +51,14 @@ def hold_actions(
 def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
     """Return which working robots touch a wall or another robot, (n,) or (runs, n)."""
     shape = simulation.working.shape
-    robots = len(simulation.team)
     positions = simulation.positions.reshape(-1, 2)
     working = simulation.working.ravel()
     radius = np.broadcast_to(simulation.team.radius, shape).ravel()
     nearest = simulation.sensor.find_nearest_points(positions, radius + MAX_CONTACT_GAP_M)
     has_contact = working & ~np.isnan(nearest[:, 0])
     reach = 2.0 * float(radius.max()) + MAX_CONTACT_GAP_M
-    # Each run is shifted far away from the others, so that only robots of the same run are close.
-    run = np.arange(len(positions)) // robots
-    separated = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
+    run_distance = 2.0 * (simulation.environment.region.diameter + reach)
+    separated = _separate_runs(positions, len(simulation.team), run_distance)
     first, second, _ = find_close_pairs(separated, _REACH_MARGIN * reach)
     if len(first) > 0:
         x, y = (positions[first] - positions[second]).T
@@ -68,3 +66,9 @@ def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
         is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + MAX_CONTACT_GAP_M
         has_contact[first[is_contact & working[first] & working[second]]] = True
     return has_contact.reshape(shape)
+
+
+def _separate_runs(positions: Array, robots: int, distance: float) -> Array:
+    """Shift each run by `distance` from the previous one, so that robots of different runs are not close."""
+    runs = np.arange(len(positions)) // robots
+    return np.asarray(positions + (distance * runs)[:, None])

@@ -25,6 +25,11 @@ _MAX_NEIGHBOR_DIAMETERS = 4.0
 _MIN_SENSING_RANGE_M = 1e-9
 _FIXED_SIZE = 7
 """Length of a row without neighbors, rays and centroid."""
+_NEIGHBOR_SIZE = 3
+"""Numbers for an obstacle or a neighbor: its offset, and 1 if it is present."""
+_PRESENCE = 2
+"""Index of the presence among these numbers."""
+_CENTROID_SIZE = 2
 
 
 @dataclass(frozen=True)
@@ -92,10 +97,10 @@ class ObservationLayout:
         sizes = {
             "position": 2,
             "velocity": 2,
-            "obstacle": 3,
-            "neighbor": 3 * self.neighbors,
+            "obstacle": _NEIGHBOR_SIZE,
+            "neighbor": _NEIGHBOR_SIZE * self.neighbors,
             "rays": self.rays,
-            "centroid": 2 * self.centroid,
+            "centroid": self._centroid_size,
         }
         ends = accumulate(sizes.values())
         return {
@@ -105,16 +110,21 @@ class ObservationLayout:
         }
 
     @property
+    def _centroid_size(self) -> int:
+        return _CENTROID_SIZE if self.centroid else 0
+
+    @property
     def size(self) -> int:
         """Length of a row."""
-        return _FIXED_SIZE + 3 * self.neighbors + self.rays + 2 * self.centroid
+        return _FIXED_SIZE + _NEIGHBOR_SIZE * self.neighbors + self.rays + self._centroid_size
 
     @property
     def bounds(self) -> tuple[Rows, Rows]:
         """Lowest and highest possible values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
-        first_ray = _FIXED_SIZE + 3 * self.neighbors
-        low[_FIXED_SIZE - 1 : first_ray : 3] = 0.0  # Flags of the obstacle and of each neighbor.
+        first_ray = _FIXED_SIZE + _NEIGHBOR_SIZE * self.neighbors
+        # The presences of the obstacle and of each neighbor.
+        low[_FIXED_SIZE - 1 : first_ray : _NEIGHBOR_SIZE] = 0.0
         low[first_ray : first_ray + self.rays] = 0.0
         return low, np.ones(self.size, dtype=np.float32)
 
@@ -147,7 +157,7 @@ class ObservationLayout:
         is_sensed = ~np.isnan(seen.obstacle_points[:, 0])
         obstacle = rows[:, blocks["obstacle"]]
         obstacle[is_sensed, :2] = ((seen.obstacle_points - seen.positions) / sensing_range)[is_sensed]
-        obstacle[:, 2] = is_sensed
+        obstacle[:, _PRESENCE] = is_sensed
         if self.neighbors:
             rows[:, blocks["neighbor"]] = self._find_neighbors(seen).reshape(n, -1)
         if self.rays:
@@ -165,7 +175,7 @@ class ObservationLayout:
         unit = seen.region.diameter
         # Noisy positions may be farther apart than the diameter, but not by much.
         robot, _, offset, distance = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
-        nearest = np.zeros((n, self.neighbors, 3))
+        nearest = np.zeros((n, self.neighbors, _NEIGHBOR_SIZE))
         distances = np.full((n, self.neighbors), np.inf)
         # `offset` points from the neighbor to the robot; the layout needs the opposite direction.
         _insert_nearest(robot, -offset / unit, distance, distances, nearest)
@@ -187,17 +197,17 @@ def normalize_positions(positions: Array, region: Region) -> Array:
 
 @kernel
 def _insert_nearest(
-    robot: IntArray, offset: Array, distance: Array, distances: Array, nearest: Array
+    robots: IntArray, offsets: Array, pair_distances: Array, distances: Array, nearest: Array
 ) -> None:
     """Insert pairs of robots into the lists of nearest neighbors, which stay sorted by distance.
 
     Parameters
     ----------
-    robot : (k,) array of int
+    robots : (k,) array of int
         Robot of each pair.
-    offset : (k, 2) array
+    offsets : (k, 2) array
         Offset of the neighbor in each pair.
-    distance : (k,) array
+    pair_distances : (k,) array
         Distance of the neighbor in each pair.
     distances : (n, count) array
         Distances of the nearest neighbors of each robot, modified in place.
@@ -205,19 +215,19 @@ def _insert_nearest(
         Offset of each of these neighbors, and 1 if there is one, modified in place.
     """
     count = distances.shape[1]
-    for k in range(len(robot)):
-        i = robot[k]
-        place = count
+    for pair in range(len(robots)):
+        robot = robots[pair]
+        rank = count
         # Neighbors at equal distances stay in the order of the pairs.
-        while place > 0 and distance[k] < distances[i, place - 1]:
-            place -= 1
-        # Farther neighbors move back by one place, and the last one is dropped.
-        for later in range(count - 1, place, -1):
-            distances[i, later] = distances[i, later - 1]
-            for c in range(3):
-                nearest[i, later, c] = nearest[i, later - 1, c]
-        if place < count:
-            distances[i, place] = distance[k]
-            nearest[i, place, 2] = 1.0
-            for c in range(2):
-                nearest[i, place, c] = offset[k, c]
+        while rank > 0 and pair_distances[pair] < distances[robot, rank - 1]:
+            rank -= 1
+        # Farther neighbors move back by one rank, and the last one is dropped.
+        for farther in range(count - 1, rank, -1):
+            distances[robot, farther] = distances[robot, farther - 1]
+            for column in range(_NEIGHBOR_SIZE):
+                nearest[robot, farther, column] = nearest[robot, farther - 1, column]
+        if rank < count:
+            distances[robot, rank] = pair_distances[pair]
+            nearest[robot, rank, _PRESENCE] = 1.0
+            for column in range(2):
+                nearest[robot, rank, column] = offsets[pair, column]

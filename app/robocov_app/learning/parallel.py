@@ -161,19 +161,19 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         episode = self._get_episode()
         checked = self._check_actions(actions)
         acting = self.agents
-        is_over = episode.cycle + 1 >= self.max_cycles
-        outcome = episode.advance(checked, is_last=is_over)
+        is_truncated = episode.cycle + 1 >= self.max_cycles
+        outcome = episode.advance(checked, is_last=is_truncated)
         self.agents = list(compress(self.possible_agents, episode.working))
         reported = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
         # A robot that has failed never works again, so its episode has terminated.
         terminations = {agent: agent not in self.agents for agent in reported}
-        truncations = {agent: is_over and not terminations[agent] for agent in reported}
+        truncations = {agent: is_truncated and not terminations[agent] for agent in reported}
         observations = self._select(reported, episode.build_rows())
         rewards = self._select(reported, outcome.rewards.tolist())
         contact_times = self._select(reported, outcome.contact_time.tolist())
         summary = episode.summarize()
         infos = {agent: {**summary, "contact_s": seconds} for agent, seconds in contact_times.items()}
-        if is_over:
+        if is_truncated:
             self.agents = []
         self._update_window()
         return observations, rewards, terminations, truncations, infos

@@ -167,14 +167,14 @@ class PolicyController:
         Decision
         """
         actions = memory.actions
-        if actions is None or self._is_due(seen, memory):
+        if actions is None or self._needs_new_actions(seen, memory):
             actions = self._compute_actions(seen, memory.team)
             memory = PolicyMemory(memory.team, actions, next_time=seen.time + self.period)
         forces = compute_driving_forces(self.action, actions, seen.velocities, memory.team)
         return Decision(forces, memory=memory)
 
-    def _is_due(self, seen: Observations, memory: PolicyMemory) -> bool:
-        """Return whether new actions are due: with each new scan or, without rays, after each period."""
+    def _needs_new_actions(self, seen: Observations, memory: PolicyMemory) -> bool:
+        """Return whether to ask the policy: after each new scan or, without rays, after each period."""
         if self.layout.rays:
             return seen.scans is not None
         return seen.time >= memory.next_time - _TIME_TOLERANCE_S
@@ -222,7 +222,7 @@ class ControllerPolicy:
         self._informed: Any = None
         self._memory: Any = None
         self._decision_cycle = -1
-        self._scan_number = -1
+        self._next_scan_step = 0
         self._actions = np.empty((0, 2))
 
     def __call__(self, env: Any) -> Any:
@@ -265,7 +265,7 @@ class ControllerPolicy:
     def _start(self, episode: Episode) -> None:
         self._episode = episode
         self._decision_cycle = -1
-        self._scan_number = -1
+        self._next_scan_step = 0
         self._informed = inform_controller(self.controller, episode.environment)
         self._memory = self._informed.begin(episode.environment.region, episode.team)
 
@@ -278,9 +278,10 @@ class ControllerPolicy:
         scanning: Scanning | None = getattr(self._informed, "scanning", None)
         if scanning is None:
             return None
-        number = episode.cycle * episode.task.repeat // scanning.count_steps(episode.task.dt)
-        if number == self._scan_number:
+        step = episode.cycle * episode.task.repeat
+        if step < self._next_scan_step:
             return None
-        self._scan_number = number
+        scan_interval = scanning.count_steps(episode.task.dt)
+        self._next_scan_step = (step // scan_interval + 1) * scan_interval
         sensor = episode.simulation.sensor
         return Scans(*sensor.scan(episode.positions, scanning.rays, episode.team.sensing_range))

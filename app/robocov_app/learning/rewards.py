@@ -75,7 +75,11 @@ def share_reward(
     gradient_sum = np.zeros_like(after.positions)
     for result in (before, after):
         if result.value:
-            # The gradient belongs to the cost `value`; the factor converts it to one of the mean distance.
-            gradient_sum += result.gradient * (result.mean_distance / result.value)
-    own = -0.5 * (gradient_sum * (after.positions - before.positions)).sum(axis=1)
-    return np.asarray(own + (decrease - own.sum()) / n)
+            gradient_sum += _compute_mean_distance_gradient(result)
+    own_decreases = -0.5 * (gradient_sum * (after.positions - before.positions)).sum(axis=1)
+    return np.asarray(own_decreases + (decrease - own_decreases.sum()) / n)
+
+
+def _compute_mean_distance_gradient(result: CoverageResult) -> Array:
+    """Convert the gradient of the cost value, which must not be 0, to that of the mean distance, (n, 2)."""
+    return np.asarray(result.gradient * (result.mean_distance / result.value))

@@ -135,7 +135,7 @@ class CoverageTask:
             )
         if not 0.0 <= self.contact_penalty < np.inf:
             raise ParameterError(
-                f"contact_penalty: expected a finite number from 0, got {quote(self.contact_penalty)}"
+                f"contact_penalty: expected a finite number of at least 0, got {quote(self.contact_penalty)}"
             )
 
     def _check_kinds(self) -> None:

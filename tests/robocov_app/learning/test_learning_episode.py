@@ -62,7 +62,7 @@ def test_rewarding_less_often_gives_the_same_sum_of_rewards(cluttered: Environme
     sparse = np.array(take_random_actions(seldom, 12))
     assert (sparse[[0, 1, 2, 4]] == 0.0).all() and sparse[3].any()
     assert sparse.sum() == pytest.approx(dense.sum(), abs=1e-12)
-    assert seldom.result.mean_distance == often.result.mean_distance
+    assert seldom.coverage.mean_distance == often.coverage.mean_distance
 
 
 def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
@@ -78,10 +78,10 @@ def test_contacts_are_reported_and_penalized(empty: Environment) -> None:
     forces[0] = -4.0, 0.0
     contact_time = np.zeros(3)
     for _ in range(15):
-        before = episode.result.mean_distance
+        before = episode.coverage.mean_distance
         outcome = episode.advance(forces)
         contact_time += outcome.contact_time
-        decrease = (before - episode.result.mean_distance) / episode.reference
+        decrease = (before - episode.coverage.mean_distance) / episode.reference_distance
         np.testing.assert_allclose(outcome.rewards, decrease - 0.5 * outcome.contact_time, atol=1e-12)
     record = episode.record()
     clearances = compute_clearances(record)
@@ -141,9 +141,9 @@ def test_a_failing_robot_does_not_change_the_rewards_of_the_others(cluttered: En
     for k in range(first_failed, 8):
         before = cost(episode.trail[k][:2]).mean_distance
         after = cost(episode.trail[k + 1][:2]).mean_distance
-        decrease = (before - after) / episode.reference
+        decrease = (before - after) / episode.reference_distance
         np.testing.assert_allclose(rewards[k], [decrease, decrease, 0.0], atol=1e-12)
-    assert len(episode.result.positions) == 2
+    assert len(episode.coverage.positions) == 2
 
 
 def test_an_episode_continues_without_working_robots(empty: Environment) -> None:
@@ -160,9 +160,12 @@ def test_moving_obstacles_count_at_their_present_position(empty: Environment) ->
     episode = start_episode(moving, STARTS, repeat=30, contact_penalty=0.0)
     rewards = np.array([episode.advance(np.zeros((3, 2))).rewards for _ in range(3)])
     final = CoverageCost(moving.at(1.5), 16)(episode.simulation.positions)
-    assert episode.result.mean_distance == pytest.approx(final.mean_distance, abs=1e-9)
-    decrease = episode.initial.mean_distance - final.mean_distance
-    assert rewards[:, 0].sum() == pytest.approx(decrease / episode.reference, abs=1e-12) and decrease != 0.0
+    assert episode.coverage.mean_distance == pytest.approx(final.mean_distance, abs=1e-9)
+    decrease = episode.initial_coverage.mean_distance - final.mean_distance
+    assert (
+        rewards[:, 0].sum() == pytest.approx(decrease / episode.reference_distance, abs=1e-12)
+        and decrease != 0.0
+    )
 
 
 def test_scans_are_those_of_the_present_positions(cluttered: Environment) -> None:

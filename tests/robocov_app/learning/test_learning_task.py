@@ -41,7 +41,7 @@ def test_the_team_goes_before_the_number() -> None:
             {"action": "velocity", "dt": 0.2},
             r"dt: expected at most 0\.1 s for robots to follow velocities, got 0\.2 s",
         ),
-        ({"contact_penalty": -1.0}, r"contact_penalty: expected a finite number from 0, got -1\.0"),
+        ({"contact_penalty": -1.0}, r"contact_penalty: expected a finite number of at least 0, got -1\.0"),
         ({"team": 6}, "team: expected a Team, got 6"),
         ({"observation": None}, "observation: expected an ObservationLayout, got None"),
         (
