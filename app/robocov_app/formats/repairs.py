@@ -38,7 +38,8 @@ class Repairs:
             lines.append(f"{format_count(count, kind)} {repair}")
         crossings = self._self_crossings
         if len(crossings) == 1:
-            lines.append(f"the outline met itself: {crossings[0]}")
+            lines.append(f"the outline crossed or touched itself: {crossings[0]}")
         elif crossings:
-            lines.append(f"{len(crossings)} outlines met themselves, the first: {crossings[0]}")
+            count = len(crossings)
+            lines.append(f"{count} outlines crossed or touched themselves, the first: {crossings[0]}")
         return tuple(lines)

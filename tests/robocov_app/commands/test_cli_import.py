@@ -29,8 +29,9 @@ def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert lines == [
         "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",
         "3 x 1.5 m, 0 obstacles",
-        "note: 16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, taken as obstacles",
-        "note: cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 0.25)",
+        "note: 16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, treated as obstacles",
+        "note: cells are larger than robots: walls move by at most 0.2 m instead of one cell "
+        "(--simplify 0.25)",
         f"saved in {out} and {picture}",
     ]
     assert load_map(out).free_area == pytest.approx(4.25)

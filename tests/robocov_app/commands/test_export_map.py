@@ -40,7 +40,7 @@ def test_closed_gaps_are_reported_next_to_the_answer(
     words = ["export", "office", "-o", str(tmp_path / "office.yaml"), "--cell", "1"]
     assert main(words) == 0
     said = capsys.readouterr()
-    assert said.err.startswith("robocov: warning: gaps close: the free space falls into ")
+    assert said.err.startswith("robocov: warning: gaps close: the free space has ")
     assert "warning" not in said.out
     assert main([*words, "--overwrite", "--json"]) == 0
     said = capsys.readouterr()

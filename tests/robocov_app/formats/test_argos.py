@@ -139,6 +139,6 @@ def test_the_room_with_the_robots_is_kept(tmp_path: Path) -> None:
     environment, report, _ = import_map(path)
     assert shapely.Polygon(environment.boundary).equals(box(-0.95, -0.95, 0.95, 0.95))
     assert environment.obstacles == ()
-    assert "the part of the free space with most robots stays, which is not the largest" in report.notes
+    assert "kept the part of the free space with the most robots, which is not the largest" in report.notes
     environment, _, _ = import_map(path, shaping=Shaping(keep="all"))
     assert environment.free_area == pytest.approx(1.9**2 + 9 - 2.1**2, abs=0.02)

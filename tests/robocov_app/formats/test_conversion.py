@@ -91,7 +91,7 @@ def test_all_parts_lie_in_their_convex_hull() -> None:
     assert len(environment.free.geoms) == 2
     assert environment.boundary_polygon.equals(shapely.union(ROOM, CLOSET).convex_hull)
     assert (
-        "note: the free space is of 2 separate parts: robots cannot pass between them"
+        "note: the free space consists of 2 separate parts: robots cannot pass between them"
         in report.format_lines()
     )
 
@@ -113,7 +113,7 @@ def test_specks_are_removed() -> None:
     crumb = ROOM - box(7, 7, 7.001, 7.02)
     environment, report = build_environment(build_foreign_map(crumb), Shaping(), "plan")
     assert len(environment.obstacles) == 2
-    assert report.dropped == ("1 hole of 2e-05 m², which come of rounding",)
+    assert report.dropped == ("1 hole, 2e-05 m², due to rounding",)
 
 
 def test_noise_depends_on_the_format() -> None:
@@ -153,7 +153,7 @@ def test_a_given_boundary_is_kept() -> None:
     assert report.dropped == ("10 m² of free space outside the boundary",)
     crossed = Polygon([(-1, -1), (11, -1), (11, 9), (-1, 9), (-1, 3), (-2, 4), (-2, 3), (-1, 4)])
     environment, report = build_environment(build_foreign_map(ROOM, boundary=crossed), Shaping(), "plan")
-    assert report.repaired[0].startswith("the boundary met itself: self-intersection at [")
+    assert report.repaired[0].startswith("the boundary crossed or touched itself: self-intersection at [")
     assert environment.free_area == pytest.approx(ROOM.area)
 
 
@@ -187,7 +187,9 @@ def test_self_crossing_outlines_are_repaired() -> None:
     bow = Polygon([(0, 0), (0, 4), (6, -2), (6, 0)])
     environment, report = build_environment(build_foreign_map(bow), Shaping(), "plan")
     assert environment.area == pytest.approx(8.0)
-    assert report.repaired == ("outlines met themselves or each other: self-intersection at [4, 0]",)
+    assert report.repaired == (
+        "outlines crossed or touched themselves or each other: self-intersection at [4, 0]",
+    )
     assert report.area_read == pytest.approx(10.0)
     overlapping = build_foreign_map(box(0, 0, 4, 4), box(3, 3, 6, 6))
     environment, report = build_environment(overlapping, Shaping(), "plan")
@@ -209,7 +211,8 @@ def test_cells_larger_than_robots_are_noted() -> None:
     _, report = build_environment(build_foreign_map(ROOM, cell=1.0), Shaping(), "plan")
     assert report.tolerance == 0.2
     assert (
-        "cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 1)" in report.notes
+        "cells are larger than robots: walls move by at most 0.2 m instead of one cell (--simplify 1)"
+        in report.notes
     )
     assert build_environment(build_foreign_map(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
     assert build_environment(build_foreign_map(ROOM), Shaping(), "plan")[1].tolerance == 0.02
@@ -330,7 +333,7 @@ def test_the_deviation_of_walls_is_measured() -> None:
     _, report = build_environment(build_foreign_map(bumpy), Shaping(), "plan")
     assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
     assert report.changed == (
-        "walls moved by at most 0.015 m; 0.003 m² changed sides, 0.0038 % of the free area",
+        "walls moved by at most 0.015 m; 0.003 m² changed between free and solid, 0.0038 % of the free area",
     )
     assert (report.to_dict()["moved_m"], report.to_dict()["moved_area_m2"]) == (
         report.moved,
@@ -357,7 +360,7 @@ def test_a_map_that_takes_too_long_is_refused(
     monkeypatch: pytest.MonkeyPatch, most: str, expected: str
 ) -> None:
     monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.environment.{most}", 0)
-    with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {expected}: --specks AREA"):
+    with pytest.raises(MapError, match=rf"plan: expected at most 0 {expected}, got \d+: --specks AREA"):
         build_environment(build_foreign_map(ROOM), Shaping(), "plan")
 
 

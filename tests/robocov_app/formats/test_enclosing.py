@@ -47,7 +47,7 @@ def test_the_largest_outline_that_contains_the_rest_is_the_boundary() -> None:
     assert foreign.boundary.equals(box(0, 0, 20, 10))
     assert foreign.free.area == pytest.approx(200 - 1 - 2)
     assert foreign.boundary_source == "the largest closed outline of 200 m²"
-    assert foreign.notes == ("3 closed outlines taken as solid (--outlines free: as free space)",)
+    assert foreign.notes == ("3 closed outlines treated as solid (--outlines free: as free space)",)
 
 
 def test_a_named_boundary_may_have_any_size() -> None:
@@ -68,7 +68,7 @@ def test_closed_lines_with_its_name_are_the_boundary() -> None:
     foreign = build_map(collect_shapes(square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(200 - 1 - 0.5)
-    assert foreign.notes[-1] == "1 line taken as walls, 0.1 m wide (--thickness)"
+    assert foreign.notes[-1] == "1 line treated as walls, 0.1 m wide (--thickness)"
     with pytest.raises(MapError, match=r"plan: boundary 'open': encloses no area, expected a closed outline"):
         build_map(collect_shapes(HALL, lines=[([[0, 0], [1, 1]], "open")], boundary="open"))
 
@@ -94,7 +94,7 @@ def test_geometries_are_free_unless_one_contains_the_others() -> None:
     free = build_map(rooms, solid=False)
     assert free.boundary is None
     assert free.free.area == pytest.approx(16 + 12 - 2 + 25)
-    assert free.notes == ("3 closed outlines taken as free space (--outlines solid: as obstacles)",)
+    assert free.notes == ("3 closed outlines treated as free space (--outlines solid: as obstacles)",)
     nested = build_map(collect_shapes(HALL, square(2, 2, 1, 1), square(5, 5, 2, 1)), solid=False)
     assert nested.free.area == pytest.approx(197.0)
     alone = build_map(collect_shapes(HALL, lines=[[[5, 0], [5, 5]]]), solid=False)
@@ -138,7 +138,7 @@ def test_points_become_pillars_on_request() -> None:
     )
     foreign = build_map(collect_shapes(HALL, points=[[5, 5], [8, 5]], pillar=0.5))
     assert foreign.free.area == pytest.approx(200 - 2 * 0.7854, abs=0.01)
-    assert foreign.notes[-1] == "2 points taken as pillars"
+    assert foreign.notes[-1] == "2 points treated as pillars"
 
 
 def test_adjacent_lines_are_joined_to_whole_corners() -> None:
@@ -194,10 +194,10 @@ def test_hairlines_become_walls() -> None:
 def test_self_crossing_outlines_are_counted() -> None:
     bow = [[0, 0], [4, 4], [4, 0], [0, 4]]
     one = build_map(collect_shapes(bow), solid=False)
-    assert one.repaired == ("the outline met itself: Self-intersection[2 2]",)
+    assert one.repaired == ("the outline crossed or touched itself: Self-intersection[2 2]",)
     assert one.free.area == pytest.approx(8.0)
     two = build_map(collect_shapes(bow, [[x + 10, y] for x, y in bow]), solid=False)
-    assert two.repaired == ("2 outlines met themselves, the first: Self-intersection[2 2]",)
+    assert two.repaired == ("2 outlines crossed or touched themselves, the first: Self-intersection[2 2]",)
 
 
 @pytest.mark.parametrize("far", [1e300, np.nan, np.inf, 2e7])

@@ -80,7 +80,7 @@ def test_a_given_reference_system_is_used() -> None:
         assert project_points(degrees, crs=name, **location)[0] == pytest.approx(direct)
     plain, notes = project_points(utm, ReadOptions(units="meters"), crs="EPSG:25832")
     assert (plain == utm).all()
-    assert notes == ["coordinates of EPSG:25832 taken as they are"]
+    assert notes == ["coordinates of EPSG:25832 used without conversion"]
     # Mercator's meters are not meters
     mercator = np.column_stack(pyproj.Transformer.from_crs(4326, 3857, always_xy=True).transform(*degrees.T))
     assert project_points(mercator, crs="EPSG:3857", **location)[0] == pytest.approx(direct, abs=1e-3)
@@ -93,7 +93,7 @@ def test_a_given_reference_system_is_used() -> None:
         (
             "+proj=utm +zone=32",
             [[0, 0]],
-            r"expected a code as EPSG:25832",
+            r"expected a code such as EPSG:25832",
         ),
         ("FILE:123", [[0, 0]], "expected a code"),
         ("EPSG:4326", [[0, 0], [5, 91]], r"expected longitude and latitude in degrees"),

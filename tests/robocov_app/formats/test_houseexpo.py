@@ -74,7 +74,7 @@ def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
     environment, report = import_plan(write(tmp_path, plan(verts)))
     assert len(environment.boundary) == 4
     assert environment.area == 15.0
-    assert report.repaired == ("2 repeated vertices taken out",)
+    assert report.repaired == ("2 repeated vertices removed",)
 
 
 def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
     assert environment.area == pytest.approx(8.0)
     assert report.area_read == pytest.approx(10.0)
     assert report.area_kept == pytest.approx(8.0)
-    assert report.repaired[0].startswith("the outline met itself: Self-intersection[4 0")
+    assert report.repaired[0].startswith("the outline crossed or touched itself: Self-intersection[4 0")
     assert report.dropped == ("1 separate part of the free space, 2 m²",)
 
 

@@ -123,7 +123,7 @@ obstacle:
         "5 robots that IR-SIM places at random",
         "2 shapes of random form",
     )
-    assert foreign.notes == ("1 obstacle with kinematics taken as standing where the file has them",)
+    assert foreign.notes == ("1 obstacle with kinematics treated as fixed at their initial positions",)
     assert read(tmp_path, text, skip=("posts",)).free.equals(SPACE)
     environment, _, _ = import_map(tmp_path / "world.yaml")
     assert environment.starts["robots"].positions == ((0.0, 3.0), (1.0, 3.0))  # type: ignore[union-attr]
@@ -226,7 +226,7 @@ PARTS = ", ".join(["*a"] * 100)
     ids=["aliases", "parts"],
 )
 def test_parts_of_many_objects_are_counted_together(tmp_path: Path, text: str) -> None:
-    with pytest.raises(MapError, match="expected at most 20000, got 20001 shapes"):
+    with pytest.raises(MapError, match="expected at most 20000 shapes, got 20001"):
         read(tmp_path, text)
 
 
@@ -253,7 +253,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
     install_irsim(tmp_path, monkeypatch, pgm(cells))
     foreign = read(tmp_path, BUNDLED)
     assert compute_obstacles(foreign).equals(box(-1, 7, 0, 8))
-    assert "world.obstacle_map: 'cave.png' taken from the installed ir-sim" in foreign.notes
+    assert "world.obstacle_map: 'cave.png' read from the installed ir-sim" in foreign.notes
     with pytest.raises(
         MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"
     ):
@@ -274,6 +274,6 @@ def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_transparency_is_reported_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
-    cause = "no cell is free: 100 % of the pixels are transparent, and count by the color that is hidden"
+    cause = "no cell is free: 100 % of the pixels are transparent; their hidden color is used"
     with pytest.raises(MapError, match=cause):
         read(tmp_path, "  obstacle_map: dark.png\n")

@@ -115,7 +115,7 @@ def test_barriers_are_walls_and_posts_are_points(tmp_path: Path) -> None:
     assert {name: wall.width for name, wall in walls.items()} == {"wall": 0.5, "hedge": 0.1}
     assert any(isinstance(one, CircleObstacle) and one.radius == 0.2 for one in environment.obstacles)
     assert environment.free_area == pytest.approx(4800 - 5 - 1 - 16 - math.pi * 0.04, abs=0.1)
-    assert "1 gate taken as closed" in report.notes
+    assert "1 gate treated as closed" in report.notes
 
 
 def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
@@ -131,8 +131,8 @@ def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     assert foreign.dropped == (
         "1 element below the ground",
-        "1 way that does not close",
-        "1 way that is not complete in the file",
+        "1 way that is not closed",
+        "1 way with missing nodes",
     )
 
 
@@ -167,8 +167,8 @@ def build_crowded_extract() -> str:
         (HEAD + "<node id='1' lat='1'/></osm>", "3: <node>: no lon"),
         (HEAD + "<way id='1'><nd ref='a'/></way></osm>", "3: <nd>: invalid literal for int()"),
         (HEAD + "</osm>", "no closed outline and no line"),
-        (HEAD + "<node id='1' lat='0' lon='0'/>" * 500_001, "expected at most 500000, got about 500001"),
-        (build_crowded_extract(), "expected at most 500000, got about 2001667 vertices"),
+        (HEAD + "<node id='1' lat='0' lon='0'/>" * 500_001, "500000 vertices, got about 500001"),
+        (build_crowded_extract(), "expected at most 500000 vertices, got about 2001667"),
         (HEAD.replace("UTF-8", "UTF-99"), "not XML: unknown encoding"),
         (HEAD + "<bounds minlat='0' minlon='0' maxlat='9' maxlon='9'/></osm>", "expected at most 10 km"),
     ],
@@ -353,7 +353,7 @@ def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
     assert corridor.contains(box(4.42, 3.9, 5.58, 4.1))
     assert not free.intersects(box(1, 3.98, 4.38, 4.02)) and not free.intersects(box(5.62, 3.98, 9, 4.02))
     assert "level 0 of 0, 1, 2 (--level)" in foreign.notes
-    assert "stairs and lifts taken as solid: 1" in foreign.notes
+    assert "stairs and lifts treated as solid: 1" in foreign.notes
 
 
 def test_rooms_without_doors_are_open_to_adjacent_spaces(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_transparent_pixels_are_unknown(tmp_path: Path) -> None:
     assert foreign.boundary is not None
     assert foreign.notes == ("4 x 4 cells of 1 m: 50 % free, 25 % blocked, 25 % transparent, cut away",)
     pixels[..., 3] = 0
-    with pytest.raises(MapError, match="--unknown free takes transparent cells as free"):
+    with pytest.raises(MapError, match="--unknown free treats transparent cells as free"):
         read(save_picture(tmp_path, pixels), cell=1.0)
 
 

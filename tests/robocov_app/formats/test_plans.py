@@ -223,7 +223,7 @@ def test_light_lines_on_a_dark_ground_are_reported(tmp_path: Path) -> None:
     blueprint = ImageOps.invert(draw_flat())
     ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
     _, report, _ = import_picture(tmp_path, blueprint)
-    assert any("if they are the walls, --invert takes them as such" in note for note in report.notes)
+    assert any("use --invert if they are the walls" in note for note in report.notes)
     # rooms amid dark rock are no lines
     rooms = Image.new("L", (200, 120), 0)
     ImageDraw.Draw(rooms).rectangle((20, 20, 59, 59), fill=255)

@@ -140,7 +140,7 @@ def test_closed_gaps_are_reported_with_a_cell_that_keeps_them() -> None:
 
     (warning,) = warnings(0.25)
     assert warning == (
-        "gaps close: the free space falls into 2 parts, not 1; cells of 0.1 m keep it (--cell 0.1)"
+        "gaps close: the free space has 2 separate parts instead of 1; cells of 0.1 m keep it (--cell 0.1)"
     )
     assert warnings(0.1) == ()
     assert describe_unsupported(environment) == ("starts: all", "names of obstacles")
@@ -157,4 +157,4 @@ def test_lost_rooms_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
     grid = build_grid(hair, 0.4)
     (warning,) = describe_lost_passages(hair, grid, find_free_cells(hair, grid))
-    assert warning.endswith("not 1; no grid of at most 1 million cells keeps it")
+    assert warning.endswith("instead of 1; no grid of at most 1 million cells keeps it")

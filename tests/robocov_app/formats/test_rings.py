@@ -61,7 +61,9 @@ def test_a_self_crossing_hole_beyond_the_outline_is_repaired(tmp_path: Path) -> 
     foreign = read(tmp_path, "rings", bad)
     # of the bow tie of two triangles of 5 m² the left one is in the outline
     assert foreign.free.area == pytest.approx(195.0)
-    assert foreign.repaired[0].startswith("the outline met itself: polygon 1: Self-intersection")
+    assert foreign.repaired[0].startswith(
+        "the outline crossed or touched itself: polygon 1: Self-intersection"
+    )
 
 
 @pytest.mark.parametrize(

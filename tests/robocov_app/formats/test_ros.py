@@ -36,7 +36,7 @@ def test_a_map_is_read_at_its_origin(tmp_path: Path) -> None:
     assert shapely.equals(foreign.free, expected)
     assert (foreign.name, foreign.cell, foreign.vertices_read) == ("plan", 0.25, 12)
     assert foreign.notes == (
-        "16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, taken as obstacles",
+        "16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, treated as obstacles",
     )
 
 
@@ -89,7 +89,7 @@ def test_a_rotated_map_has_a_note(tmp_path: Path, yaw: str, notes: list[str]) ->
             "trinary",
             "100 % of the pixels are transparent, which map_server averages in as if it were a dark color",
         ),
-        ("raw", "100 % of the pixels are transparent, and count by the color that is hidden in them"),
+        ("raw", "100 % of the pixels are transparent; their hidden color is used"),
     ],
 )
 def test_transparency_is_reported_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
@@ -202,10 +202,11 @@ def test_pictures_of_16_bits_are_read(tmp_path: Path) -> None:
 def test_remarkable_metadata_has_notes(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN), free_thresh=0.25, occupied_thresh=None, frame="map")
     environment, report, _ = import_map(path, shaping=Shaping(radius=0.1))
-    assert report.repaired == ("occupied_thresh is missing, 0.65 taken",)
-    assert report.notes[0] == "frame: no key of map_server, not looked at"
+    assert report.repaired == ("occupied_thresh is missing, 0.65 used",)
+    assert report.notes[0] == "frame: unknown key, ignored"
     assert report.notes[1] == (
-        "48 cells have the value 205, which is saved for unknown cells, and are free by free_thresh 0.25"
+        "48 cells have the value 205, which is saved for unknown cells, and are free "
+        "according to free_thresh 0.25"
     )
     assert environment.free_area > 0
 
@@ -219,7 +220,7 @@ def test_single_cells_are_noise_by_default(tmp_path: Path) -> None:
     environment, report, _ = import_map(path)
     assert len(environment.obstacles) == 1
     assert report.dropped == (
-        "2 obstacles smaller than 0.00375 m², 0.005 m² together (--specks 0 keeps them)",
+        "2 obstacles smaller than 0.00375 m², 0.005 m² in total (--specks 0 keeps them)",
     )
     assert len(import_map(path, shaping=Shaping(specks=0.0))[0].obstacles) == 3
     assert len(import_map(path, shaping=Shaping(specks=0.01))[0].obstacles) == 0
@@ -270,7 +271,7 @@ def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, n
     (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
     foreign = IMPORTER.read(write_ros_map(tmp_path, b"", "a", image=name), ReadOptions())
     assert foreign.free.area > 0
-    assert foreign.repaired == (f"image: {name!r} not found, 'plan.pgm' next to the file taken",)
+    assert foreign.repaired == (f"image: {name!r} not found, used 'plan.pgm' next to the file",)
 
 
 @pytest.mark.parametrize(
@@ -322,7 +323,7 @@ def test_invalid_maps_are_refused(tmp_path: Path, keys: dict[str, object], expec
 
 
 def test_maps_without_free_cells_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(MapError, match=r"no cell is free \(--unknown free takes unknown"):
+    with pytest.raises(MapError, match=r"no cell is free \(--unknown free treats unknown"):
         read(write_ros_map(tmp_path, draw_pixels("##\n??")))
     with pytest.raises(MapError, match=r"no cell is free$"):
         read(write_ros_map(tmp_path, draw_pixels("##\n##")))

@@ -151,7 +151,7 @@ def test_reduced_simplification_is_noted() -> None:
     result = simplify_free_space(outline, 3 * CELL, CELL, 0.115)
     assert len(find_rooms(result.free, 0.115)) == 1
     (line,) = [line for line in result.changed if "narrow" in line]
-    assert line.endswith("so that a robot of radius 0.115 m passes where it passed")
+    assert line.endswith("so that a robot of radius 0.115 m still fits through")
     assert vertices(result.free) < vertices(outline) / 2
     # a smaller robot leaves more to simplify
     assert simplify_free_space(outline, 3 * CELL, CELL, 0.05).changed == ()

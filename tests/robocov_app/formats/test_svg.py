@@ -157,7 +157,7 @@ def test_approximations_are_noted(tmp_path: Path) -> None:
     for words in (
         "a unit is 0.01 m",
         "curves flattened to within 1 mm",
-        "1 dashed strokes taken as whole",
+        "1 dashed strokes treated as continuous lines",
         "1 clip paths and masks not applied",
         "1 style rules of other kinds than tag, .class and #id not applied",
     ):
@@ -313,21 +313,21 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"\x1f\x8b\x08", ": expected plain SVG, got compressed"),
         (
             b"<!DOCTYPE svg [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><svg>&a;</svg>",
-            ":2: expected plain SVG, got an entity 'a' that stands for another file ('file:///etc/passwd')",
+            ":2: expected plain SVG, got an entity 'a' that refers to another file ('file:///etc/passwd')",
         ),
-        (b"<!DOCTYPE svg [<!ENTITY % a SYSTEM 'b'> %a;]><svg/>", "entity 'a' that stands for another file"),
-        (b"<!DOCTYPE svg [<!ENTITY % a 'b'>]><svg/>", "entity 'a' that stands for other entities"),
+        (b"<!DOCTYPE svg [<!ENTITY % a SYSTEM 'b'> %a;]><svg/>", "entity 'a' that refers to another file"),
+        (b"<!DOCTYPE svg [<!ENTITY % a 'b'>]><svg/>", "entity 'a' that refers to other entities"),
         (
             b"<!DOCTYPE svg [<!ENTITY a 'b'><!ENTITY c '&a;'>]><svg/>",
-            "entity 'c' that stands for other entities",
+            "entity 'c' that refers to other entities",
         ),
         (
             b"<!DOCTYPE svg [<!ENTITY a '" + b"b" * 900 + b"'>]><svg a='" + b"&a;" * 2000 + b"'/>",
-            "entity 'a' that stands for too much",
+            "entity 'a' that expands to too much text",
         ),
         (
             b"<!DOCTYPE svg [<!ATTLIST g a CDATA '" + b"b" * 9000 + b"'>]><svg>" + b"<g/>" * 900 + b"</svg>",
-            "entities that stand for too much",
+            "entities that expand to too much text",
         ),
         (b"<!DOCTYPE svg [<!ATTLIST g" + b" a CDATA ''" * 1001 + b">]><svg/>", "more than 1000 declarations"),
         (b"<svg xmlns='" + b"x" * 2000 + b"'/>", "a namespace of 2000 characters"),
@@ -357,14 +357,14 @@ def test_other_xml_is_refused(tmp_path: Path, content: bytes, expected: str) -> 
 @pytest.mark.parametrize(
     ("body", "expected"),
     [
-        ('<g id="a"><use href="#a"/></g>', "<g> 'a': is used within itself"),
-        ('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>', "is used within itself"),
-        ('<use id="a" href="#a"/>', "<use> 'a': is used within itself"),
+        ('<g id="a"><use href="#a"/></g>', "<g> 'a': uses itself"),
+        ('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>', "uses itself"),
+        ('<use id="a" href="#a"/>', "<use> 'a': uses itself"),
         (
             "<defs><g id='a0'><path d='M0 0h1v1z'/></g>"
             + "".join(f"<g id='a{k + 1}'>" + f"<use href='#a{k}'/>" * 10 + "</g>" for k in range(10))
             + "</defs><use href='#a10'/>",
-            f"expected at most {MAX_ELEMENTS}, got ",
+            f"expected at most {MAX_ELEMENTS} elements to draw, including uses, got ",
         ),
         (
             "".join(f"<g id='a{k + 1}'><use href='#a{k}'/></g>" for k in reversed(range(500))),

@@ -27,14 +27,14 @@ def test_paint_that_is_declared_free_is_no_obstacle(tmp_path: Path) -> None:
     rug = FLOOR + WALLS + '<rect x="1" y="1" width="3" height="2" fill="#e0e0ff"/>'
     foreign = read_shapes(tmp_path, rug)
     assert foreign.free.area == pytest.approx(ROOM - 6)
-    assert "pale paint taken as solid: #e0e0ff (1) (--free-color: as free space)" in foreign.notes
+    assert "pale paint treated as solid: #e0e0ff (1) (--free-color: as free space)" in foreign.notes
     chosen = read_shapes(tmp_path, rug, free_color=("#e0e0ff",))
     assert chosen.free.area == pytest.approx(ROOM)
     assert "painted as free: #e0e0ff (1) (--free-color)" in chosen.notes
     assert read_free_space(tmp_path, rug, free_color=("#e6e6fa",), color_tolerance=6.0) == pytest.approx(ROOM)
     ignored = read_shapes(tmp_path, rug, ignore_color=("#e0e0ff",))
     assert ignored.free.area == pytest.approx(ROOM)
-    assert any("of a color that is left out" in line for line in ignored.dropped)
+    assert any("in an ignored color" in line for line in ignored.dropped)
 
 
 def test_an_absent_color_is_reported_with_the_present_ones(tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_a_pale_fill_with_dark_paint_on_it_is_floor(tmp_path: Path) -> None:
     rooms = '<rect x="0" y="0" width="5" height="6" fill="#fff0d0"/>'
     table = '<circle cx="2" cy="3" r="0.5" fill="#444"/>'
     foreign = read_shapes(tmp_path, FLOOR + rooms + table + WALLS)
-    assert any(note.startswith("pale fills taken as floor: #fff0d0 (1)") for note in foreign.notes)
+    assert any(note.startswith("pale fills treated as floor: #fff0d0 (1)") for note in foreign.notes)
     assert foreign.free.area == pytest.approx(ROOM - shapely.Point(0, 0).buffer(0.5).area, abs=0.01)
     # of its color all are floor, and of others none
     other = '<rect x="6" y="1" width="1" height="1" fill="#fff0d0"/>'
@@ -163,7 +163,7 @@ def test_the_width_of_a_stretched_stroke_is_that_across_it(
 ) -> None:
     path = f'<path d="{d}" fill="none" stroke="#000" stroke-width="0.2" transform="{transform}"/>'
     notes = read_shapes(tmp_path, '<rect id="boundary" x="-20" y="-20" width="50" height="50"/>' + path).notes
-    assert f"1 line taken as walls, {width} m wide (--thickness)" in notes
+    assert f"1 line treated as walls, {width} m wide (--thickness)" in notes
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_colors_are_read_as_they_are_seen(tmp_path: Path, paint: str, color: str
     )
     shape = f'<g><rect x="1" y="1" width="3" height="2" {paint}/></g>'
     foreign = read_shapes(tmp_path, head + FLOOR + WALLS + shape)
-    assert f"pale paint taken as solid: {color} (1) (--free-color: as free space)" in foreign.notes
+    assert f"pale paint treated as solid: {color} (1) (--free-color: as free space)" in foreign.notes
 
 
 @pytest.mark.parametrize("paint", ['fill="rgba(0,0,0,0)"', 'fill="#0000"', 'fill="transparent"'])

@@ -67,7 +67,7 @@ def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
     foreign = read(tmp_path, TILES.format(""), tiles("Ground"))
     assert are_equal(compute_obstacles(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
-    assert foreign.notes == ("no size of a tile was given: 1 m wide taken (--cell)",)
+    assert foreign.notes == ("no tile size given: tiles 1 m wide assumed (--cell)",)
 
 
 def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
     ]
     assert compute_obstacles(foreign, (64, 48)).symmetric_difference(shapely.union_all(expected)).area < 1e-3
     assert foreign.robots == ((8.0, 24.0),)
-    assert foreign.dropped == ("1 object of text, a template or without an area",)
+    assert foreign.dropped == ("1 object that is a text or a template, or has no area",)
     assert foreign.cell is None
 
 
@@ -188,7 +188,7 @@ def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> Non
     ground = tiles("Ground", ROWS.replace("2", "1"))
     foreign = read(tmp_path, ground, things)
     assert compute_obstacles(foreign).equals(box(3, 2, 4, 3))
-    assert foreign.dropped == ("1 object not solid by name or property (--only NAME takes it)",)
+    assert foreign.dropped == ("1 object that is not solid by name or property (--only NAME selects it)",)
     assert compute_obstacles(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
     moved = objects("walls", square.format(""), more='offsetx="16" offsety="16"')
     assert compute_obstacles(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
@@ -220,10 +220,10 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
-        (tiles("walls", "1,2"), "map.tmx:3: <data>: expected 12 tiles, as it says, got 2"),
+        (tiles("walls", "1,2"), "map.tmx:3: <data>: expected 12 tiles as stated, got 2"),
         (tiles("walls", "1,x" + ",1" * 10), "expected whole numbers from 0, separated by commas"),
         (tiles("walls", "-1" + ",1" * 11), "expected whole numbers from 0, separated by commas"),
-        (tiles("walls", ROWS, size=(3, 4)), "expected one of 4 x 3 tiles"),
+        (tiles("walls", ROWS, size=(3, 4)), "expected layers of 4 x 3 tiles"),
         (tiles("walls").replace("csv", "base64"), "not base64: Only base64 data is allowed"),
         (tiles("walls", BOMB).replace('"csv"', '"base64" compression="zlib"'), "expected 12"),
         (tiles("walls", "QUJD").replace('"csv"', '"base64" compression="gzip"'), "not gzip: Error -3"),
@@ -285,8 +285,8 @@ def test_tilesets_are_limited_together(tmp_path: Path) -> None:
     layer = f'<layer name="walls" {sides}><data encoding="csv">1</data></layer>'
     path = tmp_path / "plan.tmx"
     for tiles, count, expected in (
-        (1, 201, "more than 200 files"),
-        (60_000, 2, "tilesets of more than 100000"),
+        (1, 201, "included files: expected at most 200"),
+        (60_000, 2, "at most 100000 elements in all tilesets"),
     ):
         named = "".join(f'<tileset firstgid="{k + 1}" source="t.tsx"/>' for k in range(count))
         path.write_text(f"<map {sides}>{named}{layer}</map>")

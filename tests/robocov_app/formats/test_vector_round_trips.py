@@ -122,7 +122,7 @@ def test_wkt_is_jupedsims_walkable_area(tmp_path: Path, cluttered: Environment) 
     )
     report = export_map(wall, path)
     assert path.read_text().startswith("MULTIPOLYGON (((")
-    assert any("parts: some programs take one polygon only" in note for note in report.notes)
+    assert any("parts: some programs accept only one polygon" in note for note in report.notes)
 
 
 def test_geojson_has_features_with_names(tmp_path: Path) -> None:

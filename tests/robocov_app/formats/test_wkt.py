@@ -130,7 +130,7 @@ def test_collections_are_read(tmp_path: Path) -> None:
     foreign = read(tmp_path, "wkt", text, pillar=0.25, outlines="solid")
     solid = 1 + 0.96 + 2 + 0.5 + 0.5 + 0.1 * 4
     pillars = foreign.notes[-1]
-    assert pillars == "4 points taken as pillars"
+    assert pillars == "4 points treated as pillars"
     assert foreign.free.area == pytest.approx(200 - solid - 4 * 3.1416 / 16, abs=0.01)
 
 
@@ -178,11 +178,11 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
     [
         ("", ": no closed outline and no line, expected a drawing"),
         ("PLOYGON((0 0, 1 1))", ":1:1: expected one of POINT, LINESTRING"),
-        ("POLYGON\n((0 0, 1 0, 1 x, 0 0))", ":2:13: expected a point as 1.5 2"),
+        ("POLYGON\n((0 0, 1 0, 1 x, 0 0))", ":2:13: expected a point such as 1.5 2"),
         ("POLYGON((0 0, 10 0, 10 5, 0 nan))", ":1:27: expected a point"),
         ("POLYGON((0 0, 10 0, 10 inf, 0 1))", ":1:21: expected a point"),
         ("POLYGON((0 0, 10 0, 10, 0 1))", ":1:21: expected a point"),
-        ("POLYGON((0 0, 10 0 3, 10 5, 0 1))", ":1:15: expected a point as 1.5 2, with as many"),
+        ("POLYGON((0 0, 10 0 3, 10 5, 0 1))", ":1:15: expected a point such as 1.5 2, with as many"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1e999))", ":1:9: expected finite numbers"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1e308))", ":1:9: expected finite numbers"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1e99))", ": geometry 1: expected coordinates"),
@@ -193,7 +193,7 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
         ("POLYGON", ":1:8: expected (, got the end"),
         ("POINT(1 1, 2 2)", ":1:1: expected one point, got 2"),
         ("LINESTRING(1 1)", ":1:11: expected at least 2 points, got 1"),
-        ("CURVEPOLYGON((0 0, 1 0, 1 1, 0 0))", ":1:1: expected a geometry of straight edges"),
+        ("CURVEPOLYGON((0 0, 1 0, 1 1, 0 0))", ":1:1: expected a geometry with straight edges"),
         ("GEOMETRYCOLLECTION(" * 40, "nested too deeply, expected at most 32 levels"),
         ("SRID=1;POINT(0 0);SRID=2;POINT(0 0)", ":1:19: expected one SRID for all geometries"),
         ("SRID=99999;POINT(0 0)", ": reference system EPSG:99999 is unknown"),

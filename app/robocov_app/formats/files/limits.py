@@ -20,22 +20,22 @@ MAX_DEPTH = 32
 def require_cells(width: int, height: int, where: str) -> None:
     """Raise MapError if a raster has no cell or more than `MAX_CELLS`; `where` names the file."""
     if width < 1 or height < 1:
-        raise MapError(f"{where}: expected at least 1 x 1, got {width} x {height} cells")
+        raise MapError(f"{where}: expected at least 1 x 1 cells, got {width} x {height}")
     if width * height > MAX_CELLS:
         millions = MAX_CELLS // 1_000_000
-        raise MapError(f"{where}: expected at most {millions} million, got {width} x {height} cells")
+        raise MapError(f"{where}: expected at most {millions} million cells, got {width} x {height}")
 
 
 def require_vertices(count: int, where: str) -> None:
     """Raise MapError if there are more than `MAX_VERTICES` vertices."""
     if count > MAX_VERTICES:
-        raise MapError(f"{where}: expected at most {MAX_VERTICES}, got about {count} vertices")
+        raise MapError(f"{where}: expected at most {MAX_VERTICES} vertices, got about {count}")
 
 
 def require_shapes(count: int, where: str) -> None:
     """Raise MapError if there are more than `MAX_SHAPES` shapes."""
     if count > MAX_SHAPES:
-        raise MapError(f"{where}: expected at most {MAX_SHAPES}, got {count:.6g} shapes")
+        raise MapError(f"{where}: expected at most {MAX_SHAPES} shapes, got {count:.6g}")
 
 
 def require_length(value: float, where: str, minimum: float = 1e-6, maximum: float = MAX_SIZE_M) -> None:

@@ -49,13 +49,11 @@ class IncludeBudget:
         self.files_read += 1
         self.bytes_read += path.stat().st_size
         if self.files_read > self.max_files:
-            excess = f"more than {self.max_files} files are included"
-            raise MapError(
-                f"{at}: {excess}, expected at most {self.max_files}, each counted as often as it is read"
-            )
+            expected = f"expected at most {self.max_files} (a file read twice counts twice)"
+            raise MapError(f"{at}: included files: {expected}, got more")
         if self.bytes_read > self.max_bytes:
-            excess = f"the included files have more than {self.max_bytes / 1e6:g} MB together"
-            raise MapError(f"{at}: {excess}, expected at most that")
+            expected = f"expected at most {self.max_bytes / 1e6:g} MB in total"
+            raise MapError(f"{at}: included files: {expected}, got more")
 
 
 def find_named_file(
@@ -98,7 +96,7 @@ def find_named_file(
         is_usable = is_allowed and _exists(named)
         if not is_usable and neighbor.is_file() and _is_inside(neighbor, path.parent):
             key = at.rpartition(": ")[2]
-            note = f"{key}: {quote(name)} not found, {quote(neighbor.name)} next to the file taken"
+            note = f"{key}: {quote(name)} not found, used {quote(neighbor.name)} next to the file"
             if note not in notes:
                 notes.append(note)
             return neighbor

@@ -125,8 +125,8 @@ class _YamlReader:
     def _add_to_count(self, event: Any, count: int, depth: int) -> None:
         self.count += count
         if self.count > MAX_YAML_VALUES:
-            excess = f"more than {MAX_YAML_VALUES} values, aliases followed"
-            raise MapError(f"{self._locate(event)}: expected a smaller file, got {excess}")
+            expected = f"expected at most {MAX_YAML_VALUES} values, including those of aliases"
+            raise MapError(f"{self._locate(event)}: {expected}, got more")
         if depth > MAX_YAML_DEPTH:
             expected = f"expected at most {MAX_YAML_DEPTH} levels"
             raise MapError(f"{self._locate(event)}: nested too deeply, {expected}")

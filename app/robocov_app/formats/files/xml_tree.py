@@ -132,7 +132,8 @@ def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] =
     where = to_one_line(path)
     content = read_content(path, MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):  # gzip
-        raise MapError(f"{where}: expected plain {kind}, got compressed (gunzip makes it)")
+        actual = "a gzip-compressed file. Unpack it with gunzip."
+        raise MapError(f"{where}: expected plain {kind}, got {actual}")
     if content.count(b"=") > MAX_ATTRIBUTES:
         raise MapError(f"{where}: expected at most {MAX_ATTRIBUTES} attributes, got more")
     reader = _Reader(where, content, kind, text_tags)
@@ -208,18 +209,18 @@ class _Reader:
         """Count characters, because entities and default attributes can expand to more than the file has."""
         self.remaining_characters -= count
         if self.remaining_characters < 0:
-            self._refuse("entities that stand for too much")
+            self._refuse("entities that expand to too much text")
 
     def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
         """Check a declared entity: it may be short text, which expat inserts at every reference."""
         self._count_declaration()
-        stands = f"an entity {quote(name)} that stands"
+        entity = f"an entity {quote(name)}"
         if value is None:
-            self._refuse(f"{stands} for another file ({quote(rest[1])})")
+            self._refuse(f"{entity} that refers to another file ({quote(rest[1])})")
         if is_parameter or "&" in value or "%" in value:
-            self._refuse(f"{stands} for other entities")
+            self._refuse(f"{entity} that refers to other entities")
         if len(value) * self.reference_count > _MAX_EXPANDED_CHARACTERS:
-            self._refuse(f"{stands} for too much")
+            self._refuse(f"{entity} that expands to too much text")
 
     def _count_declaration(self, *_: object) -> None:
         """Count declared entities and attributes, because expat searches all of them at each use."""

@@ -21,7 +21,7 @@ from robocov_app.formats.options import get_or_default
 DEGREES = "OGC:CRS84"
 """Longitude and latitude on WGS 84, the system of all GeoJSON (RFC 7946, section 4)."""
 _SYSTEMS_IN_DEGREES = (DEGREES, "EPSG:4326")
-_WAY_OUT = "--units meters takes coordinates as they are"
+_WAY_OUT = "--units meters uses coordinates without conversion"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
 _URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
 _ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
@@ -79,9 +79,9 @@ def convert_to_meters(
     if scale not in (None, 1.0):
         shapes.notes.append(f"a unit is {scale:g} m")
     if may_be_degrees and units is None:
-        shapes.notes.append("coordinates taken as meters: as degrees the map would be larger than 10 km")
+        shapes.notes.append("coordinates treated as meters: as degrees the map would be larger than 10 km")
     if crs is not None:
-        shapes.notes.append(f"coordinates of {crs} taken as they are")
+        shapes.notes.append(f"coordinates of {crs} used without conversion")
     meters_per_unit = get_or_default(scale, 1.0)
     return _replace_points(geometries, _join_points(geometries) * meters_per_unit)
 
@@ -131,7 +131,7 @@ def _parse_reference_system(crs: str, where: str) -> str:
     """
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
-        expected = f"expected a code as EPSG:25832 ({_WAY_OUT})"
+        expected = f"expected a code such as EPSG:25832 ({_WAY_OUT})"
         raise MapError(f"{where}: {expected}, got reference system {quote(crs)}")
     return f"{match[1].upper()}:{match[2].upper()}"
 

@@ -128,7 +128,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             for geometry in _collect_geometries(archive.files[name], k, feature, shapes):
                 role = _choose_role(name, feature, geometry)
                 if role is None:
-                    shapes.leave_out(name, "that is no area")
+                    shapes.leave_out(name, "without an area")
                     continue
                 roles.append(role)
                 if role == "opening":
@@ -136,7 +136,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     geometry = _straighten(geometry)
                 geometries.append(geometry)
     if without_floor:
-        shapes.notes.append(f"stairs, lifts and openings to below taken as solid: {without_floor}")
+        note = "stairs, lifts and openings to the floor below treated as solid"
+        shapes.notes.append(f"{note}: {without_floor}")
     geometries = convert_to_meters(geometries, shapes, DEGREES)
     elements = [FloorElement(role, geometry) for role, geometry in zip(roles, geometries, strict=True)]
     map_name = _get_venue_name(archive) or files.get_map_name(path)

@@ -92,16 +92,17 @@ def _remove_small_holes(area: MultiPolygon) -> tuple[MultiPolygon, tuple[str, ..
     dropped: tuple[str, ...] = ()
     if small_holes:
         small_area = sum(hole.area for hole in small_holes)
-        dropped = (f"{format_count(len(small_holes), 'hole')} of {small_area:.2g} m² together",)
+        count = format_count(len(small_holes), "hole")
+        dropped = (f"{count}, {small_area:.2g} m² in total, due to rounding",)
     return MultiPolygon(polygons), dropped
 
 
 def _describe_repairs(repeated_vertices: int, enclosed: EnclosedArea) -> tuple[str, ...]:
     repaired = []
     if repeated_vertices:
-        repaired.append(f"{repeated_vertices} repeated vertices taken out")
+        repaired.append(f"{repeated_vertices} repeated vertices removed")
     if enclosed.invalidity is not None:
-        repaired.append(f"the outline met itself: {enclosed.invalidity}")
+        repaired.append(f"the outline crossed or touched itself: {enclosed.invalidity}")
     return tuple(repaired)
 
 

@@ -29,7 +29,7 @@ def add_outdoors(data: OsmData, shapes: Shapes) -> None:
     shapes.add_all(convert_to_meters(geometries, shapes, DEGREES, origin=origin))
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
-        shapes.notes.append(f"{format_count(gates, 'gate')} taken as closed")
+        shapes.notes.append(f"{format_count(gates, 'gate')} treated as closed")
 
 
 def _list_geometries(data: OsmData, shapes: Shapes) -> list[SourceGeometry]:

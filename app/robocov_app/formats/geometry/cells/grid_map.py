@@ -131,7 +131,7 @@ def _require_free_cell(free: BoolArray, is_unknown: BoolArray, unknown_name: str
         return
     hint = ""
     if is_unknown.any():
-        hint = f" (--unknown free takes {unknown_name} cells as free)"
+        hint = f" (--unknown free treats {unknown_name} cells as free)"
     raise MapError(f"{where}: no cell is free{hint}")
 
 
@@ -152,7 +152,7 @@ def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: s
     unknown_count = int(np.count_nonzero(cells == UNKNOWN))
     if not unknown_count:
         return line
-    meaning = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
+    meaning = {"obstacle": "treated as obstacles", "free": "treated as free", "cut": "cut away"}[unknown]
     return f"{line}, {_format_share(unknown_count, cells.size)} {unknown_name}, {meaning}"
 
 

@@ -162,8 +162,8 @@ def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
     rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
     if rows * columns > maximum:
-        expected = f"expected at most {maximum // 1_000_000} million"
-        raise ParameterError(f"cell: {expected} cells, got {columns} x {rows} of {cell:g} m")
+        expected = f"expected at most {maximum // 1_000_000} million cells"
+        raise ParameterError(f"cell: {expected}, got {columns} x {rows} of {cell:g} m")
     origin = (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS))
     return CellGrid(rows, columns, cell, origin)
 
@@ -255,7 +255,8 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
         verb = "is" if lost == 1 else "are"
         losses.append(f"{format_count(lost, 'separate part')} of the free space {verb} lost")
     if (pieces > 1).any():
-        losses.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
+        separate = format_count(len(large), "separate part")
+        losses.append(f"gaps close: the free space has {separate} instead of {len(parts)}")
     return "; ".join(losses)
 
 

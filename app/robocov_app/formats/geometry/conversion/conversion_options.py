@@ -124,4 +124,4 @@ class Conversion:
         """Raise MapError if there are more than `maximum` obstacles or vertices."""
         if count > maximum:
             hint = "--specks AREA drops small obstacles, --simplify METERS draws walls with fewer vertices"
-            raise MapError(f"{self.where}: expected at most {maximum}, got {count} {noun}: {hint}")
+            raise MapError(f"{self.where}: expected at most {maximum} {noun}, got {count}: {hint}")

@@ -199,7 +199,7 @@ def _report_large_cells(conversion: Conversion) -> None:
     cell = conversion.foreign.cell
     width = 2 * conversion.radius
     if conversion.shaping.simplify is None and cell is not None and cell > width:
-        limit = f"walls move by at most {width:g} m, not by one (--simplify {cell:g})"
+        limit = f"walls move by at most {width:g} m instead of one cell (--simplify {cell:g})"
         conversion.notes.append(f"cells are larger than robots: {limit}")
 
 
@@ -207,7 +207,9 @@ def _report_deviation(deviation: Deviation, free: MultiPolygon, conversion: Conv
     if deviation.distance >= _MIN_REPORTED_MOVE_M:
         share = f"{100 * deviation.area / free.area:.2g} % of the free area"
         walls = f"walls moved by at most {deviation.distance:.2g} m"
-        conversion.changed.append(f"{walls}; {format_area(deviation.area, 2)} changed sides, {share}")
+        conversion.changed.append(
+            f"{walls}; {format_area(deviation.area, 2)} changed between free and solid, {share}"
+        )
 
 
 def _report_unreachable(environment: Environment, conversion: Conversion) -> None:

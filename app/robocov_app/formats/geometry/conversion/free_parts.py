@@ -91,7 +91,7 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
     others = _report_dropped_parts(parts, stays, conversion)
     if len(kept) > 1:
         conversion.notes.append(
-            f"the free space is of {len(kept)} separate parts: robots cannot pass between them"
+            f"the free space consists of {len(kept)} separate parts: robots cannot pass between them"
         )
     return PartSelection(kept, others, is_enclosed)
 
@@ -126,7 +126,7 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
         conversion.dropped.append(f"{count}, {_format_total_area(specks)} (--specks 0 keeps them)")
     if crumbs:
         count = format_count(len(crumbs), "hole")
-        conversion.dropped.append(f"{count} of {_format_total_area(crumbs)}, which come of rounding")
+        conversion.dropped.append(f"{count}, {_format_total_area(crumbs)}, due to rounding")
     if tiny_count >= _MANY_TINY_OBSTACLES and min_area < _TINY_AREA_M2:
         conversion.notes.append(
             f"{tiny_count} obstacles are smaller than {_TINY_AREA_M2:g} m² "
@@ -158,7 +158,8 @@ def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
     positions = shapely.points(np.array(robots).reshape(-1, 2))
     index = int(np.argmax([shapely.contains(part, positions).sum() for part in parts]))
     if index:
-        conversion.notes.append("the part of the free space with most robots stays, which is not the largest")
+        note = "kept the part of the free space with the most robots, which is not the largest"
+        conversion.notes.append(note)
     return index
 
 
@@ -182,7 +183,7 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
         x, y = _choose_position_in(largest)
         conversion.notes.append(
-            f"the largest part of the free space, {paper}: taken as the paper around a plan; the "
+            f"the largest part of the free space, {paper}: treated as the paper around a plan; the "
             f"largest enclosed part is kept (--inside {x:.10g} {y:.10g}: the part along the edge)"
         )
         return enclosed[0]
@@ -256,5 +257,5 @@ def _choose_position_in(part: Polygon) -> tuple[float, float]:
 
 
 def _format_total_area(parts: list[Polygon]) -> str:
-    together = " together" if len(parts) > 1 else ""
-    return f"{format_area(sum(part.area for part in parts), 3)}{together}"
+    suffix = " in total" if len(parts) > 1 else ""
+    return f"{format_area(sum(part.area for part in parts), 3)}{suffix}"

@@ -22,7 +22,8 @@ def build_valid_boundary(conversion: Conversion) -> MultiPolygon | None:
     if boundary is None:
         return None
     if not boundary.is_valid:
-        conversion.repaired.append(f"the boundary met itself: {_describe_invalidity(boundary)}")
+        problem = "the boundary crossed or touched itself"
+        conversion.repaired.append(f"{problem}: {_describe_invalidity(boundary)}")
         boundary = make_valid(boundary)
     parts = [Polygon(part.exterior) for part in list_polygons(boundary)]
     return MultiPolygon(parts) if parts else None
@@ -53,7 +54,8 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
         raise MapError(f"{where}: expected finite coordinates")
     inside: BaseGeometry = shapely.transform(free, _round_to_zero)
     if not inside.is_valid:
-        conversion.repaired.append(f"outlines met themselves or each other: {_describe_invalidity(inside)}")
+        problem = "outlines crossed or touched themselves or each other"
+        conversion.repaired.append(f"{problem}: {_describe_invalidity(inside)}")
         inside = make_valid(inside)
     if boundary is not None and not shapely.covers(boundary, inside):
         area_before = inside.area

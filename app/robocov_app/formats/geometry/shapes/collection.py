@@ -339,7 +339,7 @@ class Shapes:
         )
 
     def find_surrounding(self) -> Boundary:
-        """Return the outer edge of the shapes, taken as walls, or a rectangle around them."""
+        """Return the outer edge of the shapes, treated as walls, or a rectangle around them."""
         return find_surrounding(self._build_drawing(None))
 
     def _build_drawing(self, world: MultiPolygon | None) -> Drawing:

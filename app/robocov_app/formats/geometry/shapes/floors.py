@@ -187,14 +187,14 @@ def _report_pale(
     floors: _PaleFloors,
     report: InterpretationReport,
 ) -> None:
-    """Note which pale fills are taken as floors, and which pale paint is taken as solid."""
+    """Note which pale fills are treated as floors, and which pale paint is treated as solid."""
     rest = [outline for outline in undecided if outline not in floors.outlines]
     pale = [outline.color for outline in rest if is_pale(outline.color)]
     pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]
     if floors.outlines:
         counts = count_colors(outline.color for outline in floors.outlines)
         hint = "(--solid-color: as obstacles)"
-        report.notes.append(f"pale fills taken as floor: {counts} {floors.reason} {hint}")
+        report.notes.append(f"pale fills treated as floor: {counts} {floors.reason} {hint}")
     if pale:
         counts = count_colors(pale)
-        report.notes.append(f"pale paint taken as solid: {counts} (--free-color: as free space)")
+        report.notes.append(f"pale paint treated as solid: {counts} (--free-color: as free space)")

@@ -278,15 +278,16 @@ def _describe(
     is_found = boundary is None or boundary.source != ""
     if is_found and obstacles.count:
         count = format_count(obstacles.count, "closed outline")
-        report.notes.append(f"{count} taken as solid (--outlines free: as free space)")
+        report.notes.append(f"{count} treated as solid (--outlines free: as free space)")
     elif not are_solid and len(drawing.outlines) > 1:
         count = format_count(len(drawing.outlines), "closed outline")
-        report.notes.append(f"{count} taken as free space (--outlines solid: as obstacles)")
+        report.notes.append(f"{count} treated as free space (--outlines solid: as obstacles)")
     if obstacles.walls:
         count = format_count(len(obstacles.walls), "line")
-        report.notes.append(f"{count} taken as walls, {_format_widths(obstacles.walls)} m wide (--thickness)")
+        widths = _format_widths(obstacles.walls)
+        report.notes.append(f"{count} treated as walls, {widths} m wide (--thickness)")
     if obstacles.pillars:
-        report.notes.append(f"{format_count(len(obstacles.pillars), 'point')} taken as pillars")
+        report.notes.append(f"{format_count(len(obstacles.pillars), 'point')} treated as pillars")
 
 
 def _format_widths(walls: Sequence[WallLine]) -> str:

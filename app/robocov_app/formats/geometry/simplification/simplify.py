@@ -108,12 +108,12 @@ def simplify_free_space(
             continue
         closed = check.find_closed_gaps(parts)
         if closed is None:
-            note = "not simplified: too many gaps that a robot may pass or not"
+            note = "not simplified: too many narrow gaps to check"
             return SimplifiedSpace(free, 0.0, (note,))
         if not closed.any():
             return SimplifiedSpace(parts, tolerance, _describe_problems(problems, radius))
         allowed[closed] = 0.0
-    return SimplifiedSpace(free, 0.0, ("not simplified: walls would have met, or closed passages",))
+    return SimplifiedSpace(free, 0.0, ("not simplified: walls would have touched, or closed passages",))
 
 
 def _tighten(
@@ -135,10 +135,10 @@ def _tighten(
 def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]:
     """Return the lines of the import report about places that were simplified less."""
     reasons = {
-        "narrow passage": f"so that a robot of radius {radius:g} m passes where it passed",
+        "narrow passage": f"so that a robot of radius {radius:g} m still fits through",
         "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
         "outline": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
-        "point": "where walls would have met",
+        "point": "where walls would have touched",
     }
     lines = []
     for kind, reason in reasons.items():

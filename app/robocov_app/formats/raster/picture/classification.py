@@ -78,9 +78,10 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
     for role in ROLES:
         names = getattr(options, f"{role}_color")
         if names:
-            fraction = np.count_nonzero(roles == _get_role_code(role)) / roles.size
+            percentage = 100 * np.count_nonzero(roles == _get_role_code(role)) / roles.size
             colors = ", ".join(names)
-            notes.append(f"{100 * fraction:.3g} % of the pixels are {colors}, taken as {_ROLE_LABELS[role]}")
+            note = f"{percentage:.3g} % of the pixels are {colors}, treated as {_ROLE_LABELS[role]}"
+            notes.append(note)
     return notes
 
 
@@ -164,7 +165,7 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: s
     if counts[UNKNOWN]:
         percentage = 100 * counts[UNKNOWN] / cells.size
         cause = f"{percentage:.3g} % of the pixels are transparent, which counts as solid"
-        advice = "--unknown free takes transparent cells as free"
+        advice = "--unknown free treats transparent cells as free"
     else:
         darkest = picture.level.min() / picture.full
         lightest = picture.level.max() / picture.full
@@ -180,12 +181,12 @@ def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str
         percentage = 100 * counts[UNKNOWN] / cells.size
         return [
             f"nothing is solid: {percentage:.3g} % of the pixels are transparent (less than half opaque), "
-            "which --unknown free takes as free"
+            "which --unknown free treats as free"
         ]
     if _is_line_drawing(cells):
         percentage = 100 * counts[FREE] / cells.size
         light = f"only {percentage:.2g} % of the pixels are light, all of them thin lines"
-        return [f"{light}: if they are the walls, --invert takes them as such"]
+        return [f"{light}: use --invert if they are the walls"]
     if not counts[BLOCKED] and not counts[UNKNOWN]:
         darkest = picture.level.min() / picture.full
         return [f"nothing is solid: the darkest pixel has a brightness of {darkest:.2g} (--threshold)"]

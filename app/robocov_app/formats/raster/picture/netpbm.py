@@ -53,7 +53,8 @@ def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
         levels = _parse_plain(data[header.end :], header.level_count, where)
     highest = int(levels.max())
     if highest > maximum:
-        raise MapError(f"{where}: expected at most {maximum}, the largest value, got a pixel of {highest}")
+        expected = f"expected pixels of at most {maximum} (the maximum in the header)"
+        raise MapError(f"{where}: {expected}, got {highest}")
     pixels = levels.reshape(header.height, header.width, header.channels)
     roles = None
     if key:
@@ -102,7 +103,7 @@ def _parse_header(data: bytes, where: str) -> _Header:
     """Parse the header: type (P2, P3, P5 or P6), width, height and maximum level."""
     numbers = []
     at = 2  # after the type
-    for name in ("width", "height", "largest value"):
+    for name in ("width", "height", "maximum"):
         blank = _BLANK.match(data, at)
         start = at
         digits = None
@@ -117,7 +118,7 @@ def _parse_header(data: bytes, where: str) -> _Header:
     width, height, maximum = numbers
     files.require_cells(width, height, where)
     if not 1 <= maximum <= _MAX_LEVEL:
-        raise MapError(f"{where}: largest value: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
+        raise MapError(f"{where}: maximum: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
     channels = 1
     if data[1:2] in b"36":  # P3 and P6 are in color
         channels = 3
@@ -137,7 +138,7 @@ def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
         start = header.end + 2
     if len(data) - start < size:
         complete = max(0, len(data) - start) // raw.itemsize // header.channels
-        raise MapError(f"{where}: cut off after {complete} of {count // header.channels} pixels")
+        raise MapError(f"{where}: expected {count // header.channels} pixels, got {complete}")
     return np.frombuffer(data, raw, count, start).astype(raw.newbyteorder("="), copy=False)
 
 
@@ -145,7 +146,7 @@ def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     """Parse `count` levels that are written as text, piece by piece to limit the memory."""
     shortest = 2 * count - 1  # one digit for each level, with blanks between them
     if len(text) < shortest:
-        raise MapError(f"{where}: cut off: {len(text)} bytes are too few for {count} pixels")
+        raise MapError(f"{where}: expected {count} pixels, got only {len(text)} bytes")
     if b"#" in text:
         text = re.sub(rb"#[^\r\n]*", b" ", text)
     values = np.empty(count, np.uint16)
@@ -161,16 +162,16 @@ def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
         numbers = files.parse_integers(piece, " ")
         at = next_piece
         if numbers is None:
-            raise MapError(f"{where}: pixels that are not whole numbers, of {count}")
+            raise MapError(f"{where}: expected {count} whole numbers as pixels, got other text")
         numbers = numbers[: count - done]
         invalid = numbers[(numbers < 0) | (numbers > _MAX_LEVEL)]
         if len(invalid):
             worst = max(invalid)
             if min(invalid) < 0:
                 worst = min(invalid)
-            raise MapError(f"{where}: expected a number from 0 to {_MAX_LEVEL}, got a pixel of {worst}")
+            raise MapError(f"{where}: expected pixels from 0 to {_MAX_LEVEL}, got {worst}")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
     if done < count:
-        raise MapError(f"{where}: cut off after {done} of {count} pixels")
+        raise MapError(f"{where}: expected {count} pixels, got {done}")
     return values

@@ -63,7 +63,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if metadata.mode != "raw":
         repaired += _describe_missing_thresholds(metadata)
     yaw = math.remainder(metadata.yaw, 2 * math.pi)
-    notes = [f"{key}: no key of map_server, not looked at" for key in metadata.unknown_keys]
+    notes = [f"{key}: unknown key, ignored" for key in metadata.unknown_keys]
     if metadata.mode == "trinary":
         notes += _describe_doubtful_cells(picture, metadata)
     if transparency:
@@ -83,7 +83,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _describe_missing_thresholds(metadata: Metadata) -> list[str]:
-    return [f"{key} is missing, {DEFAULT_THRESHOLDS[key]:g} taken" for key in metadata.missing_thresholds]
+    return [f"{key} is missing, {DEFAULT_THRESHOLDS[key]:g} used" for key in metadata.missing_thresholds]
 
 
 def _describe_transparency(picture: Brightness, mode: str) -> str:
@@ -93,7 +93,7 @@ def _describe_transparency(picture: Brightness, mode: str) -> str:
         return ""
     if mode == "raw":
         return description
-    share, _, _ = description.partition(",")
+    share, _, _ = description.partition(";")
     return f"{share}, which map_server averages in as if it were a dark color"
 
 
@@ -116,4 +116,4 @@ def _describe_doubtful_cells(picture: Brightness, metadata: Metadata) -> list[st
     if not is_plain or not is_unknown_free or count < picture.level.size / 100:
         return []
     cells = f"{count} cells have the value {UNKNOWN_LEVEL}, which is saved for unknown cells"
-    return [f"{cells}, and are free by free_thresh {metadata.free:g}"]
+    return [f"{cells}, and are free according to free_thresh {metadata.free:g}"]

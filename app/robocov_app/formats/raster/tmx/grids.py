@@ -89,7 +89,7 @@ def read_tile_layers(root: Element, layers: list[Layer]) -> TileLayers:
     if is_infinite:
         window = _find_bounds(pieces)
     elif any(piece.window != window for piece in pieces):
-        root.refuse(f"expected one of {columns} x {rows} tiles, got a layer of another size")
+        root.refuse(f"expected layers of {columns} x {rows} tiles, got one of another size")
     _require_few_tiles(root, window, len(layers))
     grids = [_combine(layer_pieces, window) for layer_pieces in pieces_of_layers]
     if is_infinite:
@@ -112,7 +112,9 @@ def _require_few_tiles(root: Element, window: Window, layer_count: int) -> None:
     rows, columns = window.shape
     size = math.prod(window.shape)
     if size > MAX_TILES or size * layer_count > MAX_TILES_READ:
-        root.refuse(f"expected fewer, got {columns} x {rows} tiles in {format_count(layer_count, 'layer')}")
+        expected = f"expected at most {MAX_TILES} tiles, and {MAX_TILES_READ} in all layers"
+        layers = format_count(layer_count, "layer")
+        root.refuse(f"{expected}, got {columns} x {rows} in {layers}")
 
 
 def _combine(pieces: list[_Piece], window: Window) -> GlobalIDs:

@@ -182,7 +182,7 @@ class ObstacleReader:
             elif self._is_solid(element, labels, folded, are_all_solid or layer.is_solid):
                 self._add_shape(element, shape, labels)
             else:
-                reason = "not solid by name or property (--only NAME takes it)"
+                reason = "that is not solid by name or property (--only NAME selects it)"
                 self._shapes.leave_out("object", reason)
 
     def _is_solid(
@@ -209,4 +209,4 @@ class ObstacleReader:
         else:
             is_polygon = shape.kind == "polygon"
             if not is_polygon or not shapes.add_outline([points], labels, at=at, thing=""):
-                shapes.leave_out("object", "of text, a template or without an area")
+                shapes.leave_out("object", "that is a text or a template, or has no area")

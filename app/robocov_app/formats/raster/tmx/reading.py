@@ -91,7 +91,7 @@ def _choose_pixel_size(tile: Array, options: ReadOptions, notes: list[str]) -> f
         return options.scale
     cell = options.cell
     if cell is None:
-        notes.append(f"no size of a tile was given: {DEFAULT_TILE_M:g} m wide taken (--cell)")
+        notes.append(f"no tile size given: tiles {DEFAULT_TILE_M:g} m wide assumed (--cell)")
         cell = DEFAULT_TILE_M
     return cell / float(tile[0])
 

@@ -59,7 +59,7 @@ def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
         piece.refuse(f"expected CSV, or base64 with zlib or gzip or neither, got {name}")
     if ids is None or len(ids) != count:
         actual = "more" if ids is None else len(ids)
-        piece.refuse(f"expected {count} tiles, as it says, got {actual}")
+        piece.refuse(f"expected {count} tiles as stated, got {actual}")
     return ids
 
 

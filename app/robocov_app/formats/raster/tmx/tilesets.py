@@ -64,8 +64,8 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
             element_count += sum(1 for _ in tileset.iterate())
         if element_count > MAX_ELEMENTS:
             raise MapError(
-                f"{element.where}:{element.line}: tilesets of more than {MAX_ELEMENTS} elements, "
-                "expected at most that"
+                f"{element.where}:{element.line}: expected at most {MAX_ELEMENTS} elements in all tilesets, "
+                "got more"
             )
         _add_solid_tiles(tileset, first_id, tiles)
     return tiles

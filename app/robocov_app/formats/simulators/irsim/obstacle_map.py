@@ -49,7 +49,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     )
     if not file.is_file():
         file = _find_packaged_picture(source)
-        shapes.notes.append(f"{place}: {quote(file.name)} taken from the installed ir-sim")
+        shapes.notes.append(f"{place}: {quote(file.name)} read from the installed ir-sim")
     picture = read_picture(file, to_one_line(file))
     step = int(world["mdownsample"].parse_number(1.0))
     if step < 1:

@@ -118,7 +118,7 @@ class _GroupReader:
         number = max(int(group["number"].parse_number(1.0)), 0)
         self._object_count += number
         if self._object_count > MAX_OBJECTS:
-            group["number"].refuse(f"a number of at most {MAX_OBJECTS} together")
+            group["number"].refuse(f"a number of at most {MAX_OBJECTS} in total")
         states = self._parse_states(group, number)
         if states is None:
             self._shapes.leave_out(kind, "that IR-SIM places at random", number)
@@ -138,7 +138,7 @@ class _GroupReader:
         if not self._moving_count:
             return []
         obstacles = format_count(self._moving_count, "obstacle")
-        return [f"{obstacles} with kinematics taken as standing where the file has them"]
+        return [f"{obstacles} with kinematics treated as fixed at their initial positions"]
 
     def _add_obstacle(self, group: Node, k: int, frame: Array, labels: tuple[str, ...]) -> None:
         """Add obstacle k of a group; `frame` is the (3, 3) transform from its frame to meters."""

@@ -63,8 +63,8 @@ class BitmapReader:
         self._pixel_count += picture.level.size
         if self._pixel_count > files.MAX_CELLS:
             millions = files.MAX_CELLS // 1_000_000
-            actual = f"with those before it more than {millions} million pixels"
-            raise MapError(f"{where}: expected fewer, got {actual}")
+            expected = f"expected at most {millions} million pixels in all bitmaps"
+            raise MapError(f"{where}: {expected}, got more")
         is_dark = picture.level <= _MAX_DARK_LEVEL * picture.full
         transparency = describe_transparency(picture)
         if transparency:
@@ -74,7 +74,7 @@ class BitmapReader:
             if is_dark.any():
                 shade = "dark"
             cause = f": {transparency}" if transparency else ""
-            raise MapError(f"{where}: all is {shade}, expected a picture with dark walls{cause}")
+            raise MapError(f"{where}: expected a picture with dark walls, got only {shade} pixels{cause}")
         row = np.flatnonzero(is_dark.any(axis=1))
         column = np.flatnonzero(is_dark.any(axis=0))
         is_free = ~is_dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]

@@ -138,7 +138,7 @@ class ModelPlacer:
         while chain[-1].type in macros:
             chain.append(macros[chain[-1].type])
             if len(chain) > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: the model {quote(entity.type)} is made of itself")
+                raise MapError(f"{entity.at}: the model {quote(entity.type)} is defined in terms of itself")
         self._entity_count += 1 + sum(len(base.children) for base in chain)
         if self._entity_count > MAX_ENTITIES:
             raise MapError(f"{entity.at}: expected at most {MAX_ENTITIES} models and blocks, got more")
@@ -226,5 +226,5 @@ def _parse_rings(entity: Entity) -> list[Array]:
     for prefix, points in rings.items():
         count = entity.parse_number(f"{prefix}points", len(points))
         if count != len(points):
-            raise MapError(f"{entity.at}: expected {count:g}, as it says, got {len(points)} points")
+            raise MapError(f"{entity.at}: expected {count:g} points as stated, got {len(points)}")
     return [np.array([points[index] for index in sorted(points)]) for points in rings.values()]

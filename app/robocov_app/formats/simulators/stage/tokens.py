@@ -97,7 +97,7 @@ class _TokenReader:
 
     def _append(self, token: Token) -> None:
         if len(self.tokens) >= MAX_TOKENS:
-            raise MapError(f"{token.at}: expected fewer, got more than {MAX_TOKENS} words and numbers")
+            raise MapError(f"{token.at}: expected at most {MAX_TOKENS} words and numbers, got more")
         self.tokens.append(token)
 
     def _include(self, token: Token, open_files: tuple[Path, ...]) -> None:
@@ -107,6 +107,6 @@ class _TokenReader:
         path = self._find_file(token.text, "file", at=token.at)
         includes_itself = any(path.resolve() == file.resolve() for file in open_files)
         if includes_itself or len(open_files) > files.MAX_DEPTH:
-            token.refuse("a file to include, which does not include itself,")
+            token.refuse("a file that does not include itself")
         self._budget.take(path, token.at)
         self.read(path, (*open_files, path))

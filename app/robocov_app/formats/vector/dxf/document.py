@@ -69,7 +69,8 @@ def load_document(path: Path, where: str) -> Any:
             raise MapError(f"{where}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # ezdxf raises exceptions of any type for a damaged file
             reason = to_one_line(error) or type(error).__name__
-    raise MapError(f"{where}: no DXF that can be read: {reason[:_MAX_REASON_CHARACTERS]}")
+    reason = reason[:_MAX_REASON_CHARACTERS]
+    raise MapError(f"{where}: expected a readable DXF, got a damaged one: {reason}")
 
 
 def _require_limits(content: bytes, where: str) -> None:
@@ -84,7 +85,7 @@ def _require_limits(content: bytes, where: str) -> None:
         files.require_vertices(_count_matches(_POINT, content, files.MAX_VERTICES), where)
     lines = content.count(b"\n")
     if lines > MAX_LINES:
-        raise MapError(f"{where}: expected at most {MAX_LINES}, got {lines} lines")
+        raise MapError(f"{where}: expected at most {MAX_LINES} lines, got {lines}")
 
 
 def _count_matches(pattern: re.Pattern[bytes], content: bytes, limit: int) -> int:

@@ -28,8 +28,8 @@ def require_few_entities(document: Any, where: str) -> None:
     """
     count = _EntityCounter(document, where).count(document.modelspace())
     if count > MAX_DRAWN_ENTITIES:
-        actual = f"{min(count, _MAX_PRINTED_COUNT):.3g} entities to be drawn, including those in blocks"
-        raise MapError(f"{where}: expected at most {MAX_DRAWN_ENTITIES}, got {actual}")
+        expected = f"expected at most {MAX_DRAWN_ENTITIES} entities to draw, including those in blocks"
+        raise MapError(f"{where}: {expected}, got {min(count, _MAX_PRINTED_COUNT):.3g}")
 
 
 class _EntityCounter:

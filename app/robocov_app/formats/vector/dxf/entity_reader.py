@@ -163,7 +163,7 @@ class EntityReader:
     def _add_hatch(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
         """Add a hatch as an area, if the option ``hatches`` is set; otherwise count it as left out."""
         if not self._shapes.options.hatches:
-            self._shapes.leave_out("HATCH", "(--hatches takes them as areas)")
+            self._shapes.leave_out("HATCH", "(--hatches imports them as areas)")
             return
         from ezdxf.path import from_hatch
 

@@ -145,7 +145,7 @@ class _DrawingReader:
     def describe(self) -> list[str]:
         """Return notes about simplified or ignored elements."""
         counts = {
-            "dashed strokes taken as whole": self.shape_reader.dashed,
+            "dashed strokes treated as continuous lines": self.shape_reader.dashed,
             "clip paths and masks not applied": self.clipped,
             "style rules of other kinds than tag, .class and #id not applied": self.sheet.unsupported,
         }
@@ -159,9 +159,8 @@ class _DrawingReader:
         """Raise MapError if too much would be drawn: a few kB of uses may expand to billions of elements."""
         counts = _ElementCounter(self).count(self.root, 0)
         if counts[0] > MAX_ELEMENTS:
-            expected = f"expected at most {MAX_ELEMENTS}"
-            got = f"got {counts[0]:.3g} elements to be drawn, uses and all"
-            raise MapError(f"{self.root.where}: {expected}, {got}")
+            expected = f"expected at most {MAX_ELEMENTS} elements to draw, including uses"
+            raise MapError(f"{self.root.where}: {expected}, got {counts[0]:.3g}")
         require_shapes(counts[1], self.root.where)
 
     def find_target(self, element: Element) -> Element | None:
@@ -234,7 +233,7 @@ class _ElementCounter:
     def count(self, element: Element, depth: int) -> tuple[int, int]:
         """Return how many elements an element draws, and how many of them are shapes."""
         if element in self._open:
-            element.refuse("is used within itself")
+            element.refuse("uses itself")
         if depth > MAX_NESTING:
             element.refuse(f"uses are nested deeper than {MAX_NESTING}")
         if element not in self._counts:

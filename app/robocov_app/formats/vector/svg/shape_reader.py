@@ -106,7 +106,7 @@ class ShapeReader:
         """Return whether the user ignores a color; if so, count the fill or stroke as left out."""
         if paint.role != "ignore":
             return False
-        self.shapes.leave_out(kind, "of a color that is left out (--ignore-color)")
+        self.shapes.leave_out(kind, "in an ignored color (--ignore-color)")
         return True
 
     def _find_paint(self, state: ElementState, kind: Literal["fill", "stroke"]) -> Paint:

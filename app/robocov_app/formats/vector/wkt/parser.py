@@ -153,7 +153,7 @@ class WktParser:
             word = scanner.match(_WORD)
             name = word[0].upper() if word else ""
             if name.rstrip("ZM") in CURVED_KINDS:
-                scanner.refuse(f"expected a geometry of straight edges, got {name}")
+                scanner.refuse(f"expected a geometry with straight edges, got {name}")
             scanner.refuse(f"expected one of {', '.join(KINDS)}, got {scanner.quote_next()}")
         scanner.position = match.end()
         scanner.skip_space()
@@ -277,4 +277,5 @@ class WktParser:
         point = ahead.split(",")[0].split(")")[0]
         scanner.skip_space()
         actual = quote(" ".join(point.split())) if point.strip() else "nothing"
-        scanner.refuse(f"expected a point as 1.5 2, with as many numbers as the first, got {actual}")
+        expected = "expected a point such as 1.5 2, with as many numbers as the first point"
+        scanner.refuse(f"{expected}, got {actual}")

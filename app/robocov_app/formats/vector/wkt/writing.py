@@ -30,7 +30,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         temporary.write_text(text + "\n", encoding="ascii")
     notes = [f"in meters, {digits} decimals"]
     if len(polygons) > 1:
-        notes.append(f"the free space has {len(polygons)} parts: some programs take one polygon only")
+        notes.append(f"the free space has {len(polygons)} parts: some programs accept only one polygon")
     return ExportReport(
         "wkt",
         (path,),
