@@ -23,7 +23,29 @@ _CARD_RADIUS_PX = 8
 _MESSAGE_TEXT_PX = 12.5
 _MESSAGE_LINE_PX = 18
 _MAX_MESSAGE_WIDTH_PX = 620
+_MESSAGE_MARGIN_PX = 14
+"""Distance of the text of a message from the left and right edges of its box."""
+_MESSAGE_HEIGHT_PX = 14
+"""Height of the box of a message in addition to that of its lines."""
+_FIRST_LINE_PX = 16
+"""Distance of the middle of the first line of a message from the top of its box."""
+_MESSAGE_SIDE_PX = 40
+"""Minimum distance of a message from the left and right edges of the arena."""
+_MESSAGE_BOTTOM_PX = 42
+"""Distance of a message from the bottom of the arena."""
+_TAG_MARGIN_PX = 6
+_TAG_HEIGHT_PX = 20
+_TAG_RADIUS_PX = 4
 _STATUS_MARGIN_PX = 12
+_STATUS_GAP_PX = 20
+"""Minimum distance between the facts and the hint of the status line."""
+
+# Fractions of the second color that are mixed into the first one.
+_FIELD_STRENGTH = 0.8
+_CARD_EDGE_STRENGTH = 0.28
+_EDGE_STRENGTH = 0.3
+_STATUS_STRENGTH = 0.06
+_ERROR_STRENGTH = 0.14
 
 
 def create_flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
@@ -73,7 +95,7 @@ def get_field_color(theme: Theme) -> Color:
     """Return the color of buttons and text fields."""
     if theme is LIGHT:
         return theme.background
-    return mix(theme.panel, theme.background, 0.8)
+    return mix(theme.panel, theme.background, _FIELD_STRENGTH)
 
 
 def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[str]:
@@ -107,7 +129,7 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
 
 def draw_card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
     """Draw the background of a dialog or another card over the window."""
-    edge = mix(theme.panel, theme.ink, 0.28)
+    edge = mix(theme.panel, theme.ink, _CARD_EDGE_STRENGTH)
     radius = round(_CARD_RADIUS_PX * scale)
     draw_rounded_box(screen, box, theme.panel, edge=edge, radius=radius, width=max(1, round(scale)))
 
@@ -133,11 +155,12 @@ def draw_tag(screen: Surface, text: str, position: tuple[float, float], theme: T
         Scale of the text and the box.
     """
     size = round(theme.text * scale)
-    box = Rect(0, 0, measure_text(text, size) + round(12 * scale), round(20 * scale))
-    box.midleft = round(position[0] - 6 * scale), round(position[1])
+    width = measure_text(text, size) + round(2 * _TAG_MARGIN_PX * scale)
+    box = Rect(0, 0, width, round(_TAG_HEIGHT_PX * scale))
+    box.midleft = round(position[0] - _TAG_MARGIN_PX * scale), round(position[1])
     box.clamp_ip(screen.get_rect())
-    edge = mix(theme.background, theme.ink, 0.3)
-    draw_rounded_box(screen, box, theme.background, edge=edge, radius=round(4 * scale))
+    edge = mix(theme.background, theme.ink, _EDGE_STRENGTH)
+    draw_rounded_box(screen, box, theme.background, edge=edge, radius=round(_TAG_RADIUS_PX * scale))
     image = render_text(text, size, theme.ink)
     screen.blit(image, image.get_rect(center=box.center))
 
@@ -160,11 +183,11 @@ def draw_status(
         Text at the right end.
     """
     left, top, width, height = box
-    screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
+    screen.fill(mix(theme.panel, theme.ink, _STATUS_STRENGTH), Rect(box))
     canvas = create_flat_canvas(screen, theme, scale)
     size = theme.small_text
     y = top + height / 2
-    max_width = width - 44 * scale - canvas.measure_text(hint, size)
+    max_width = width - (2 * _STATUS_MARGIN_PX + _STATUS_GAP_PX) * scale - canvas.measure_text(hint, size)
     count = len(facts)
     while count > 1 and canvas.measure_text(_FACT_SEPARATOR.join(facts[:count]), size) > max_width:
         count -= 1
@@ -195,21 +218,22 @@ def draw_message(
         return
     size = round(_MESSAGE_TEXT_PX * scale)
     left, top, width, height = arena
-    max_width = min(width - 80 * scale, _MAX_MESSAGE_WIDTH_PX * scale)
+    max_width = min(width - 2 * _MESSAGE_SIDE_PX * scale, _MAX_MESSAGE_WIDTH_PX * scale)
     lines: list[str] = []
     for paragraph in text.split("\n"):
         lines += wrap_text(paragraph, size, max_width)
-    box_width = max(measure_text(line, size) for line in lines) + 28 * scale
-    box = Rect(0, 0, round(box_width), round((len(lines) * _MESSAGE_LINE_PX + 14) * scale))
-    box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
+    box_width = max(measure_text(line, size) for line in lines) + 2 * _MESSAGE_MARGIN_PX * scale
+    box_height = (len(lines) * _MESSAGE_LINE_PX + _MESSAGE_HEIGHT_PX) * scale
+    box = Rect(0, 0, round(box_width), round(box_height))
+    box.midbottom = round(left + width / 2), round(top + height - _MESSAGE_BOTTOM_PX * scale)
     fill = theme.panel
-    edge = mix(theme.panel, theme.ink, 0.3)
+    edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
     if is_error:
-        fill = mix(theme.panel, theme.trajectory, 0.14)
-        edge = theme.trajectory
+        fill = mix(theme.panel, theme.error, _ERROR_STRENGTH)
+        edge = theme.error
     radius = round(_CARD_RADIUS_PX * scale)
     draw_rounded_box(screen, box, fill, edge=edge, radius=radius, width=max(1, round(scale)))
     for number, line in enumerate(lines):
         image = render_text(line, size, theme.ink)
-        y = round(box.top + (16 + _MESSAGE_LINE_PX * number) * scale)
+        y = round(box.top + (_FIRST_LINE_PX + _MESSAGE_LINE_PX * number) * scale)
         screen.blit(image, image.get_rect(center=(box.centerx, y)))

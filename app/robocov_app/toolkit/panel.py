@@ -147,7 +147,7 @@ class CommandPanel(SidePanel):
         label: str,
         command: str,
         *,
-        chosen: bool = False,
+        selected: bool = False,
         small: bool = False,
         disabled_reason: str = "",
     ) -> None:
@@ -161,8 +161,8 @@ class CommandPanel(SidePanel):
             Its text.
         command : str
             Name of the command. Its title and keys are the tool tip.
-        chosen : bool
-            Whether it is highlighted.
+        selected : bool
+            Whether it has the accent color.
         small : bool
             Whether its text is small.
         disabled_reason : str
@@ -173,7 +173,10 @@ class CommandPanel(SidePanel):
             # A command may have two buttons on a page, and widget keys must be unique.
             key = f"{key}:again"
         tip = self.commands[command].tip
-        if ui.button(label, key=key, tip=tip, chosen=chosen, small=small, disabled_reason=disabled_reason):
+        is_clicked = ui.button(
+            label, key=key, tip=tip, selected=selected, small=small, disabled_reason=disabled_reason
+        )
+        if is_clicked:
             self._run_command(command)
 
     def show_buttons(self, ui: Ui, row: tuple[PanelButton, ...]) -> None:
@@ -188,6 +191,6 @@ class CommandPanel(SidePanel):
         ui.row(*[0.0] * columns, below=4)
         for tool in toolbox.by_name.values():
             label = tool.button_text or tool.title
-            is_chosen = tool is toolbox.current
-            self.show_button(ui, label, f"tool:{tool.name}", chosen=is_chosen, small=True)
+            is_selected = tool is toolbox.current
+            self.show_button(ui, label, f"tool:{tool.name}", selected=is_selected, small=True)
         ui.space(6)

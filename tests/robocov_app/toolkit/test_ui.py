@@ -151,7 +151,7 @@ def test_an_open_list_covers_the_widgets_below(page: EditedPage) -> None:
     page.press("menu", "word")
     found = page.ui.open_list
     assert found is not None
-    item = found.get_item_rect(found.chosen + 1)
+    item = found.get_item_rect(found.highlighted + 1)
     page.at(*item.center)
     assert page.word == "c"
     assert page.ui.open_list is None

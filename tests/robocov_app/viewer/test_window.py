@@ -190,12 +190,12 @@ def test_the_palette_is_navigated_by_keys(driver: Driver) -> None:
     palette = driver.window.dialogs.current
     driver.press_key("down", 2)
     driver.press_key("up")
-    assert palette.chosen == 1
+    assert palette.highlighted == 1
     driver.press_key("backspace")
     assert palette.text == "ro"
-    assert palette.chosen == 0
+    assert palette.highlighted == 0
     driver.press_key("down", 30)
-    assert palette.chosen == len(palette.options("ro")) - 1
+    assert palette.highlighted == len(palette.options("ro")) - 1
     driver.press_key("escape")
     assert not driver.window.dialogs.is_open
     assert driver.session.timeline.end_time == 0.0

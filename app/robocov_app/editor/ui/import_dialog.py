@@ -238,7 +238,7 @@ class ImportDialog(Dialog):
 
     def _draw_click_action(self, ui: Ui, action: str, text: str, tip: str) -> None:
         is_chosen = self.click_action == action
-        if ui.button(text, key=f"clicks:{action}", chosen=is_chosen, small=True, tip=tip):
+        if ui.button(text, key=f"clicks:{action}", selected=is_chosen, small=True, tip=tip):
             self.click_action = action
 
     def _draw_chips(self, ui: Ui, sheet: ColorSheet) -> None:
@@ -257,7 +257,7 @@ class ImportDialog(Dialog):
         key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
         tip = f"{name}: a click changes it"
-        if ui.button(text, key=key, chosen=role is not None, small=True, tip=tip):
+        if ui.button(text, key=key, selected=role is not None, small=True, tip=tip):
             self.form.cycle_color(color)
         button = ui.find("button", key)
         if ui.surface is not None and button is not None:
@@ -275,7 +275,7 @@ class ImportDialog(Dialog):
         self.form.show_help(ui, foot - HELP_MARGIN_PX)
         ui.y = foot - BUTTONS_HEIGHT_PX
         ui.row(92, 92, height=BUTTONS_HEIGHT_PX, below=0)
-        if ui.button("Import", chosen=self.is_ready, key="import", tip=self.problem):
+        if ui.button("Import", selected=self.is_ready, key="import", tip=self.problem):
             self.accepted = True
         if ui.button("Cancel", key="cancel"):
             self.is_done = True

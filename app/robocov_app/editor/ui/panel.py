@@ -397,7 +397,7 @@ class EditorPanel(CommandPanel):
         if ui.surface is not None:
             canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
             draw_badge(canvas, badge.centerx, badge.top + ui.px(13), is_error=problem.is_error)
-        if ui.option("\n".join(lines), key=f"problem:{number}", chosen=problem is editor.problem):
+        if ui.option("\n".join(lines), key=f"problem:{number}", highlighted=problem is editor.problem):
             editor.problem = problem
             if problem.owner is not None:
                 editor.select(Selection.of(problem.owner).restrict_to(editor.sketch))
@@ -424,7 +424,7 @@ class EditorPanel(CommandPanel):
                 mark = ""
                 if count < 0:
                     mark = "undone"
-                if ui.option(text, mark, key=f"step:{number}", chosen=count == 0):
+                if ui.option(text, mark, key=f"step:{number}", highlighted=count == 0):
                     self.editor.undo_steps(count)
 
     def _draw_object_list(self, ui: Ui) -> None:
@@ -441,7 +441,7 @@ class EditorPanel(CommandPanel):
                 owner, marks_text = rows[number]
                 is_selected = owner in editor.selection.owners
                 name = format_numbered_name(sketch, owner)
-                if ui.option(name, marks_text, key=f"object:{owner}", chosen=is_selected):
+                if ui.option(name, marks_text, key=f"object:{owner}", highlighted=is_selected):
                     self._select(Selection.of(owner), editor.selection.without_vertices())
 
     def _draw_vertex_list(self, ui: Ui) -> None:
@@ -456,7 +456,7 @@ class EditorPanel(CommandPanel):
                 x, y = find_position(editor.displayed[0], vertex)
                 position = f"{x:.3f}      {y:.3f}  m"
                 is_selected = vertex in editor.selection.vertices
-                if ui.option(f"{number + 1}", position, key=f"vertex:{number}", chosen=is_selected):
+                if ui.option(f"{number + 1}", position, key=f"vertex:{number}", highlighted=is_selected):
                     previous = Selection(vertices=editor.selection.vertices)
                     self._select(Selection(vertices=frozenset({vertex})), previous)
 

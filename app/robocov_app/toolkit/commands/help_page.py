@@ -23,6 +23,29 @@ _BOTTOM_PX = 14
 _TITLE_SIZE_PX = 16
 _HINT_SIZE_PX = 11
 _KEY_WIDTH_PX = 84
+_TITLE_GAP_PX = 8
+"""Distance between the title of a command and the next column."""
+_TITLE_TOP_PX = 12
+_HINT_MIDDLE_PX = 22
+"""Distance of the middle of the hint from the upper edge of the page."""
+_WINDOW_MARGIN_PX = 12
+"""Minimum distance of the page from the left and right edges of the window."""
+_MIN_SPACE_AROUND_ROWS_PX = 90
+"""Minimum difference of the height of the window and that of the rows."""
+_SPACE_AROUND_ROWS_PX = 66
+"""Difference of the height of the page and that of the rows."""
+
+_COLUMN_COUNT = 3
+_WIDE_COLUMN_COUNT = 4
+"""Number of columns in windows that are at least `_WIDE_WINDOW_PX` wide."""
+_TEXT_FRACTION = 0.66
+"""Size of the text as a fraction of the height of a row."""
+_HEADING_TEXT_FRACTION = 0.92
+"""Size of the headings as a fraction of the size of the text."""
+_HEADING_GAP_ROWS = 0.5
+"""Space above a heading."""
+_TITLE_STRENGTH = 0.8
+"""Fraction of the color of text in the titles of commands."""
 
 _MIN_TEXT_PX = 8
 """Minimum text size, at any scale."""
@@ -86,8 +109,8 @@ def draw_help_page(
     _draw_title(screen, theme, columns, hint)
     for line, x, y in _place_lines(lines, columns):
         if isinstance(line, str):
-            size = max(_MIN_TEXT_PX, round(columns.text_size * 0.92))
-            screen.blit(render_text(line.upper(), size, theme.final, True), (round(x), round(y)))
+            size = max(_MIN_TEXT_PX, round(columns.text_size * _HEADING_TEXT_FRACTION))
+            screen.blit(render_text(line.upper(), size, theme.accent, True), (round(x), round(y)))
         else:
             _draw_command(screen, theme, columns, line, x, y)
 
@@ -105,25 +128,27 @@ def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str 
 def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
     """Choose the number of columns, and a row height at which `rows` rows fit."""
     width, height = screen.get_size()
-    count = 3
+    count = _COLUMN_COUNT
     if width >= _WIDE_WINDOW_PX * scale:
-        count = 4
+        count = _WIDE_COLUMN_COUNT
     # One spare row, because a heading may have to move to the next column.
     rows_per_column = math.ceil(rows / count) + 1
-    row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_per_column)
-    box_width = round(min(width - 24 * scale, _MAX_WIDTH_PX * scale))
-    box = Rect(0, 0, box_width, round(rows_per_column * row_height + 66 * scale))
+    row_height = min(_MAX_ROW_PX * scale, (height - _MIN_SPACE_AROUND_ROWS_PX * scale) / rows_per_column)
+    box_width = round(min(width - 2 * _WINDOW_MARGIN_PX * scale, _MAX_WIDTH_PX * scale))
+    box_height = round(rows_per_column * row_height + _SPACE_AROUND_ROWS_PX * scale)
+    box = Rect(0, 0, box_width, box_height)
     box.center = width // 2, height // 2
-    return _Columns(count, row_height, max(_MIN_TEXT_PX, round(row_height * 0.66)), box, scale)
+    text_size = max(_MIN_TEXT_PX, round(row_height * _TEXT_FRACTION))
+    return _Columns(count, row_height, text_size, box, scale)
 
 
 def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
     scale = columns.scale
     box = columns.box
     title = render_text("Keys", round(_TITLE_SIZE_PX * scale), theme.ink, True)
-    screen.blit(title, (box.left + round(_MARGIN_PX * scale), box.top + round(12 * scale)))
+    screen.blit(title, (box.left + round(_MARGIN_PX * scale), box.top + round(_TITLE_TOP_PX * scale)))
     image = render_text(hint, round(_HINT_SIZE_PX * scale), theme.faint)
-    right_end = box.right - round(_MARGIN_PX * scale), box.top + round(22 * scale)
+    right_end = box.right - round(_MARGIN_PX * scale), box.top + round(_HINT_MIDDLE_PX * scale)
     screen.blit(image, image.get_rect(midright=right_end))
 
 
@@ -144,7 +169,7 @@ def _place_lines(
             x += columns.width
             y = columns.top
         if is_heading and y > columns.top + columns.scale:
-            y += 0.5 * row_height
+            y += _HEADING_GAP_ROWS * row_height
         yield line, x, y
         y += row_height
 
@@ -154,7 +179,7 @@ def _draw_command(
 ) -> None:
     size = columns.text_size
     screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
-    max_width = columns.width - (_KEY_WIDTH_PX + 8) * columns.scale
+    max_width = columns.width - (_KEY_WIDTH_PX + _TITLE_GAP_PX) * columns.scale
     title = shorten_to_width(command.title.partition(":")[0], size, max_width)
-    image = render_text(title, size, mix(theme.panel, theme.ink, 0.8))
+    image = render_text(title, size, mix(theme.panel, theme.ink, _TITLE_STRENGTH))
     screen.blit(image, (round(x + _KEY_WIDTH_PX * columns.scale), round(y)))

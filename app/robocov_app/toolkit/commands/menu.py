@@ -35,7 +35,7 @@ class Menu(Dialog):
     ----------
     rows
         As passed.
-    chosen : int
+    highlighted : int
         Index of the row highlighted with the arrow keys; -1 if there is none.
     """
 
@@ -47,7 +47,7 @@ class Menu(Dialog):
         self, rows: Sequence[Command | None], position: tuple[int, int], run: Callable[[str], object]
     ) -> None:
         self.rows = rows
-        self.chosen = -1
+        self.highlighted = -1
         self._position = position
         self._run = run
 
@@ -63,7 +63,7 @@ class Menu(Dialog):
                 command.title,
                 command.key_text,
                 key=command.name,
-                chosen=number == self.chosen,
+                highlighted=number == self.highlighted,
                 disabled_reason=command.get_disabled_reason(),
             )
             if is_clicked:
@@ -79,8 +79,8 @@ class Menu(Dialog):
         numbers = [number for number, row in enumerate(self.rows) if _is_enabled(row)]
         if name in _KEY_STEPS and numbers:
             self._move(_KEY_STEPS[name], numbers)
-        elif name in ENTER_KEYS and self.chosen in numbers:
-            self._choose(self.rows[self.chosen])
+        elif name in ENTER_KEYS and self.highlighted in numbers:
+            self._choose(self.rows[self.highlighted])
         return True
 
     def _move(self, step: int, numbers: list[int]) -> None:
@@ -93,13 +93,13 @@ class Menu(Dialog):
         numbers : list of int
             Indices of the enabled rows.
         """
-        if self.chosen in numbers:
-            index = numbers.index(self.chosen) + step
+        if self.highlighted in numbers:
+            index = numbers.index(self.highlighted) + step
         elif step > 0:
             index = 0
         else:
             index = -1
-        self.chosen = numbers[index % len(numbers)]
+        self.highlighted = numbers[index % len(numbers)]
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
         """Move the box to its position, and make it as wide as the longest row."""

@@ -63,7 +63,7 @@ class Choice(Dialog):
         Shown if there are no lines.
     text : str
         Typed text.
-    chosen : int
+    highlighted : int
         Index of the highlighted line.
     top : int
         Index of the first visible line.
@@ -81,7 +81,7 @@ class Choice(Dialog):
     hint: str = "↑ ↓ choose · Enter accepts · Esc closes"
     empty_text: str = "no matches"
     text: str = ""
-    chosen: int = 0
+    highlighted: int = 0
     top: int = 0
     error: str = ""
 
@@ -94,9 +94,9 @@ class Choice(Dialog):
         ui.row(height=32, below=8)
         ui.text_field(_FIELD, self.text, placeholder=self.placeholder)
         self.read_widgets(ui)
-        ui.paragraph(self.error, color=ui.theme.trajectory, bold=True)
+        ui.paragraph(self.error, color=ui.theme.error, bold=True)
         options = list(self.options(self.text))
-        self.chosen = min(self.chosen, max(len(options) - 1, 0))
+        self.highlighted = min(self.highlighted, max(len(options) - 1, 0))
         self._show_options(ui, options)
         ui.row(height=22, below=0)
         count = f"{len(options)} in all · " if len(options) > VISIBLE_OPTIONS else ""
@@ -113,7 +113,7 @@ class Choice(Dialog):
                 option.text,
                 option.note,
                 key=f"option:{number}",
-                chosen=number == self.chosen,
+                highlighted=number == self.highlighted,
                 disabled_reason=option.disabled_reason,
             )
             if is_clicked:
@@ -130,7 +130,7 @@ class Choice(Dialog):
 
     def _set_text(self, text: str) -> None:
         self.text = text
-        self.chosen = 0
+        self.highlighted = 0
         self.top = 0
         self.error = ""
 
@@ -152,7 +152,7 @@ class Choice(Dialog):
     def handle_key(self, name: str, ui: Ui) -> bool:
         """Highlight a line (arrow keys), complete it (Tab) or accept it (Enter)."""
         options = list(self.options(self.text))
-        option = options[self.chosen] if self.chosen < len(options) else None
+        option = options[self.highlighted] if self.highlighted < len(options) else None
         if name in _KEY_STEPS:
             self._move(_KEY_STEPS[name])
         elif name == "tab":
@@ -172,8 +172,8 @@ class Choice(Dialog):
     def _move(self, step: int) -> None:
         """Highlight the line `step` lines below, and scroll it into view."""
         last = max(len(self.options(self.text)) - 1, 0)
-        self.chosen = min(max(self.chosen + step, 0), last)
-        self.top = min(max(self.top, self.chosen - VISIBLE_OPTIONS + 1), self.chosen)
+        self.highlighted = min(max(self.highlighted + step, 0), last)
+        self.top = min(max(self.top, self.highlighted - VISIBLE_OPTIONS + 1), self.highlighted)
 
 
 def create_list_choice(

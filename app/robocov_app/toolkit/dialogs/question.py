@@ -16,7 +16,12 @@ MAX_LINES = 14
 # Lengths in pixels at scale 1.
 _TITLE_PX = 16
 _TEXT_PX = TEXT_PX + 1
+_TITLE_GAP_PX = 6
+_TEXT_GAP_PX = 12
+_BUTTON_HEIGHT_PX = 30
 _BUTTON_GAP_PX = 8
+_BUTTON_MARGIN_PX = 18
+"""Distance of the text of a button from its left and right edges."""
 
 _KEY_STEPS = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}
 
@@ -55,7 +60,7 @@ class Question(Dialog):
     answers : sequence of Answer
     on_cancel : callable
         Called if the user closes the question without an answer.
-    chosen : int
+    highlighted : int
         Index of the highlighted answer, which Enter gives.
     """
 
@@ -63,21 +68,24 @@ class Question(Dialog):
     text: str
     answers: Sequence[Answer]
     on_cancel: Callable[[], object] = _do_nothing
-    chosen: int = 0
+    highlighted: int = 0
 
     def show_content(self, ui: Ui) -> None:
         """Show the title, the text and the answers."""
         ui.paragraph(self.title, size=_TITLE_PX, bold=True)
-        ui.space(6)
+        ui.space(_TITLE_GAP_PX)
         self._show_text(ui)
-        ui.space(12)
-        widths = [measure_text(answer.text, ui.px(TEXT_PX), True) / ui.scale + 36 for answer in self.answers]
+        ui.space(_TEXT_GAP_PX)
+        texts = [answer.text for answer in self.answers]
+        widths = [
+            measure_text(text, ui.px(TEXT_PX), True) / ui.scale + 2 * _BUTTON_MARGIN_PX for text in texts
+        ]
         free_width = max(ui.width - sum(widths) - _BUTTON_GAP_PX * len(widths), 1.0)
-        ui.row(free_width, *widths, height=30, gap=_BUTTON_GAP_PX, below=0)
+        ui.row(free_width, *widths, height=_BUTTON_HEIGHT_PX, gap=_BUTTON_GAP_PX, below=0)
         ui.cell()
         for number, answer in enumerate(self.answers):
             tip = f"Key {answer.key.upper()}" if answer.key else ""
-            if ui.button(answer.text, key=f"answer:{number}", chosen=number == self.chosen, tip=tip):
+            if ui.button(answer.text, key=f"answer:{number}", selected=number == self.highlighted, tip=tip):
                 self._give(answer)
 
     def _show_text(self, ui: Ui) -> None:
@@ -96,10 +104,10 @@ class Question(Dialog):
 
     def handle_key(self, name: str, ui: Ui) -> bool:
         """Highlight an answer (arrow keys, Tab), or give one (Enter or its key)."""
-        self.chosen = (self.chosen + _KEY_STEPS.get(name, 0)) % len(self.answers)
+        self.highlighted = (self.highlighted + _KEY_STEPS.get(name, 0)) % len(self.answers)
         given = next((answer for answer in self.answers if answer.key == name), None)
         if name in ENTER_KEYS:
-            given = self.answers[self.chosen]
+            given = self.answers[self.highlighted]
         if given is not None:
             self._give(given)
         return True

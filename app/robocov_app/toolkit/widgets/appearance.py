@@ -1,5 +1,7 @@
 """Common appearance of widgets: text sizes, boxes, button faces, focus ring and texts."""
 
+from typing import NamedTuple
+
 import pygame
 from pygame import Rect
 
@@ -14,6 +16,26 @@ TEXT_PX = 12.0
 SMALL_TEXT_PX = 11.0
 """Size of the text of small buttons, headings and units."""
 CORNER_RADIUS_PX = 4.0
+EDGE_WIDTH_PX = 0.75
+_FOCUS_RING_WIDTH_PX = 1.5
+
+# Fractions for `shade`.
+EDGE_SHADE = 0.24
+"""Edge of a button or text field."""
+DISABLED_TEXT_SHADE = 0.45
+_DISABLED_EDGE_SHADE = 0.14
+
+
+class _Tint(NamedTuple):
+    """Fractions of a second color that are mixed into the face of a button while it is hovered or held."""
+
+    hovered: float
+    held: float
+
+
+# The accent color is mixed into plain faces, the color of text into selected ones.
+_PLAIN_TINT = _Tint(hovered=0.14, held=0.28)
+_SELECTED_TINT = _Tint(hovered=0.15, held=0.25)
 
 
 def shade(page: Page, fraction: float) -> Color:
@@ -26,6 +48,11 @@ def get_text_size(*, small: bool) -> float:
     if small:
         return SMALL_TEXT_PX
     return TEXT_PX
+
+
+def get_edge_width(page: Page) -> int:
+    """Return the width of the edge of a widget, px."""
+    return max(1, page.px(EDGE_WIDTH_PX))
 
 
 def is_visible(page: Page, rect: Rect) -> bool:
@@ -63,7 +90,7 @@ def draw_box(
     draw_rounded_box(page.surface, rect, fill, edge=edge, radius=page.px(radius), width=width)
 
 
-def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled: bool = True) -> Color:
+def draw_face(page: Page, rect: Rect, key: str, *, selected: bool = False, enabled: bool = True) -> Color:
     """Draw the background of a button or menu, depending on its state, and return the color for its text.
 
     Parameters
@@ -73,8 +100,8 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
         Position in the window, px.
     key : str
         Key of the widget.
-    chosen : bool
-        Whether it is highlighted with the accent color.
+    selected : bool
+        Whether it has the accent color.
     enabled : bool
         Whether it can be used; otherwise it is gray.
 
@@ -86,42 +113,42 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
     is_hovered = page.is_hovered(rect)
     is_held = page.active == key and bool(rect.collidepoint(page.pointer))
     if not enabled:
-        # Disabled: the colors are close to that of the panel, so the button looks faint.
+        # The colors are close to that of the panel, so the button looks faint.
         fill = theme.panel
-        edge = shade(page, 0.14)
-        ink = shade(page, 0.45)
-    elif chosen:
-        # `theme.final` is also the accent color of widgets.
-        fill = mix(theme.final, theme.ink, _choose_strength(0.15, 0.25, is_hovered, is_held))
+        edge = shade(page, _DISABLED_EDGE_SHADE)
+        ink = shade(page, DISABLED_TEXT_SHADE)
+    elif selected:
+        strength = _choose_strength(_SELECTED_TINT, is_hovered=is_hovered, is_held=is_held)
+        fill = mix(theme.accent, theme.ink, strength)
         edge = fill
         ink = get_accent_ink(theme)
     else:
-        strength = _choose_strength(0.14, 0.28, is_hovered, is_held)
-        fill = mix(get_field_color(theme), theme.final, strength)
-        edge = shade(page, 0.24)
+        strength = _choose_strength(_PLAIN_TINT, is_hovered=is_hovered, is_held=is_held)
+        fill = mix(get_field_color(theme), theme.accent, strength)
+        edge = shade(page, EDGE_SHADE)
         if is_held or is_hovered:
-            edge = theme.final
+            edge = theme.accent
         ink = theme.ink
-    draw_box(page, rect, fill, edge=edge, width=max(1, page.px(0.75)))
+    draw_box(page, rect, fill, edge=edge, width=get_edge_width(page))
     draw_focus_ring(page, rect, key)
     return ink
 
 
-def _choose_strength(hovered: float, held: float, is_hovered: bool, is_held: bool) -> float:
-    """Return the fraction of the tint of a face: `held` while pressed, `hovered` under the mouse, else 0."""
+def _choose_strength(tint: _Tint, *, is_hovered: bool, is_held: bool) -> float:
+    """Return the fraction of the tint that a face has in its current state."""
     if is_held:
-        return held
+        return tint.held
     if is_hovered:
-        return hovered
+        return tint.hovered
     return 0.0
 
 
 def draw_focus_ring(page: Page, rect: Rect, key: str) -> None:
     """Draw a ring around a widget if it has the focus."""
     if page.surface is not None and page.focus == key:
-        width = max(2, page.px(1.5))
+        width = max(2, page.px(_FOCUS_RING_WIDTH_PX))
         radius = page.px(CORNER_RADIUS_PX)
-        pygame.draw.rect(page.surface, page.theme.final, rect, width, border_radius=radius)
+        pygame.draw.rect(page.surface, page.theme.accent, rect, width, border_radius=radius)
 
 
 def draw_text(

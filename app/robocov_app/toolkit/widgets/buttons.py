@@ -11,12 +11,14 @@ from robocov_app.look.colors import mix
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import get_accent_ink, get_field_color
 from robocov_app.toolkit.widgets.appearance import (
+    DISABLED_TEXT_SHADE,
     SMALL_TEXT_PX,
     TEXT_PX,
     draw_box,
     draw_face,
     draw_focus_ring,
     draw_text,
+    get_edge_width,
     get_text_size,
     is_visible,
     shade,
@@ -26,12 +28,26 @@ from robocov_app.toolkit.widgets.page import Page, Widget
 # Lengths in pixels at scale 1.
 _MAX_BUTTON_HEIGHT_PX = 32.0
 _LINE_PX = TEXT_PX + 5
+_BUTTON_MARGIN_PX = 3
+_OPTION_MARGIN_PX = 8
+_NOTE_GAP_PX = 12
+_TABS_GAP_PX = 8
 _CHECK_BOX_PX = 16
+_CHECK_BOX_RADIUS_PX = 3.0
 _CHECK_TEXT_LEFT_PX = 23
 _TICK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
 """Corners of the tick, as fractions of the check box."""
+_TICK_WIDTH = 1 / 8
+"""Width of the lines of the tick, as a fraction of the check box."""
 _FINE = 4
 """The tick is drawn larger by this factor and then scaled down, which smooths its edges."""
+
+# Fractions of the accent color that are mixed into the background.
+_HIGHLIGHTED_TINT = 0.2
+_HOVERED_TINT = 0.08
+_HOVERED_BOX_TINT = 0.14
+
+_BOX_EDGE_SHADE = 0.35
 _NO_TITLES: Mapping[str, str] = MappingProxyType({})
 
 
@@ -42,7 +58,7 @@ def show_button(
     key: str = "",
     tip: str = "",
     disabled_reason: str = "",
-    chosen: bool = False,
+    selected: bool = False,
     small: bool = False,
 ) -> bool:
     """Show a button.
@@ -57,8 +73,8 @@ def show_button(
         Tool tip.
     disabled_reason : str
         Why it cannot be pressed; empty if it can.
-    chosen : bool
-        Whether it is highlighted.
+    selected : bool
+        Whether it has the accent color.
     small : bool
         Whether its text is small.
 
@@ -70,17 +86,17 @@ def show_button(
     key = key or text
     rect = page.cell()
     rect.height = min(rect.height, page.px(_MAX_BUTTON_HEIGHT_PX))
-    is_clicked = page.add_clickable(Widget("button", key, rect, text, chosen, tip), disabled_reason)
+    is_clicked = page.add_clickable(Widget("button", key, rect, text, selected, tip), disabled_reason)
     if is_visible(page, rect):
-        ink = draw_face(page, rect, key, chosen=chosen, enabled=not disabled_reason)
+        ink = draw_face(page, rect, key, selected=selected, enabled=not disabled_reason)
         size = get_text_size(small=small)
-        inner = rect.inflate(-page.px(6), 0)
-        draw_text(page, text, inner, ink, size, bold=chosen and not small, align="center")
+        inner = rect.inflate(-page.px(2 * _BUTTON_MARGIN_PX), 0)
+        draw_text(page, text, inner, ink, size, bold=selected and not small, align="center")
     return is_clicked
 
 
 def show_option(
-    page: Page, text: str, note: str = "", *, key: str, chosen: bool = False, disabled_reason: str = ""
+    page: Page, text: str, note: str = "", *, key: str, highlighted: bool = False, disabled_reason: str = ""
 ) -> bool:
     """Show a line of a list that can be clicked.
 
@@ -92,7 +108,7 @@ def show_option(
     note : str
         Faint text at the right end.
     key : str
-    chosen : bool
+    highlighted : bool
         Whether it is highlighted.
     disabled_reason : str
         Why it cannot be chosen; empty if it can.
@@ -103,22 +119,22 @@ def show_option(
         Whether it was just clicked.
     """
     rect = page.cell()
-    is_clicked = page.add_clickable(Widget("option", key, rect, text, chosen), disabled_reason)
+    is_clicked = page.add_clickable(Widget("option", key, rect, text, highlighted), disabled_reason)
     if not is_visible(page, rect):
         return is_clicked
-    if chosen:
-        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.2))
+    if highlighted:
+        draw_box(page, rect, mix(page.theme.panel, page.theme.accent, _HIGHLIGHTED_TINT))
     elif page.is_hovered(rect):
-        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.08))
-    inner = rect.inflate(-page.px(16), 0)
+        draw_box(page, rect, mix(page.theme.panel, page.theme.accent, _HOVERED_TINT))
+    inner = rect.inflate(-page.px(2 * _OPTION_MARGIN_PX), 0)
     draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
     if note:
         # The text must not run into the note.
-        inner.width -= measure_text(note, page.px(SMALL_TEXT_PX)) + page.px(12)
+        inner.width -= measure_text(note, page.px(SMALL_TEXT_PX)) + page.px(_NOTE_GAP_PX)
     lines = text.split("\n")
     ink = page.theme.ink
     if disabled_reason:
-        ink = shade(page, 0.45)
+        ink = shade(page, DISABLED_TEXT_SHADE)
     # Texts are centered vertically in their rectangle: start half the extra lines higher.
     inner.top -= page.px(_LINE_PX * (len(lines) - 1) / 2)
     for number, line in enumerate(lines):
@@ -148,7 +164,7 @@ def show_tabs(
     *widths: float,
     titles: Mapping[str, str] = _NO_TITLES,
 ) -> str | None:
-    """Show a row of buttons, one of which is chosen.
+    """Show a row of buttons, one of which is selected.
 
     Parameters
     ----------
@@ -156,7 +172,7 @@ def show_tabs(
     key : str
     names : sequence of str
     value : str
-        Name of the chosen button.
+        Name of the selected button.
     *widths : float
         Widths of the buttons at scale 1, px; by default they are equal.
     titles : mapping of str to str
@@ -165,15 +181,15 @@ def show_tabs(
     Returns
     -------
     str or None
-        Name of the button that was just clicked; None if none was, or only the chosen one.
+        Name of the button that was just clicked; None if none was, or only the selected one.
     """
-    page.row(*(widths or [0.0] * len(names)), below=8)
+    page.row(*(widths or [0.0] * len(names)), below=_TABS_GAP_PX)
     picked = None
     for name in names:
         title = titles.get(name, name.capitalize())
-        is_chosen = name == value
-        is_clicked = show_button(page, title, key=f"{key}:{name}", chosen=is_chosen, small=True)
-        if is_clicked and not is_chosen:
+        is_selected = name == value
+        is_clicked = show_button(page, title, key=f"{key}:{name}", selected=is_selected, small=True)
+        if is_clicked and not is_selected:
             picked = name
     page.row()
     return picked
@@ -218,21 +234,22 @@ def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> 
     """Draw the box of a check box, with a tick if its value is True."""
     theme = page.theme
     if value:
-        fill = edge = theme.final
+        fill = edge = theme.accent
     elif is_hovered:
-        fill = mix(get_field_color(theme), theme.final, 0.14)
-        edge = theme.final
+        fill = mix(get_field_color(theme), theme.accent, _HOVERED_BOX_TINT)
+        edge = theme.accent
     else:
         fill = get_field_color(theme)
-        edge = shade(page, 0.35)
-    draw_box(page, box, fill, edge=edge, radius=3, width=max(1, page.px(0.75)))
+        edge = shade(page, _BOX_EDGE_SHADE)
+    draw_box(page, box, fill, edge=edge, radius=_CHECK_BOX_RADIUS_PX, width=get_edge_width(page))
     if not value or page.surface is None:
         return
     # Lines with smooth edges: draw the tick enlarged, and scale it down.
     side = _FINE * box.width
     large = Surface((side, side), pygame.SRCALPHA, 32)
+    line_width = max(_FINE, round(_TICK_WIDTH * side))
     corners = [(x * side, y * side) for x, y in _TICK]
     for start, end in pairwise(corners):
-        pygame.draw.line(large, get_accent_ink(theme), start, end, max(4, round(side / 8)))
+        pygame.draw.line(large, get_accent_ink(theme), start, end, line_width)
     tick = pygame.transform.smoothscale(large.premul_alpha(), box.size)
     page.surface.blit(tick, box, special_flags=pygame.BLEND_PREMULTIPLIED)

@@ -7,8 +7,23 @@ from pygame import Rect
 
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_visible
-from robocov_app.toolkit.widgets.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
+from robocov_app.toolkit.widgets.open_list import LIST_EDGE_PX, LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
 from robocov_app.toolkit.widgets.page import Page, Widget
+
+# Lengths in pixels at scale 1.
+_PAGE_MARGIN_PX = 8
+"""Minimum distance of an open list from the edges of the page."""
+_LIST_GAP_PX = 2
+"""Distance between a menu and its list."""
+_LIST_TEXT_MARGINS_PX = 34
+"""Width of a list in addition to its longest option: margins and scroll bar."""
+_TEXT_MARGIN_PX = 9
+_TRIANGLE_SPACE_PX = 12
+_TRIANGLE_RIGHT_PX = 13
+"""Distance of the center of the triangle from the right edge of the menu."""
+_TRIANGLE_DROP_PX = 1
+"""Distance of the center of the triangle below the middle of the menu."""
+_TRIANGLE_SIDE_PX = 4
 
 
 def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, tip: str = "") -> str | None:
@@ -59,34 +74,38 @@ def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:
 def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: Rect) -> OpenList:
     """Build the list below its menu, or above the menu if there is not enough space below but more above."""
     row_height = page.px(LIST_ROW_PX)
-    # The list has an edge of 1 px at its top and bottom.
-    height = min(len(options) * row_height + 2, page.px(MAX_LIST_HEIGHT_PX))
-    space_below = page.box.bottom - menu.bottom - page.px(8)
-    space_above = menu.top - page.box.top - page.px(8)
-    rect = Rect(menu.left, menu.bottom + page.px(2), menu.width, min(height, max(space_below, space_above)))
+    height = min(len(options) * row_height + 2 * LIST_EDGE_PX, page.px(MAX_LIST_HEIGHT_PX))
+    space_below = page.box.bottom - menu.bottom - page.px(_PAGE_MARGIN_PX)
+    space_above = menu.top - page.box.top - page.px(_PAGE_MARGIN_PX)
+    rect = Rect(
+        menu.left, menu.bottom + page.px(_LIST_GAP_PX), menu.width, min(height, max(space_below, space_above))
+    )
     if space_below < height and space_above > space_below:
-        rect.bottom = menu.top - page.px(2)
+        rect.bottom = menu.top - page.px(_LIST_GAP_PX)
     longest = max((measure_text(option, page.px(TEXT_PX)) for option in options), default=0)
-    rect.width = min(max(longest + page.px(34), menu.width), page.box.width - page.px(16))
-    rect.right = min(rect.right, page.box.right - page.px(8))
+    rect.width = min(
+        max(longest + page.px(_LIST_TEXT_MARGINS_PX), menu.width),
+        page.box.width - page.px(2 * _PAGE_MARGIN_PX),
+    )
+    rect.right = min(rect.right, page.box.right - page.px(_PAGE_MARGIN_PX))
     open_list = OpenList(key, list(options), rect, row_height)
     if value in options:
-        open_list.choose(open_list.options.index(value))
+        open_list.highlight(open_list.options.index(value))
     else:
-        open_list.choose(0)
+        open_list.highlight(0)
     return open_list
 
 
 def _draw_menu(page: Page, key: str, value: str, rect: Rect) -> None:
     """Draw a closed menu: its face, the current option, and a triangle that points down."""
     ink = draw_face(page, rect, key)
-    text_rect = rect.inflate(-page.px(18), 0)
-    text_rect.width -= page.px(12)
+    text_rect = rect.inflate(-page.px(2 * _TEXT_MARGIN_PX), 0)
+    text_rect.width -= page.px(_TRIANGLE_SPACE_PX)
     draw_text(page, value, text_rect, ink, TEXT_PX)
     if page.surface is None:
         return
-    x = rect.right - page.px(13)
-    y = rect.centery + page.px(1)
-    side = page.px(4)
+    x = rect.right - page.px(_TRIANGLE_RIGHT_PX)
+    y = rect.centery + page.px(_TRIANGLE_DROP_PX)
+    side = page.px(_TRIANGLE_SIDE_PX)
     corners = [(x - side, y - side // 2), (x + side, y - side // 2), (x, y + side // 2 + 1)]
     pygame.draw.polygon(page.surface, ink, corners)

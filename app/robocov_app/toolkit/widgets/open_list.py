@@ -16,6 +16,20 @@ from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, get_wheel
 MAX_LIST_HEIGHT_PX = 268.0
 LIST_ROW_PX = 24.0
 _TEXT_PX = 12.0
+_RADIUS_PX = 4
+_TEXT_LEFT_PX = 8
+_TEXT_MARGINS_PX = 14
+_SCROLLED_TEXT_MARGINS_PX = 24
+"""Margins of the text next to a scroll bar."""
+_BAR_WIDTH_PX = 6
+_BAR_MARGIN_PX = 2
+LIST_EDGE_PX = 1
+"""Width of the edge of a list, at any scale."""
+
+# Fractions of the second color that are mixed into the first one.
+_EDGE_STRENGTH = 0.4
+_BAR_STRENGTH = 0.3
+_HIGHLIGHT_STRENGTH = 0.25
 
 _TO_END = 9999
 """A step past the end of any list; the result is clamped to the list."""
@@ -47,7 +61,7 @@ class OpenList:
         Position in the window, px.
     row_height : int
         Height of an option, px.
-    chosen : int
+    highlighted : int
         Index of the highlighted option.
     top : float
         Scroll offset: the height of the options hidden above the visible part, px.
@@ -59,39 +73,45 @@ class OpenList:
     options: list[str]
     rect: Rect
     row_height: int
-    chosen: int = 0
+    highlighted: int = 0
     top: float = 0.0
     picked: str | None = None
 
     @property
     def max_top(self) -> float:
         """Maximum of `top`: the height by which the options exceed the list, px."""
-        return max(len(self.options) * self.row_height + 2 - self.rect.height, 0)
+        return max(len(self.options) * self.row_height + 2 * LIST_EDGE_PX - self.rect.height, 0)
+
+    @property
+    def _inner_rect(self) -> Rect:
+        """The part of the list inside its edge."""
+        return self.rect.inflate(-2 * LIST_EDGE_PX, -2 * LIST_EDGE_PX)
 
     def get_item_rect(self, number: int) -> Rect:
         """Return the position of an option in the window, even if it is scrolled out of view."""
-        y = self.rect.top + 1 + number * self.row_height - round(self.top)
-        return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row_height)
+        inner = self._inner_rect
+        y = inner.top + number * self.row_height - round(self.top)
+        return Rect(inner.left, y, inner.width, self.row_height)
 
     def find_item(self, pixel: tuple[int, int]) -> int | None:
         """Return the index of the option at a pixel; None if there is none."""
-        number = int((pixel[1] - self.rect.top - 1 + self.top) // self.row_height)
+        number = int((pixel[1] - self._inner_rect.top + self.top) // self.row_height)
         is_item = self.rect.collidepoint(pixel) and 0 <= number < len(self.options)
         return number if is_item else None
 
-    def choose(self, number: int) -> None:
+    def highlight(self, number: int) -> None:
         """Highlight the option with this index, limited to the list, and scroll it into view."""
-        self.chosen = min(max(number, 0), len(self.options) - 1)
+        self.highlighted = min(max(number, 0), len(self.options) - 1)
         # Range of scroll offsets at which the whole option is visible.
-        low = self.chosen * self.row_height
-        high = (self.chosen + 1) * self.row_height + 2 - self.rect.height
+        low = self.highlighted * self.row_height
+        high = (self.highlighted + 1) * self.row_height + 2 * LIST_EDGE_PX - self.rect.height
         self.top = min(max(self.top, high, 0.0), low)
 
-    def highlight(self, pixel: tuple[int, int]) -> None:
+    def highlight_at(self, pixel: tuple[int, int]) -> None:
         """Highlight the option at a pixel, if there is one."""
         number = self.find_item(pixel)
         if number is not None:
-            self.chosen = number
+            self.highlighted = number
 
     def handle_event(self, event: pygame.event.Event) -> ListResponse:
         """Handle an event. While the list is open, it gets all events."""
@@ -113,11 +133,11 @@ class OpenList:
     def _handle_key(self, name: str) -> ListResponse:
         """Handle a key: move the highlight, pick an option, or close the list on any other key."""
         if name in _KEY_STEPS:
-            self.choose(self.chosen + _KEY_STEPS[name])
+            self.highlight(self.highlighted + _KEY_STEPS[name])
             return ListResponse.HANDLED
         if name in (*ENTER_KEYS, "space"):
-            return self._pick(self.chosen)
-        if len(name) == 1 and self._choose_by_letter(name):
+            return self._pick(self.highlighted)
+        if len(name) == 1 and self._highlight_by_letter(name):
             return ListResponse.HANDLED
         if is_function_key(name):
             return ListResponse.IGNORED
@@ -127,39 +147,43 @@ class OpenList:
         self.picked = self.options[number]
         return ListResponse.PICKED
 
-    def _choose_by_letter(self, letter: str) -> bool:
+    def _highlight_by_letter(self, letter: str) -> bool:
         """Highlight the next option that starts with a letter; return whether there is one."""
         numbers = [k for k, option in enumerate(self.options) if option.lower().startswith(letter)]
         if not numbers:
             return False
-        self.choose(next((number for number in numbers if number > self.chosen), numbers[0]))
+        self.highlight(next((number for number in numbers if number > self.highlighted), numbers[0]))
         return True
 
     def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
         """Draw the list over the window."""
         field = get_field_color(theme)
-        edge = mix(theme.panel, theme.ink, 0.4)
-        draw_rounded_box(screen, self.rect, field, edge=edge, radius=round(4 * scale))
-        inner = self.rect.inflate(-2, -2)
-        text_margin = round((24 if self.max_top else 14) * scale)
+        edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
+        draw_rounded_box(screen, self.rect, field, edge=edge, radius=round(_RADIUS_PX * scale))
+        inner = self._inner_rect
+        text_margins = _TEXT_MARGINS_PX
+        if self.max_top:
+            text_margins = _SCROLLED_TEXT_MARGINS_PX
+        max_text_width = inner.width - round(text_margins * scale)
+        text_left = inner.left + round(_TEXT_LEFT_PX * scale)
         size = round(_TEXT_PX * scale)
         screen.set_clip(inner)
         for number, option in enumerate(self.options):
             item = self.get_item_rect(number)
             if not item.colliderect(inner):
                 continue
-            if number == self.chosen:
-                screen.fill(mix(field, theme.final, 0.25), item)
-            text = render_text(shorten_to_width(option, size, item.width - text_margin), size, theme.ink)
-            screen.blit(text, text.get_rect(midleft=(item.left + round(8 * scale), item.centery)))
+            if number == self.highlighted:
+                screen.fill(mix(field, theme.accent, _HIGHLIGHT_STRENGTH), item)
+            text = render_text(shorten_to_width(option, size, max_text_width), size, theme.ink)
+            screen.blit(text, text.get_rect(midleft=(text_left, item.centery)))
         if self.max_top:
             self._draw_scroll_bar(screen, inner, theme, scale)
         screen.set_clip(None)
 
     def _draw_scroll_bar(self, screen: Surface, inner: Rect, theme: Theme, scale: float) -> None:
         full_height = inner.height + self.max_top
-        bar = Rect(0, 0, round(6 * scale), round(inner.height * inner.height / full_height))
+        bar = Rect(0, 0, round(_BAR_WIDTH_PX * scale), round(inner.height * inner.height / full_height))
         top = inner.top + round(self.top * inner.height / full_height)
-        bar.topright = inner.right - round(2 * scale), top
-        color = mix(theme.panel, theme.ink, 0.3)
-        draw_rounded_box(screen, bar, color, edge=color, radius=round(3 * scale))
+        bar.topright = inner.right - round(_BAR_MARGIN_PX * scale), top
+        color = mix(theme.panel, theme.ink, _BAR_STRENGTH)
+        draw_rounded_box(screen, bar, color, edge=color, radius=round(_BAR_WIDTH_PX / 2 * scale))

@@ -47,7 +47,7 @@ class PageEvents:
         page = self._page
         page.pointer = event.pos
         if page.open_list is not None:
-            page.open_list.highlight(event.pos)
+            page.open_list.highlight_at(event.pos)
         if page.active is None:
             hovered = ""
             widget = next(page.find_hovered_widgets(), None)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import pygame
 from pygame import Rect
@@ -17,7 +18,33 @@ PANEL_MARGIN_PX = 12.0
 _NOTCH_PX = 40.0
 """Distance scrolled by one notch of the wheel."""
 _MIN_KNOB_PX = 20
+_BAR_GAP_PX = 4
+"""Distance between the content and the scroll bar."""
+_BAR_RIGHT_PX = 1
+"""Distance of the scroll bar from the right edge of the area."""
+_KNOB_MARGINS_PX = (4, 2)
+"""How much narrower and lower than its area the knob is drawn."""
 _HEIGHT_TOLERANCE_PX = 0.5
+
+# Fractions of the color of text in the color of the knob.
+_KNOB_SHADE = 0.3
+_HOVERED_KNOB_SHADE = 0.45
+_HELD_KNOB_SHADE = 0.55
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """A scroll bar: its track and knob in the window, and the maximum scroll offset at scale 1, px."""
+
+    key: str
+    track: Rect
+    knob: Rect
+    max_offset: float
+
+    @property
+    def free_height(self) -> int:
+        """Distance over which the knob can move, px."""
+        return max(self.track.height - self.knob.height, 1)
 
 
 @contextmanager
@@ -42,7 +69,7 @@ def scroll(page: Page, key: str) -> Iterator[None]:
     page.scroll_offsets[key] = offset
     if max_offset:
         offset = _show_bar(page, key, area, content_height, offset)
-        page.width -= BAR_WIDTH_PX + 4 - PANEL_MARGIN_PX
+        page.width -= BAR_WIDTH_PX + _BAR_GAP_PX - PANEL_MARGIN_PX
     page.clip = page.clip.clip(area)
     if page.surface is not None:
         page.surface.set_clip(page.clip)
@@ -111,37 +138,55 @@ def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: f
     -------
     float
     """
+    bar = _build_bar(page, key, area, content_height, offset)
+    offset = _read_bar(page, bar, area, offset)
+    page.scroll_offsets[key] = offset
+    page.widgets[bar.key] = Widget("bar", key, bar.knob, value=offset)
+    _draw_bar(page, bar)
+    return offset
+
+
+def _build_bar(page: Page, key: str, area: Rect, content_height: float, offset: float) -> _Bar:
+    """Lay out the scroll bar of an area; the parameters are those of `_show_bar`."""
     height = area.height / page.scale
     max_offset = content_height - height
-    bar_key = f"bar:{key}"
-    track = Rect(area.right - page.px(BAR_WIDTH_PX + 1), area.top, page.px(BAR_WIDTH_PX), area.height)
+    left = area.right - page.px(BAR_WIDTH_PX + _BAR_RIGHT_PX)
+    track = Rect(left, area.top, page.px(BAR_WIDTH_PX), area.height)
     knob_height = max(round(track.height * height / content_height), page.px(_MIN_KNOB_PX))
-    free_height = max(track.height - knob_height, 1)
-    knob = Rect(track.left, track.top + round(free_height * offset / max_offset), track.width, knob_height)
+    bar = _Bar(f"bar:{key}", track, Rect(track.topleft, (track.width, knob_height)), max_offset)
+    bar.knob.top += round(bar.free_height * offset / max_offset)
+    return bar
+
+
+def _read_bar(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
+    """Return the scroll offset after the mouse event of this run: a turn of the wheel, a press or a drag."""
     event = page.get_event()
-    is_pressed = page.is_pressed(track)
-    is_dragged = page.active == bar_key and page.is_event(pygame.MOUSEMOTION)
+    is_pressed = page.is_pressed(bar.track)
+    is_dragged = page.active == bar.key and page.is_event(pygame.MOUSEMOTION)
     if event is not None and event.type == pygame.MOUSEWHEEL and area.collidepoint(page.pointer):
         offset -= get_wheel_notches(event) * _NOTCH_PX
         page.consume_event()
     elif is_pressed or is_dragged:
-        is_on_knob = is_pressed and bool(knob.collidepoint(page.pointer))
+        is_on_knob = is_pressed and bool(bar.knob.collidepoint(page.pointer))
         if is_pressed:
-            page.active = bar_key
+            page.active = bar.key
             page.consume_event()
-            page.grab_offset = knob.height / 2
+            page.grab_offset = bar.knob.height / 2
             if is_on_knob:
-                page.grab_offset = page.pointer[1] - knob.top
+                page.grab_offset = page.pointer[1] - bar.knob.top
         # A press beside the knob moves the middle of the knob there at once.
         if not is_on_knob:
-            offset = (page.pointer[1] - page.grab_offset - track.top) / free_height * max_offset
-    offset = min(max(offset, 0.0), max_offset)
-    page.scroll_offsets[key] = offset
-    page.widgets[bar_key] = Widget("bar", key, knob, value=offset)
-    strength = 0.3
-    if page.active == bar_key:
-        strength = 0.55
-    elif page.is_hovered(track):
-        strength = 0.45
-    draw_box(page, knob.inflate(-page.px(4), -page.px(2)), shade(page, strength), radius=BAR_WIDTH_PX / 2)
-    return offset
+            knob_offset = page.pointer[1] - page.grab_offset - bar.track.top
+            offset = knob_offset / bar.free_height * bar.max_offset
+    return min(max(offset, 0.0), bar.max_offset)
+
+
+def _draw_bar(page: Page, bar: _Bar) -> None:
+    strength = _KNOB_SHADE
+    if page.active == bar.key:
+        strength = _HELD_KNOB_SHADE
+    elif page.is_hovered(bar.track):
+        strength = _HOVERED_KNOB_SHADE
+    margin_x, margin_y = _KNOB_MARGINS_PX
+    knob = bar.knob.inflate(-page.px(margin_x), -page.px(margin_y))
+    draw_box(page, knob, shade(page, strength), radius=BAR_WIDTH_PX / 2)

@@ -13,6 +13,19 @@ from robocov_app.toolkit.widgets.page import Page, Widget
 _TRACK_HEIGHT_PX = 14
 _KNOB_WIDTH_PX = 12
 _KNOB_RADIUS_PX = 5
+_GROOVE_INSET_PX = 4
+"""Distance from the edge of the track to the groove, at the top and at the bottom."""
+
+_GROOVE_SHADE = 0.18
+_DISABLED_SHADE = 0.35
+_FILL_STRENGTH = 0.6
+"""Fraction of the accent color in the groove to the left of the knob."""
+_HOVERED_STRENGTH = 0.2
+"""Fraction of the color of text in the knob under the mouse."""
+_HELD_STRENGTH = 0.3
+"""The same while the knob is held."""
+_MIN_SPAN = 1e-300
+"""Avoids a division by zero."""
 
 _KEY_STEPS = {"left": -1, "down": -1, "right": 1, "up": 1}
 _STEPS_OF_KEYS = 50
@@ -32,7 +45,7 @@ class _Range:
     @property
     def span(self) -> float:
         """Difference of the values at the ends."""
-        return max(self.high - self.low, 1e-300)
+        return max(self.high - self.low, _MIN_SPAN)
 
     @property
     def free_width(self) -> int:
@@ -123,19 +136,19 @@ def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabl
     theme = page.theme
     track = values.track
     knob_offset = round(fraction * (track.width - values.knob_width))
-    groove = track.inflate(0, -page.px(8))
+    groove = track.inflate(0, -page.px(2 * _GROOVE_INSET_PX))
     radius = groove.height // 2 / page.scale
-    draw_box(page, groove, shade(page, 0.18), radius=radius)
-    groove.width = max(knob_offset + page.px(6), groove.height)
-    accent = shade(page, 0.35)
+    draw_box(page, groove, shade(page, _GROOVE_SHADE), radius=radius)
+    groove.width = max(knob_offset + page.px(_KNOB_WIDTH_PX / 2), groove.height)
+    accent = shade(page, _DISABLED_SHADE)
     if enabled:
-        accent = theme.final
-    draw_box(page, groove, mix(theme.panel, accent, 0.6), radius=radius)
+        accent = theme.accent
+    draw_box(page, groove, mix(theme.panel, accent, _FILL_STRENGTH), radius=radius)
     strength = 0.0
     if page.active == key:
-        strength = 0.3
+        strength = _HELD_STRENGTH
     elif enabled and page.is_hovered(track):
-        strength = 0.2
+        strength = _HOVERED_STRENGTH
     knob = Rect(track.left + knob_offset, track.top, values.knob_width, page.px(_TRACK_HEIGHT_PX))
     draw_box(page, knob, mix(accent, theme.ink, strength), radius=_KNOB_RADIUS_PX)
     draw_focus_ring(page, track, key)

@@ -8,7 +8,15 @@ from pygame import Rect, Surface
 from robocov_app.look.colors import Color, mix
 from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import get_field_color
-from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_visible, shade
+from robocov_app.toolkit.widgets.appearance import (
+    EDGE_SHADE,
+    TEXT_PX,
+    draw_box,
+    draw_text,
+    get_edge_width,
+    is_visible,
+    shade,
+)
 from robocov_app.toolkit.widgets.page import Page, Widget
 from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.window.input import ENTER_KEYS
@@ -16,6 +24,13 @@ from robocov_app.toolkit.window.input import ENTER_KEYS
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 6
 _CURSOR_HEIGHT_PX = 17
+_CURSOR_WIDTH_PX = 1
+_INNER_MARGIN_PX = 2
+"""Margin of the text above and below it; also the space for the cursor at both ends of the text."""
+_EDITED_EDGE_WIDTH_PX = 1.25
+
+_SELECTION_STRENGTH = 0.35
+"""Fraction of the accent color in the background of selected text."""
 
 
 def show_text_field(
@@ -102,7 +117,7 @@ def _get_text_color(page: Page, text: str) -> Color:
 
 
 def _get_inner(page: Page, rect: Rect) -> Rect:
-    return rect.inflate(-page.px(2 * _MARGIN_PX), -page.px(4))
+    return rect.inflate(-page.px(2 * _MARGIN_PX), -page.px(2 * _INNER_MARGIN_PX))
 
 
 def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
@@ -120,16 +135,16 @@ def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
 def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
     """Return how far a long text is shifted to the left to keep its caret visible, px."""
     width_before = measure_text(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
-    return max(width_before - (rect.width - page.px(14)), 0)
+    return max(width_before - (rect.width - page.px(2 * (_MARGIN_PX + _CURSOR_WIDTH_PX))), 0)
 
 
 def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
-    edge = shade(page, 0.24)
+    edge = shade(page, EDGE_SHADE)
     if is_edited or page.is_hovered(rect):
-        edge = page.theme.final
-    width = max(1, page.px(0.75))
+        edge = page.theme.accent
+    width = get_edge_width(page)
     if is_edited:
-        width = max(2, page.px(1.25))
+        width = max(2, page.px(_EDITED_EDGE_WIDTH_PX))
     draw_box(page, rect, get_field_color(page.theme), edge=edge, width=width)
 
 
@@ -139,19 +154,19 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     size = page.px(TEXT_PX)
     clip = screen.get_clip()
     inner = _get_inner(page, rect)
-    screen.set_clip(inner.inflate(page.px(4), 0).clip(clip))
+    screen.set_clip(inner.inflate(page.px(2 * _INNER_MARGIN_PX), 0).clip(clip))
     left = inner.left - _compute_shift(page, edit, rect)
     start, end = (measure_text(edit.text[:position], size) for position in edit.selection)
     selection = Rect(left + start, 0, end - start, page.px(_CURSOR_HEIGHT_PX))
     selection.centery = rect.centery
     if start != end:
-        screen.fill(mix(get_field_color(theme), theme.final, 0.35), selection)
+        screen.fill(mix(get_field_color(theme), theme.accent, _SELECTION_STRENGTH), selection)
     # Composed text is shown at the caret and underlined, although it is not part of the text yet.
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
     image = render_text(text or placeholder, size, _get_text_color(page, text))
     screen.blit(image, image.get_rect(midleft=(left, rect.centery)))
     x = left + measure_text(edit.text[: edit.caret], size)
-    line_width = max(1, page.px(1))
+    line_width = max(1, page.px(_CURSOR_WIDTH_PX))
     if edit.composed:
         width = measure_text(edit.composed, size)
         screen.fill(theme.ink, (x, selection.bottom - 1, width, line_width))

@@ -87,16 +87,16 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        canvas.draw_outline(corners, canvas.theme.final, canvas.scale_width(1.5))
+        canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(1.5))
 
 
 def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
     if len(points) < 2:
         return
-    canvas.draw_outline(points, canvas.theme.final, canvas.scale_width(1.5), is_closed=False)
+    canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(1.5), is_closed=False)
     if is_closed:
         canvas.draw_dashed_line(
-            points[-1].tolist(), points[0].tolist(), canvas.theme.final, canvas.scale_width(1.0)
+            points[-1].tolist(), points[0].tolist(), canvas.theme.accent, canvas.scale_width(1.0)
         )
 
 
@@ -105,4 +105,4 @@ def _draw_marks(canvas: Canvas, points: Array) -> None:
     for x, y in points.tolist():
         box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
         pygame.draw.rect(canvas.surface, canvas.theme.background, box)
-        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.scale_width(1.5))
+        pygame.draw.rect(canvas.surface, canvas.theme.accent, box, canvas.scale_width(1.5))

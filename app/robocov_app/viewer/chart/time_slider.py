@@ -52,7 +52,7 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
     theme = frame.theme
     size = theme.small_text
     if not frame.timeline.is_live:
-        canvas.draw_text("past", (left, middle), color=theme.final, bold=True, size=size)
+        canvas.draw_text("past", (left, middle), color=theme.accent, bold=True, size=size)
         return
     if not frame.timeline.history.thinned:
         canvas.draw_text("live", (left, middle), color=theme.start, bold=True, size=size)
@@ -75,8 +75,8 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
     # Gray up to the simulated time; if the past is displayed, colored up to the displayed time.
     _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, 0.4))
     if not timeline.is_live:
-        _fill_bar(screen, frame, column, theme.final)
-        frame.draw_rule(screen, column, theme.final, top=frame.layout.chart.top)
+        _fill_bar(screen, frame, column, theme.accent)
+        frame.draw_rule(screen, column, theme.accent, top=frame.layout.chart.top)
     dot_radius = max(_MIN_EVENT_DOT_RADIUS_PX, round(_EVENT_DOT_PX * frame.scale) / 2)
     dot = partial(sprites.render_dot, dot_radius, theme.ink)
     for event in timeline.events:
@@ -84,7 +84,7 @@ def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
     handle = partial(
         sprites.render_disc,
         round(2 * _HANDLE_RADIUS_PX * frame.scale) / 2,
-        fill=theme.ink if timeline.is_live else theme.final,
+        fill=theme.ink if timeline.is_live else theme.accent,
         ring=theme.background,
         ring_width=_HANDLE_RING_PX * frame.scale,
         edge=theme.faint,

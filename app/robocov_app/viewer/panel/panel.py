@@ -214,10 +214,10 @@ class ViewerPanel(CommandPanel):
             ui,
             "Pause" if session.playback.is_playing else "Play",
             "pause",
-            chosen=not session.playback.is_playing,
+            selected=not session.playback.is_playing,
         )
         self.show_button(ui, "Step", "step")
-        self.show_button(ui, "Settle", "settle", chosen=session.playback.stop_when_settled)
+        self.show_button(ui, "Settle", "settle", selected=session.playback.stop_when_settled)
         self.show_button(ui, "Restart", "restart")
         ui.row(46, 0, 42, height=22)
         ui.label("Speed")
@@ -285,7 +285,7 @@ class ViewerPanel(CommandPanel):
             for choice in choices:
                 is_on = choice == parameter.value
                 key = f"{name}:{choice}"
-                if ui.button(choice, key=key, tip=parameter.meaning, chosen=is_on, small=True):
+                if ui.button(choice, key=key, tip=parameter.meaning, selected=is_on, small=True):
                     self._set(name, choice)
         else:
             chosen = ui.dropdown(name, choices, parameter.value, tip=parameter.meaning)
@@ -315,7 +315,7 @@ class ViewerPanel(CommandPanel):
                     self._run_command(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)
-            self.show_button(ui, "Fading", "fade", chosen=view.fades_trajectories)
+            self.show_button(ui, "Fading", "fade", selected=view.fades_trajectories)
             self.show_button(ui, "Dark" if view.theme == "light" else "Light", "theme")
             self.show_button(ui, "Whole map", "fit")
 
@@ -341,7 +341,7 @@ class ViewerPanel(CommandPanel):
         for label, command in _FILE_BUTTONS:
             is_recording = command == "video" and self.viewer.view.is_recording
             text = "Stop video" if is_recording else label
-            self.show_button(ui, text, command, chosen=is_recording)
+            self.show_button(ui, text, command, selected=is_recording)
 
 
 def show_report(ui: Ui, report: RobotReport) -> None:
