@@ -34,16 +34,16 @@ END_TIMEOUT_S = 1.0  # for all pages to close their sockets at the end of the se
 # WebSocket close codes, which page.html interprets.
 WINDOW_CLOSED = 1001
 NOT_UNDERSTOOD = 1008
-FAULT = 1011
+INTERNAL_ERROR = 1011
 WINDOW_ENDED = 1012  # the page connects again by itself
 TRY_AGAIN_LATER = 1013
 REPLACED = 4001  # the page does not connect again by itself
 
 Answer = Callable[["ServerConnection", "Request"], Awaitable["Response | None"]]
-Talk = Callable[["ServerConnection"], Awaitable[None]]
+ServePage = Callable[["ServerConnection"], Awaitable[None]]
 
 
-def report_fault(message: str) -> None:
+def report_exception(message: str) -> None:
     """Print a message and the traceback of the current exception on stderr."""
     report(f"{message}\n{traceback.format_exc()}")
 
@@ -60,13 +60,13 @@ class Listener:
     ----------
     answer : callable
         Coroutine that returns the response to a request; None if the request may open a socket.
-    talk : callable
+    serve_page : callable
         Coroutine that exchanges messages with a page as long as its socket is open.
     """
 
-    def __init__(self, answer: Answer, talk: Talk) -> None:
+    def __init__(self, answer: Answer, serve_page: ServePage) -> None:
         self._answer = answer
-        self._talk = talk
+        self._serve_page = serve_page
         self._connections: set[ServerConnection] = set()
         self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # oldest first
         self._files: dict[ServerConnection, int] = {}  # bytes of the files that browsers are downloading
@@ -173,7 +173,7 @@ class Listener:
         try:
             response = await self._answer(connection, request)
         except Exception:
-            report_fault("a request of a browser failed")
+            report_exception("a request of a browser failed")
             return respond(connection, HTTPStatus.INTERNAL_SERVER_ERROR, "The request failed.\n")
         if response is None:
             return None
@@ -196,11 +196,11 @@ class Listener:
     async def _handle_socket(self, connection: ServerConnection) -> None:
         self._stop_request_timer(connection)
         try:
-            await self._talk(connection)
+            await self._serve_page(connection)
         except Exception:
-            report_fault("the connection to a page failed")
+            report_exception("the connection to a page failed")
             with suppress(Exception):
-                await connection.close(FAULT, "The server had a fault.")
+                await connection.close(INTERNAL_ERROR, "Internal server error.")
 
 
 def _raise_file_limit() -> None:

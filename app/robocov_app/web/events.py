@@ -110,10 +110,17 @@ class TextPasted(_Message):
     text: Annotated[str, Field(max_length=100_000), _Lines]
 
 
-class Left(_Message):
-    """The pointer has left the page, or the page has lost the keyboard focus."""
+class PointerLeft(_Message):
+    """The pointer has left the page."""
 
-    kind: Literal["leave", "blur"]
+    kind: Literal["leave"]
+    held: Literal[0] = 0
+
+
+class FocusLost(_Message):
+    """The page has lost the keyboard focus."""
+
+    kind: Literal["blur"]
     held: Literal[0] = 0
 
 
@@ -134,14 +141,14 @@ class FrameShown(_Message):
     number: int = Field(ge=0, lt=2**32)
 
 
-class Control(_Message):
+class ControlPassed(_Message):
     """Control is handed to the page with a number; 0 requests control."""
 
     kind: Literal["control"]
     to: int = Field(ge=0, lt=2**31)
 
 
-class Named(_Message):
+class NameEntered(_Message):
     """The user of a page has entered a name."""
 
     kind: Literal["name"]
@@ -163,9 +170,11 @@ class Uploaded(_Message):
     path: str
 
 
-InputMessage = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
+InputMessage = (
+    PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | PointerLeft | FocusLost
+)
 """Messages with input for a window."""
-Message = InputMessage | PageChanged | FrameShown | Control | Named | UploadStarted
+Message = InputMessage | PageChanged | FrameShown | ControlPassed | NameEntered | UploadStarted
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
 _KEYS_WITH_SAME_NAME = [
     *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
@@ -234,8 +243,11 @@ class EventTranslator:
                 yield from _press_key("v", held=_CTRL)
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)
-            case Left():
-                yield from self._leave(message)
+            case PointerLeft():
+                yield Event(pygame.WINDOWLEAVE)
+            case FocusLost():
+                yield from self._release_button()
+                yield Event(pygame.WINDOWFOCUSLOST)
 
     def _change_button(self, message: ButtonChanged) -> Iterator[Event]:
         if message.down:
@@ -248,15 +260,11 @@ class EventTranslator:
             kind = pygame.MOUSEBUTTONUP
         yield Event(kind, pos=self._position, button=message.button, touch=False)
 
-    def _leave(self, message: Left) -> Iterator[Event]:
-        if message.kind == "leave":
-            yield Event(pygame.WINDOWLEAVE)
-            return
+    def _release_button(self) -> Iterator[Event]:
+        """Release the pressed button, because without the focus the page will not notice its release."""
         if self._pressed_button:
-            # Without the focus, the page will not notice when the button is released.
             yield Event(pygame.MOUSEBUTTONUP, pos=self._position, button=self._pressed_button, touch=False)
             self._pressed_button = 0
-        yield Event(pygame.WINDOWFOCUSLOST)
 
     def _move(self, x: float, y: float, button: int) -> Event:
         previous_x, previous_y = self._position

@@ -104,7 +104,7 @@ def check_name(name: str) -> None:
     """Raise `TransferError` if a file with this name cannot be uploaded."""
     path = Path(name)
     if not name or path.name != name or "\\" in name or name.startswith("."):
-        raise TransferError("expected the name of a file without folders")
+        raise TransferError("expected a file name without a folder")
     if not name.isprintable():
         raise TransferError("expected a file name of printable characters")
     if len(name.encode()) > MAX_NAME_BYTES:

@@ -6,6 +6,7 @@ import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from time import monotonic
+from typing import NamedTuple
 
 from robocov_app.web.frames import BaseFrames, Frame, encode_frame
 from robocov_app.web.pages import Page, Pages
@@ -17,6 +18,13 @@ MAX_INDIVIDUAL_PAGES = 3
 SHARED_FRAME_INTERVAL_S = 1 / 15
 """Time between frames if there are more pages. They share frames, each of which is encoded once."""
 _MIN_TIMEOUT_S = 0.001
+
+
+class _Delivery(NamedTuple):
+    """A frame, and the page to which it is sent next."""
+
+    page: Page
+    frame: Frame
 
 
 class FrameDelivery:
@@ -50,35 +58,37 @@ class FrameDelivery:
         """Deliver frames until the task is canceled."""
         while True:
             self.has_work.clear()
-            page, frame = self._choose()
-            if page is None or frame is None:
+            delivery = self._choose_delivery()
+            if delivery is None:
                 await self._wait_for_work()
             else:
-                await self._deliver(page, frame)
+                await self._deliver(delivery.page, delivery.frame)
             self.bases.keep_only({page.base_number for page in self._pages})
 
     def close(self) -> None:
         """End the thread that encodes frames."""
         self._encoder.shutdown(wait=False, cancel_futures=True)
 
-    def _choose(self) -> tuple[Page | None, Frame | None]:
-        """Return the page that gets the next frame, and that frame; (None, None) if no page is ready.
+    def _choose_delivery(self) -> _Delivery | None:
+        """Return the page that gets the next frame, and that frame; None if no page is ready.
 
         The controlling page and the others take turns. Among the others, the page that shows the oldest frame
         comes first.
         """
         controlling = self._pages.controlling
-        controlling_is_ready = controlling is not None and controlling.is_ready_for(self.newest)
-        if controlling_is_ready and not self._controlling_was_last:
-            return controlling, self.newest
-        others = [page for page in self._pages if page is not controlling]
-        self._update_shared_frame(len(others))
-        ready = [page for page in others if page.is_ready_for(self._shared_frame)]
-        if ready:
-            return min(ready, key=lambda page: page.base_number), self._shared_frame
-        if controlling_is_ready:
-            return controlling, self.newest
-        return None, None
+        newest = self.newest
+        to_controlling: _Delivery | None = None
+        if controlling is not None and newest is not None and controlling.is_ready_for(newest):
+            to_controlling = _Delivery(controlling, newest)
+        if to_controlling is not None and not self._controlling_was_last:
+            return to_controlling
+        watching = [page for page in self._pages if page is not controlling]
+        self._update_shared_frame(len(watching))
+        frame = self._shared_frame
+        ready = [page for page in watching if page.is_ready_for(frame)]
+        if ready and frame is not None:
+            return _Delivery(min(ready, key=lambda page: page.base_number), frame)
+        return to_controlling
 
     def _update_shared_frame(self, page_count: int) -> None:
         """Update the frame for the other pages; with many of them, only every `SHARED_FRAME_INTERVAL_S`."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MAX_VIEWERS = 100
 """Maximum number of pages opened with the watch link."""
-MAX_TEACHERS = 16
+MAX_CONTROL_PAGES = 16
 """Maximum number of pages opened with the control link. If one more is opened, the oldest is closed."""
 MAX_NOTICES = 8
 """Maximum number of notices waiting to be sent to a page."""
@@ -27,8 +27,8 @@ MAX_FRAMES_IN_FLIGHT = 2
 """Maximum number of frames that were sent to a page but that it has not shown yet."""
 
 
-class NoPlaceError(RobocovError):
-    """There is no place for another page; the message is shown in the page."""
+class TooManyPagesError(RobocovError):
+    """The maximum number of pages is open; the message is shown in the page."""
 
 
 @dataclass(eq=False)
@@ -40,7 +40,7 @@ class Page:
     connection : ServerConnection
     number : int
         Number of the page, by which messages refer to it.
-    is_teacher : bool
+    may_control : bool
         Whether it was opened with the control link, so that it may take control at any time.
     name : str
         Name that other pages show.
@@ -62,13 +62,13 @@ class Page:
         Messages to the user waiting to be sent.
     sent_state : dict
         State of the window that was last sent to it.
-    has_news : asyncio.Event
+    has_updates : asyncio.Event
         Set when there is something to send.
     """
 
     connection: ServerConnection
     number: int
-    is_teacher: bool
+    may_control: bool
     name: str
     page_id: str
     requests_control: bool = False
@@ -79,7 +79,7 @@ class Page:
     outbox: deque[bytes] = field(default_factory=deque)
     notices: deque[str] = field(default_factory=lambda: deque(maxlen=MAX_NOTICES))
     sent_state: dict[str, Any] = field(default_factory=dict)
-    has_news: asyncio.Event = field(default_factory=asyncio.Event)
+    has_updates: asyncio.Event = field(default_factory=asyncio.Event)
 
     def is_ready_for(self, frame: Frame | None) -> bool:
         """Return whether a frame is newer than the page's frame, and not too many frames are on their way."""
@@ -92,7 +92,7 @@ class Page:
         self.base_number = number
         self.in_flight.append(number % 2**32)
         self.outbox.append(message)
-        self.has_news.set()
+        self.has_updates.set()
 
     def confirm_frame(self, number: int) -> None:
         """Remove a frame that the page has shown, and all earlier ones, from `in_flight`."""
@@ -102,11 +102,11 @@ class Page:
     def notify(self, notice: str) -> None:
         """Show a message in the page."""
         self.notices.append(notice)
-        self.has_news.set()
+        self.has_updates.set()
 
 
 class Pages:
-    """The pages that show a window. One page at a time controls it; at first, the first teacher's.
+    """The pages that show a window. One page at a time controls it; at first, the first one that may.
 
     Parameters
     ----------
@@ -117,13 +117,13 @@ class Pages:
     ----------
     controlling : Page or None
         The page that controls the window.
-    people : list of dict
+    participants : list of dict
         Number, name, and control state of each page, for the list in the pages.
     """
 
     def __init__(self, on_control_change: Callable[[Page | None, Page | None], None]) -> None:
         self.controlling: Page | None = None
-        self.people: list[dict[str, Any]] = []
+        self.participants: list[dict[str, Any]] = []
         self._on_control_change = on_control_change
         self._pages: list[Page] = []
 
@@ -133,7 +133,7 @@ class Pages:
     def __len__(self) -> int:
         return len(self._pages)
 
-    def open(self, connection: ServerConnection, *, is_teacher: bool, page_id: str) -> Page:
+    def open(self, connection: ServerConnection, *, may_control: bool, page_id: str) -> Page:
         """Add the page of a new connection.
 
         If the same page is still listed because its earlier connection broke unnoticed, it keeps its number,
@@ -142,7 +142,7 @@ class Pages:
         Parameters
         ----------
         connection : ServerConnection
-        is_teacher : bool
+        may_control : bool
             Whether it was opened with the control link.
         page_id : str
             Identity of the page; empty if it has none.
@@ -153,15 +153,15 @@ class Pages:
 
         Raises
         ------
-        NoPlaceError
+        TooManyPagesError
             If all places for viewers are taken.
         """
-        earlier = self._find(page_id, is_teacher=is_teacher)
-        if earlier is None and not is_teacher and self._count_viewers() >= MAX_VIEWERS:
-            raise NoPlaceError(f"All {MAX_VIEWERS} places for viewers are taken. Trying again …")
+        earlier = self._find(page_id, may_control=may_control)
+        if earlier is None and not may_control and self._count_viewers() >= MAX_VIEWERS:
+            raise TooManyPagesError(f"All {MAX_VIEWERS} places for viewers are taken. Trying again …")
         number = self._find_free_number()
-        role = "Teacher" if is_teacher else "Viewer"
-        page = Page(connection, number, is_teacher, f"{role} {number}", page_id)
+        role = "Teacher" if may_control else "Viewer"
+        page = Page(connection, number, may_control, f"{role} {number}", page_id)
         self._pages.append(page)
         if earlier is not None:
             self._replace(earlier, page)
@@ -169,23 +169,23 @@ class Pages:
         return page
 
     def close(self, page: Page) -> None:
-        """Remove a page whose connection has ended; if it had control, a teacher gets it."""
+        """Remove a page whose connection has ended; if it had control, the first page that may gets it."""
         if page in self._pages:
             self._pages.remove(page)
         self.give_control(self.controlling)
 
-    def remove_surplus_teacher(self) -> Page | None:
-        """If there are too many teacher pages, remove the oldest one that is not in control.
+    def remove_surplus_control_page(self) -> Page | None:
+        """If too many pages may control the window, remove the oldest one that does not.
 
         Returns
         -------
         Page or None
             The removed page, whose connection is still open.
         """
-        teachers = [page for page in self._pages if page.is_teacher]
-        if len(teachers) <= MAX_TEACHERS:
+        control_pages = [page for page in self._pages if page.may_control]
+        if len(control_pages) <= MAX_CONTROL_PAGES:
             return None
-        oldest = next(page for page in teachers if page is not self.controlling)
+        oldest = next(page for page in control_pages if page is not self.controlling)
         self._pages.remove(oldest)
         self.give_control(self.controlling)
         return oldest
@@ -194,40 +194,40 @@ class Pages:
         """Set the name of a page, unless it is blank."""
         printable = "".join(filter(str.isprintable, name)).strip()
         page.name = printable or page.name
-        self._update_people()
+        self._update_participants()
 
     def toggle_request(self, page: Page) -> None:
         """Record that a page requests control, or withdraws its request."""
         page.requests_control = not page.requests_control and page is not self.controlling
-        self._update_people()
+        self._update_participants()
 
     def pass_control(self, page: Page, number: int) -> None:
         """Give control to the page with a number, if `page`, which asks for this, is allowed to."""
-        if page is not self.controlling and not page.is_teacher:
+        if page is not self.controlling and not page.may_control:
             return
         receivers = (other for other in self._pages if other.number == number)
         self.give_control(next(receivers, self.controlling))
 
     def give_control(self, page: Page | None) -> None:
-        """Let a page control the window; if it is None or gone, the first teacher's page."""
+        """Let a page control the window; if it is None or gone, the first page that may control it."""
         if page not in self._pages:
-            page = next((other for other in self._pages if other.is_teacher), None)
+            page = next((other for other in self._pages if other.may_control), None)
         if page is not self.controlling:
             previous = self.controlling
             self.controlling = page
             if page is not None:
                 page.requests_control = False
             self._on_control_change(previous, page)
-        self._update_people()
+        self._update_participants()
 
     def wake(self) -> None:
         """Wake the senders of all pages, so that they send what has changed."""
         for page in self._pages:
-            page.has_news.set()
+            page.has_updates.set()
 
-    def _find(self, page_id: str, *, is_teacher: bool) -> Page | None:
+    def _find(self, page_id: str, *, may_control: bool) -> Page | None:
         for page in self._pages:
-            if page_id and page.page_id == page_id and page.is_teacher == is_teacher:
+            if page_id and page.page_id == page_id and page.may_control == may_control:
                 return page
         return None
 
@@ -240,7 +240,7 @@ class Pages:
         return number
 
     def _count_viewers(self) -> int:
-        return sum(not page.is_teacher for page in self._pages)
+        return sum(not page.may_control for page in self._pages)
 
     def _replace(self, earlier: Page, page: Page) -> None:
         """Let a page inherit number, name and control from its earlier connection, and abort that."""
@@ -253,13 +253,13 @@ class Pages:
             self.give_control(page)
         earlier.connection.transport.abort()
 
-    def _update_people(self) -> None:
-        """Rebuild `people`, and wake the senders of all pages."""
-        self.people = [
+    def _update_participants(self) -> None:
+        """Rebuild `participants`, and wake the senders of all pages."""
+        self.participants = [
             {
                 "number": page.number,
                 "name": page.name,
-                "asks": page.requests_control,
+                "requests_control": page.requests_control,
                 "controls": page is self.controlling,
             }
             for page in self._pages

@@ -35,11 +35,11 @@ from robocov_app.web.connections import (
     respond_with,
     respond_with_page,
 )
-from robocov_app.web.conversation import Conversation, SharedWindow
 from robocov_app.web.files import TransferError, list_saved, read_saved
 from robocov_app.web.frame_delivery import SERVED_FPS, FrameDelivery
 from robocov_app.web.frames import Frame
-from robocov_app.web.pages import NoPlaceError, Page, Pages
+from robocov_app.web.page_connection import PageConnection, SharedWindow
+from robocov_app.web.pages import Page, Pages, TooManyPagesError
 from robocov_app.web.window_input import WindowInput
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ class WebDisplay:
         """Answer a request for the page or a file; return None to let it open a socket."""
         path = request.path.partition("?")[0]
         if not self._is_known(self._read_token(request)):
-            text = "This needs the whole link that robocov printed, with its token.\n"
+            text = "Open the complete link that robocov printed, including its token.\n"
             return respond(connection, HTTPStatus.FORBIDDEN, text)
         if path.endswith("/socket"):
             if is_from_own_page(request):
@@ -220,7 +220,7 @@ class WebDisplay:
             return respond(connection, HTTPStatus.NOT_FOUND, "This page does not exist.\n")
         link_token = get_token(request.path)
         has_link = self._is_known(link_token)
-        # A teacher who opens the watch link keeps the right to control.
+        # A page that may control keeps that right if it is reopened with the watch link.
         keeps_cookie = are_equal(self._read_cookie(request), self.token)
         cookie = ""
         if has_link and not keeps_cookie:
@@ -251,21 +251,21 @@ class WebDisplay:
         request = connection.request
         assert request is not None
         pages = self.shared.pages
-        is_teacher = are_equal(self._read_token(request), self.token)
+        may_control = are_equal(self._read_token(request), self.token)
         page_id = parse_query(request.path).get("page", "")
         try:
-            page = pages.open(connection, is_teacher=is_teacher, page_id=page_id)
-        except NoPlaceError as error:
+            page = pages.open(connection, may_control=may_control, page_id=page_id)
+        except TooManyPagesError as error:
             await connection.close(TRY_AGAIN_LATER, str(error))
             return
-        surplus = pages.remove_surplus_teacher()
+        surplus = pages.remove_surplus_control_page()
         if surplus is not None:
             text = "This window was opened in too many other pages."
             self._start_in_background(surplus.connection.close(REPLACED, text))
         # The page has no frame yet, so the delivery must send it one.
         self.shared.delivery.has_work.set()
         try:
-            await Conversation(page, self.shared).run()
+            await PageConnection(page, self.shared).run()
         finally:
             pages.close(page)
             # The delivery can drop the page's base frame.
@@ -276,7 +276,7 @@ class WebDisplay:
         if page is not None:
             self.shared.window_input.set_page(page.settings)
         if previous is not None:
-            self.shared.window_input.put(events.Left(kind="blur"))
+            self.shared.window_input.put(events.FocusLost(kind="blur"))
 
     def _start_in_background(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)

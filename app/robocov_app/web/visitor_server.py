@@ -18,7 +18,7 @@ from urllib.parse import quote, unquote, urlencode
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
-    FAULT,
+    INTERNAL_ERROR,
     TRY_AGAIN_LATER,
     Listener,
     is_from_own_page,
@@ -185,7 +185,7 @@ class VisitorServer:
             return self._admit(connection, cookie_token)
         token = self._read_token(request)
         if not token:
-            text = "This needs the whole link that robocov printed.\n"
+            text = "Open the complete link that robocov printed.\n"
             return respond(connection, HTTPStatus.FORBIDDEN, text)
         if path.endswith("/socket"):
             if is_from_own_page(request):
@@ -258,7 +258,7 @@ class VisitorServer:
             if self._windows.get(visitor) is window and not self._is_ending:
                 del self._windows[visitor]
                 report(f"a visitor's window did not open: {error}")
-            await connection.close(FAULT, _shorten_reason(f"The window did not open: {error}"))
+            await connection.close(INTERNAL_ERROR, _shorten_reason(f"The window did not open: {error}"))
         finally:
             window.page_count -= 1
             window.idle_since = monotonic()

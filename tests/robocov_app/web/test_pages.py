@@ -12,21 +12,21 @@ from robocov_app.web.pages import Pages
 IDENTITIES = count()
 
 
-def open_page(pages: Pages, *, is_teacher: bool):
+def open_page(pages: Pages, *, may_control: bool):
     """Add a page with an identity that no page has had before, as after each loading."""
-    return pages.open(SimpleNamespace(), is_teacher=is_teacher, page_id=f"page-{next(IDENTITIES)}")
+    return pages.open(SimpleNamespace(), may_control=may_control, page_id=f"page-{next(IDENTITIES)}")
 
 
 def test_a_teacher_who_reloads_the_page_stays_the_first():
     pages = Pages(lambda previous, page: None)
-    teacher = open_page(pages, is_teacher=True)
-    viewers = [open_page(pages, is_teacher=False) for _ in range(2)]
+    teacher = open_page(pages, may_control=True)
+    viewers = [open_page(pages, may_control=False) for _ in range(2)]
     pages.close(teacher)
-    teacher = open_page(pages, is_teacher=True)
+    teacher = open_page(pages, may_control=True)
     assert (teacher.number, teacher.name) == (1, "Teacher 1")
     assert pages.controlling is teacher
     assert [viewer.number for viewer in viewers] == [2, 3]
-    assert open_page(pages, is_teacher=False).name == "Viewer 4"
+    assert open_page(pages, may_control=False).name == "Viewer 4"
 
 
 def test_uploaded_files_are_not_offered_as_saved_until_they_are_saved(tmp_path):

@@ -30,10 +30,10 @@ from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
     MAX_UPLOAD_BYTES,
     MESSAGES,
-    Control,
+    ControlPassed,
     EventTranslator,
     FrameShown,
-    Named,
+    NameEntered,
     PageChanged,
     PointerMoved,
     Uploaded,
@@ -111,7 +111,7 @@ def test_whatever_a_page_tells_is_understood_or_refused(told):
         message = MESSAGES.validate_json(json.dumps(told))
     except ValueError:
         return
-    if not isinstance(message, PageChanged | FrameShown | Control | Named | UploadStarted):
+    if not isinstance(message, PageChanged | FrameShown | ControlPassed | NameEntered | UploadStarted):
         for event in EventTranslator(Clipboard()).translate(message):
             assert event.type
 
@@ -231,7 +231,7 @@ def watcher_of(display):
 
 
 def controller(told):
-    return next((each["number"] for each in told["people"] if each["controls"]), None)
+    return next((each["number"] for each in told["participants"] if each["controls"]), None)
 
 
 def moved(display):
@@ -253,7 +253,7 @@ def test_one_controls_the_others_watch_and_control_is_handed_over(display):
             pupil.send(json.dumps({**move, "x": 1}))
             pupil.send(json.dumps({"kind": "control", "to": you}))  # is not theirs to take
             pupil.send(json.dumps({"kind": "control", "to": 0}))
-            assert [each["asks"] for each in told_to(teacher)["people"]] == [True, False]
+            assert [each["requests_control"] for each in told_to(teacher)["participants"]] == [True, False]
             teacher.send(json.dumps({**move, "x": 2}))
             teacher.send(json.dumps({"kind": "control", "to": you}))
             assert controller(told_to(teacher)) == you
@@ -275,7 +275,7 @@ def test_a_page_that_lost_its_line_is_known_again(display):
         before.send(json.dumps({"kind": "name", "name": "Ada"}))
         with socket_of(display, "?page=a", Cookie=cookie) as again:  # nobody has noticed yet
             told = told_to(again)
-            while len(told["people"]) > 2 or told["people"][1]["name"] != "Ada":
+            while len(told["participants"]) > 2 or told["participants"][1]["name"] != "Ada":
                 told = told_to(again)
             assert told["you"] == controller(told) == own
 
@@ -311,7 +311,7 @@ def test_only_who_controls_sees_the_clipboard(display):
             pass
         assert told["copied"] == "a secret"
         pupil.send(json.dumps({"kind": "name", "name": "Ada\n"}))
-        while (told := told_to(pupil))["people"][1]["name"] != "Ada":
+        while (told := told_to(pupil))["participants"][1]["name"] != "Ada":
             assert "copied" not in told
         assert "copied" not in told
 
@@ -565,7 +565,7 @@ def test_watchers_never_lock_the_teacher_out(display, monkeypatch):
                 assert controller(told) == told["you"]
         watchers[0].close()
         with watcher_of(display) as other:
-            assert told_to(other)["people"]
+            assert told_to(other)["participants"]
 
 
 def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, monkeypatch):
@@ -578,7 +578,7 @@ def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, mo
 
 
 def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.pages.MAX_TEACHERS", 2)
+    monkeypatch.setattr("robocov_app.web.pages.MAX_CONTROL_PAGES", 2)
     cookie = cookie_of(display)
     with ExitStack() as stack:
         first, second = (stack.enter_context(socket_of(display, Cookie=cookie)) for _ in range(2))
@@ -586,7 +586,7 @@ def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, m
         third = stack.enter_context(socket_of(display, Cookie=cookie))
         assert close_reason(second)[0] == 4001  # the first one controls
         told = told_to(third)
-        while len(told["people"]) != 2:
+        while len(told["participants"]) != 2:
             told = told_to(third)
         first.ping().wait(5)
 

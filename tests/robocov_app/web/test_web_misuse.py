@@ -216,7 +216,7 @@ def test_sockets_that_open_and_close_fast(display):
 
 
 def test_a_page_that_never_reads_is_ended_and_holds_up_nobody(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.conversation.SEND_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("robocov_app.web.page_connection.SEND_TIMEOUT_S", 0.5)
     monkeypatch.setattr("robocov_app.web.pages.MAX_FRAMES_IN_FLIGHT", 1000)  # it says that it has shown all
     with socket.socket() as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

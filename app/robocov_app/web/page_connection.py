@@ -83,7 +83,7 @@ class _EventBudget:
         self._remaining -= event_count
 
 
-class Conversation:
+class PageConnection:
     """The exchange of messages with a page, as long as its connection lasts.
 
     Parameters
@@ -97,14 +97,14 @@ class Conversation:
         self._shared = shared
         self._handlers: dict[type[Any], Callable[[Any], None]] = {
             events.FrameShown: self._handle_shown_frame,
-            events.Control: self._handle_control,
-            events.Named: self._handle_name,
+            events.ControlPassed: self._handle_passed_control,
+            events.NameEntered: self._handle_name,
             events.PageChanged: self._handle_page,
         }
 
     async def run(self) -> None:
         """Exchange messages until the connection ends."""
-        sender = asyncio.create_task(self._send_news())
+        sender = asyncio.create_task(self._send_updates())
         try:
             await self._receive_messages()
         finally:
@@ -159,13 +159,13 @@ class Conversation:
         self._page.confirm_frame(message.number)
         self._shared.delivery.has_work.set()
 
-    def _handle_control(self, message: events.Control) -> None:
+    def _handle_passed_control(self, message: events.ControlPassed) -> None:
         if message.to == 0:
             self._shared.pages.toggle_request(self._page)
         else:
             self._shared.pages.pass_control(self._page, message.to)
 
-    def _handle_name(self, message: events.Named) -> None:
+    def _handle_name(self, message: events.NameEntered) -> None:
         self._shared.pages.rename(self._page, message.name)
 
     def _handle_page(self, message: events.PageChanged) -> None:
@@ -218,15 +218,15 @@ class Conversation:
 
     # Messages to the page.
 
-    async def _send_news(self) -> None:
+    async def _send_updates(self) -> None:
         """Send state, notices and frames to the page whenever there are new ones."""
         from websockets.exceptions import ConnectionClosed
 
         page = self._page
         with suppress(ConnectionClosed):
             while True:
-                await page.has_news.wait()
-                page.has_news.clear()
+                await page.has_updates.wait()
+                page.has_updates.clear()
                 # Read the frames before the state: then the state is never older than the frames.
                 frames = list(page.outbox)
                 page.outbox.clear()
@@ -238,14 +238,14 @@ class Conversation:
                     await self._send(frame)
 
     async def _send_state(self) -> None:
-        """Send the state of the window and the list of people if they have changed."""
+        """Send the state of the window and the list of participants if they have changed."""
         page = self._page
         state = {
             **self._shared.state,
             "kind": "state",
-            "people": self._shared.pages.people,
+            "participants": self._shared.pages.participants,
             "you": page.number,
-            "teacher": page.is_teacher,
+            "may_control": page.may_control,
         }
         if not self._is_controlling:
             # Only the controlling page may see the clipboard.
