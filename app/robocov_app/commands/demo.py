@@ -23,8 +23,12 @@ if TYPE_CHECKING:
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.start.cards import StartChoice
+    from robocov_app.viewer.start.launch import StartLauncher
     from robocov_app.viewer.window.window import ViewerWindow
 
+DEFAULT_MAP = "rooms"
+"""Map of the window if an option is given, but no map."""
 _MAX_CONTROLLERS = 4
 """Maximum number of controllers side by side."""
 
@@ -33,11 +37,14 @@ _MAX_CONTROLLERS = 4
 class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     """Open the interactive window: watch a team cover a map, edit it, compare controllers, go back in time.
 
-    All commands have keys: press F1. The settings of the window are remembered.
+    Without a map and options, a start page shows examples, all bundled maps and recent sessions. All commands
+    have keys: press F1. The settings of the window are remembered.
 
     Example: robocov demo museum --controllers rapf rpf lloyd --robots 8
     """
 
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[MAP]")] = ""
+    """Path of a map or session file, or the name of a bundled map (with other options: rooms)."""
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf",)
     """Up to four controllers side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
@@ -86,6 +93,12 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
             raise ParameterError(f"--video: expected a name ending in .mp4, got {str(self.video)!r}")
 
     @property
+    def shows_start_page(self) -> bool:
+        """Whether there are no options other than the look of the window."""
+        look = Arguments(theme=self.theme, size=self.size, scale=self.scale, folder=self.folder)
+        return self == look
+
+    @property
     def is_headless(self) -> bool:
         """Whether the window is rendered without a display."""
         return self.frames is not None or self.video is not None
@@ -93,7 +106,6 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
 def command(options: Arguments) -> int:
     """Run `robocov demo`, and return its exit status."""
-    from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.window.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
 
@@ -104,8 +116,59 @@ def command(options: Arguments) -> int:
         return _render(_build_launcher(options), options)
     with ExitStack() as stack:
         stack.enter_context(ending_on_signals())
+        if options.shows_start_page:
+            return _open_start_page(options)
+        from robocov.kernel_compilation import compile_in_background
+
         stack.enter_context(compile_in_background())
         return _open_window(_build_launcher(options), options)
+
+
+def _open_start_page(options: Arguments) -> int:
+    """Show the start page, and then what the user has chosen there; return the exit status."""
+    from robocov.errors import RobocovError
+    from robocov_app.viewer.start.launch import StartLauncher
+
+    launcher = StartLauncher(options.theme, parse_window_size(options.size), options.scale, options.folder)
+    message = ""
+    with launcher as start:
+        while (choice := start.choose(message)) is not None:
+            try:
+                return _open_choice(start, choice, options)
+            except RobocovError as error:
+                message = str(error)
+    return 0
+
+
+def _open_choice(start: StartLauncher, choice: StartChoice, options: Arguments) -> int:
+    """Open the window for a choice on the start page, and return the exit status.
+
+    Raises
+    ------
+    RobocovError
+        If it cannot be opened.
+    """
+    from robocov_app.viewer.start.cards import Target
+
+    width, height = start.size
+    if choice.target is Target.EDITOR:
+        from robocov_app.commands import edit
+
+        theme = start.theme if start.has_new_theme else options.theme
+        edit.open_editor(
+            edit.Arguments(theme=theme, size=f"{width}x{height}", scale=options.scale, folder=options.folder)
+        )
+        return 0
+    chosen = replace(options, size=f"{width}x{height}", **choice.options)
+    launcher = _build_launcher(chosen)
+    launcher.offers_lesson = False
+    with launcher.window() as window:
+        if start.has_new_theme:
+            window.viewer.view.theme = start.theme
+        if choice.target is Target.LESSON:
+            window.lesson.start()
+        window.run()
+    return 0
 
 
 def _build_launcher(options: Arguments) -> ViewerLauncher:
@@ -115,6 +178,7 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
     from robocov_app.viewer.session.files.session_file import SUFFIX
 
     controllers = (*list_controller_classes(), *options.controllers)
+    options = replace(options, map=options.map or DEFAULT_MAP)
     file: Path | None = None
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
@@ -191,7 +255,7 @@ def build_session(options: Arguments) -> Session:
     choices += [ControllerChoice(name) for name in other_names]
     conditions = options.conditions.build_conditions(options.seed, robots)
     scenario = SessionScenario(
-        load_map(options.map),
+        load_map(options.map or DEFAULT_MAP),
         tuple(choices),
         robots,
         options.start,

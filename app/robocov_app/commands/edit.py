@@ -64,11 +64,11 @@ def command(options: Arguments) -> int:
         if options.screenshot is None:
             stack.enter_context(ending_on_signals())
             stack.enter_context(compile_in_background())
-        _open_editor(options)
+        open_editor(options)
     return 0
 
 
-def _open_editor(options: Arguments) -> None:
+def open_editor(options: Arguments) -> None:
     """Show the editor until it is closed, or save its screenshot."""
     from robocov_app.editor.ui.launch import EditorLauncher
     from robocov_app.web import show

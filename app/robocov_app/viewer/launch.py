@@ -20,6 +20,7 @@ from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 from robocov_app.viewer.costs.costs import Costs
+from robocov_app.viewer.messages import NO_DISPLAY
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 from robocov_app.viewer.session.files.run_saver import RunSaver
@@ -28,10 +29,6 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window.dialogs import build_lesson_offer
 from robocov_app.viewer.window.window import ViewerWindow
 
-NO_DISPLAY = (
-    "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR "
-    "with --frames N (for a saved run, with --video); robocov run needs no display."
-)
 HEADLESS_FPS = 30  # frames per second of simulated real time without a display
 
 

@@ -1,0 +1,105 @@
+"""The examples on the start page, and what each of them opens."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+
+class Target(StrEnum):
+    """What a choice on the start page opens."""
+
+    WINDOW = "window"
+    LESSON = "lesson"
+    EDITOR = "editor"
+
+
+@dataclass(frozen=True)
+class StartChoice:
+    """What the user has chosen on the start page.
+
+    Attributes
+    ----------
+    title : str
+        What is opened, for the message while it loads.
+    target : Target
+    options : mapping
+        Options of `robocov demo` that differ from the defaults.
+    """
+
+    title: str
+    target: Target = Target.WINDOW
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StartCard:
+    """An example on the start page.
+
+    Attributes
+    ----------
+    choice : StartChoice
+        What it opens.
+    text : str
+        What it shows, in one or two lines.
+    previews : tuple of str
+        Names of recorded runs, shown side by side; empty for the drawing of a map.
+    labels : tuple of str
+        Texts below these runs; empty for none.
+    """
+
+    choice: StartChoice
+    text: str
+    previews: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+
+
+START_CARDS = (
+    StartCard(
+        StartChoice("Rooms", options={"map": "rooms"}),
+        "Six robots spread through a building that they do not know.",
+        ("rooms",),
+    ),
+    StartCard(
+        StartChoice("The trap", options={"map": "trap"}),
+        "A wall in the shape of a U. Who gets stuck, and why?",
+        ("trap",),
+    ),
+    StartCard(
+        StartChoice("City with 50 robots", options={"map": "city", "robots": 50, "start": "uniform"}),
+        "Fifty robots share the streets between blocks of houses.",
+        ("city",),
+    ),
+    StartCard(
+        StartChoice(
+            "Compare three controllers",
+            options={"map": "blocks-a", "controllers": ("rapf", "rpf", "lloyd")},
+        ),
+        "From the same starting positions: which of them covers the map best?",
+        ("compare-rapf", "compare-rpf", "compare-lloyd"),
+        ("RAPF", "RPF", "Lloyd"),
+    ),
+    StartCard(
+        StartChoice("Draw your own", Target.EDITOR),
+        "Draw walls and rooms, then let robots cover them.",
+    ),
+    StartCard(
+        StartChoice("Lesson 1", Target.LESSON),
+        "What holds robots back, and what helps: eleven short chapters.",
+        ("lesson",),
+    ),
+)
+"""The examples, in the order of their keys 1 to 6."""
+
+
+def choose_map(name: str) -> StartChoice:
+    """Return the choice that opens a bundled map."""
+    return StartChoice(name, options={"map": name})
+
+
+def choose_session(path: Path) -> StartChoice:
+    """Return the choice that opens a session or a map file."""
+    return StartChoice(path.stem, options={"map": str(path)})
