@@ -80,7 +80,7 @@ def describe_state(session: Session) -> list[object]:
         list(timeline.ghosts),
         timeline.head.number,
         timeline.head.parent is not None,
-        timeline.head.redo is not None,
+        timeline.head.redo_child is not None,
         session.playback.is_playing,
         session.displayed.time,
     ]

@@ -45,7 +45,7 @@ class ViewState:
         self.fades_trajectories = not self.fades_trajectories
         if self.fades_trajectories:
             return f"trajectories show the last {FADE_S:g} s"
-        return "trajectories stay"
+        return "complete trajectories are shown"
 
     def toggle_suggestions(self) -> str:
         """Switch suggestions on or off; return a message."""

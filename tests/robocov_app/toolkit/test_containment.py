@@ -55,7 +55,7 @@ class Fragile(BaseWindow):
     def draw(self) -> None:
         self.call("draw")
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         self.call("look")
         return None
 

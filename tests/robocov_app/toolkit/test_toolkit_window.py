@@ -38,7 +38,7 @@ class Counting(BaseWindow):
     def close(self) -> None:
         pass
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         return None if self.shows == "moves" else self.shows
 
 
@@ -122,7 +122,7 @@ def test_a_paused_window_is_drawn_only_after_changes(tmp_path: Path) -> None:
         assert len(drawn) == 6
         assert not window.is_idle
         driver.session.timeline.is_settled = True  # time goes on, and nothing moves
-        assert window.get_visible_state() is not None
+        assert window.build_frame_key() is not None
         window._idle_s = IDLE_S
         before = driver.session.displayed.time
         window.advance(0.5)

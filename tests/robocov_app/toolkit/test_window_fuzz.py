@@ -68,7 +68,7 @@ class CostsOfSmallMaps(Costs):
             super().set_environment(environment)
         else:
             self.forget()
-            self._map_question = None
+            self._map_request = None
 
 
 def play_viewer(folder: Path, seed: int, events: int) -> ExceptionLog:

@@ -20,7 +20,7 @@ from sample_sessions import (
 
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
-from robocov_app.viewer.session import lockstep as module
+from robocov_app.viewer.session import pane_group as module
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
 
@@ -125,7 +125,7 @@ def test_a_branch_that_is_not_possible_changes_nothing(monkeypatch):
     def raise_start_error(state):
         raise StartError("no room")
 
-    monkeypatch.setattr(module.Lockstep, "resume", raise_start_error)
+    monkeypatch.setattr(module.PaneGroup, "resume", raise_start_error)
     for edit in (
         session.branch,
         lambda: session.set_controller(session.timeline.panes[0], LLOYD),

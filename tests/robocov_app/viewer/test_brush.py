@@ -251,7 +251,7 @@ def test_the_cost_is_computed_for_each_density():
     distances = []
     for environment in (HALL, HALL.with_density(peak), HALL):
         costs.set_environment(environment)
-        costs.ask(0, 0.0, positions)
+        costs.request(0, 0.0, positions)
         ((_, answer),) = costs.poll()
         distances.append(answer.result.mean_distance)
         assert distances[-1] == CoverageCost(environment, 24)(positions).mean_distance

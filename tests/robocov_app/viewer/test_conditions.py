@@ -199,7 +199,7 @@ def test_a_saved_run_with_conditions_is_replayed_and_continued(tmp_path: Path) -
 def test_the_cost_is_computed_among_moving_obstacles() -> None:
     for costs in (Costs(8, direct=True), Costs(8)):
         costs.set_environment(HALL)
-        costs.ask(0, 0.0, STARTS)
+        costs.request(0, 0.0, STARTS)
         end = time.monotonic() + 60.0
         while not costs.poll() and time.monotonic() < end:
             time.sleep(0.005)

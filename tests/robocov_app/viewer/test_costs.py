@@ -107,8 +107,8 @@ def ready(stubbed):
 def test_answers_equal_the_coverage_cost():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.5, POSITIONS)
-    costs.ask(3, 1.5, OTHER_POSITIONS, np.array([3.5, 0.5]))
+    costs.request(0, 1.5, POSITIONS)
+    costs.request(3, 1.5, OTHER_POSITIONS, np.array([3.5, 0.5]))
     assert costs.known == {}
     answers = dict(costs.poll())
     assert answers == costs.known
@@ -126,7 +126,7 @@ def test_only_the_newest_question_of_a_pane_is_answered():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
     for when in (1.0, 2.0, 3.0):
-        costs.ask(0, when, POSITIONS)
+        costs.request(0, when, POSITIONS)
     assert [known.time for _, known in costs.poll()] == [3.0]
 
 
@@ -134,7 +134,7 @@ def test_positions_are_copied_when_a_question_is_asked():
     costs = Costs(32, direct=True)
     positions = POSITIONS.copy()
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, positions)
+    costs.request(0, 1.0, positions)
     positions += 0.5
     ((_, known),) = costs.poll()
     np.testing.assert_array_equal(known.result.positions, POSITIONS)
@@ -143,8 +143,8 @@ def test_positions_are_copied_when_a_question_is_asked():
 def test_impossible_questions_have_no_answer():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, INSIDE)
-    costs.ask(1, 1.0, POSITIONS, INSIDE[0])
+    costs.request(0, 1.0, INSIDE)
+    costs.request(1, 1.0, POSITIONS, INSIDE[0])
     assert [(pane, known.path) for pane, known in costs.poll()] == [(1, None)]
     assert costs.state == ""
 
@@ -152,17 +152,17 @@ def test_impossible_questions_have_no_answer():
 def test_a_new_map_replaces_earlier_questions():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, POSITIONS)
+    costs.request(0, 1.0, POSITIONS)
     costs.poll()
-    costs.ask(0, 2.0, POSITIONS)
+    costs.request(0, 2.0, POSITIONS)
     costs.set_environment(replace(HALL, obstacles=()))
     assert costs.known == {}
     assert costs.poll() == [], "the question was about the previous map"
-    costs.ask(0, 2.0, INSIDE)
+    costs.request(0, 2.0, INSIDE)
     assert len(costs.poll()) == 1
     costs = Costs(1, direct=True)
     costs.set_environment(FULL)
-    costs.ask(0, 1.0, POSITIONS)
+    costs.request(0, 1.0, POSITIONS)
     assert costs.poll() == []
     assert costs.state.startswith("no cost: ")
     costs.set_environment(HALL)
@@ -172,9 +172,9 @@ def test_a_new_map_replaces_earlier_questions():
 def test_forget_drops_costs_and_questions():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, POSITIONS)
+    costs.request(0, 1.0, POSITIONS)
     costs.poll()
-    costs.ask(0, 2.0, POSITIONS)
+    costs.request(0, 2.0, POSITIONS)
     costs.forget()
     assert costs.known == {}
     assert costs.poll() == []
@@ -186,7 +186,7 @@ def test_moving_obstacles_are_at_the_position_of_the_time():
     assert costs.state == ""
     values = []
     for when in (0.0, 2.5, 5.0):
-        costs.ask(0, when, POSITIONS)
+        costs.request(0, when, POSITIONS)
         ((_, known),) = costs.poll()
         assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(POSITIONS).mean_distance
         assert known.field.max_distance == known.result.distances.max()
@@ -198,14 +198,14 @@ def test_a_robot_under_a_moving_obstacle_owns_no_site():
     costs = Costs(32, direct=True)
     costs.set_environment(CROSSED)
     over = np.array([[1.0, 2.0], [5.0, 3.0]])
-    costs.ask(0, 0.0, over, np.array([5.5, 3.5]))
+    costs.request(0, 0.0, over, np.array([5.5, 3.5]))
     ((_, known),) = costs.poll()
     np.testing.assert_array_equal(known.result.positions, over)
     assert set(known.result.owner.tolist()) == {1}
     assert known.result.mean_distance == CoverageCost(CROSSED.at(0.0), 32)(over[1:]).mean_distance
     np.testing.assert_array_equal(known.path[-1], over[1])
     # There is no other robot.
-    costs.ask(0, 0.0, over[:1])
+    costs.request(0, 0.0, over[:1])
     assert costs.poll() == []
 
 
@@ -213,8 +213,8 @@ def test_travel_time_of_robots_with_speeds():
     speeds = np.array([0.2, 1.0])
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, POSITIONS)
-    costs.ask(1, 1.0, POSITIONS, speeds=speeds)
+    costs.request(0, 1.0, POSITIONS)
+    costs.request(1, 1.0, POSITIONS, speeds=speeds)
     without, timed = (known for _, known in costs.poll())
     assert without.travel_time is None
     assert timed.travel_time == CoverageCost(HALL, 32)(POSITIONS, speeds).mean_time
@@ -227,7 +227,7 @@ def test_travel_time_of_robots_with_speeds():
 
 def test_questions_wait_until_the_map_is_prepared(stubbed):
     costs, worker = stubbed
-    costs.ask(0, 1.0, POSITIONS)
+    costs.request(0, 1.0, POSITIONS)
     assert costs.poll() == []
     assert costs.state == "cost: preparing the map"
     worker.progress = 0.25, 3.0
@@ -248,7 +248,7 @@ def test_panes_take_turns(ready):
     turns = []
     for frame in range(40):
         for pane in range(3):
-            costs.ask(pane, float(frame), POSITIONS)
+            costs.request(pane, float(frame), POSITIONS)
         worker.answer()
         turns += [pane for pane, _ in costs.poll()]
     assert {turns.count(pane) for pane in range(3)} <= {13, 14}
@@ -259,7 +259,7 @@ def test_panes_take_turns(ready):
 def test_one_question_is_sent_at_a_time(ready):
     costs, worker = ready
     for pane in range(3):
-        costs.ask(pane, 1.0, POSITIONS)
+        costs.request(pane, 1.0, POSITIONS)
     for _ in range(3):
         assert costs.poll() == []
     assert len(worker.questions) == 2  # with the map
@@ -267,10 +267,10 @@ def test_one_question_is_sent_at_a_time(ready):
 
 def test_answers_to_forgotten_questions_are_ignored(ready):
     costs, worker = ready
-    costs.ask(0, 7.0, POSITIONS)
+    costs.request(0, 7.0, POSITIONS)
     costs.poll()
     costs.forget()
-    costs.ask(0, 0.0, OTHER_POSITIONS)
+    costs.request(0, 0.0, OTHER_POSITIONS)
     worker.answer()
     assert costs.poll() == []
     assert costs.known == {}
@@ -280,10 +280,10 @@ def test_answers_to_forgotten_questions_are_ignored(ready):
 
 def test_answers_about_an_earlier_map_are_ignored(ready):
     costs, worker = ready
-    costs.ask(2, 7.0, POSITIONS)
+    costs.request(2, 7.0, POSITIONS)
     costs.poll()
     costs.set_environment(replace(HALL, obstacles=()))
-    costs.ask(2, 8.0, INSIDE)
+    costs.request(2, 8.0, INSIDE)
     worker._answer = module.KnownCost(7.0, None, None, None)  # while the newest question has no answer
     assert costs.poll() == []
     assert costs.known == {}
@@ -295,8 +295,8 @@ def test_answers_about_an_earlier_map_are_ignored(ready):
 
 def test_a_robot_in_an_obstacle_does_not_block_other_questions(ready):
     costs, worker = ready
-    costs.ask(0, 1.0, INSIDE)
-    costs.ask(1, 1.0, POSITIONS)
+    costs.request(0, 1.0, INSIDE)
+    costs.request(1, 1.0, POSITIONS)
     costs.poll()
     worker.answer()
     assert "outside the free space" in worker.problem
@@ -308,7 +308,7 @@ def test_a_robot_in_an_obstacle_does_not_block_other_questions(ready):
 
 def test_a_process_that_ends_repeatedly_is_reported(ready):
     costs, worker = ready
-    costs.ask(0, 1.0, POSITIONS)
+    costs.request(0, 1.0, POSITIONS)
     costs.poll()
     worker.die()
     costs.poll()
@@ -317,7 +317,7 @@ def test_a_process_that_ends_repeatedly_is_reported(ready):
     count = len(worker.questions)
     worker.die()
     for _ in range(3):
-        costs.ask(0, 2.0, POSITIONS)
+        costs.request(0, 2.0, POSITIONS)
         costs.poll()
     assert costs.state == "no cost: it has ended"
     assert len(worker.questions) == count
@@ -329,8 +329,8 @@ def test_a_process_that_ends_repeatedly_is_reported(ready):
 def test_another_process_gives_the_same_answers(worker_costs):
     worker_costs.set_environment(HALL)
     point = np.array([3.5, 0.5])
-    worker_costs.ask(0, 1.5, POSITIONS)
-    worker_costs.ask(5, 1.5, OTHER_POSITIONS, point)
+    worker_costs.request(0, 1.5, POSITIONS)
+    worker_costs.request(5, 1.5, OTHER_POSITIONS, point)
     answers = wait_for_answers(worker_costs, 2)
     cost = CoverageCost(HALL, 32)
     for pane, positions in ((0, POSITIONS), (5, OTHER_POSITIONS)):
@@ -343,13 +343,13 @@ def test_another_process_gives_the_same_answers(worker_costs):
     assert worker_costs.state == ""
     assert worker_costs.known == answers
     # There is no path from a point inside the pillar.
-    worker_costs.ask(0, 2.0, POSITIONS, INSIDE[0])
+    worker_costs.request(0, 2.0, POSITIONS, INSIDE[0])
     assert wait_for_answers(worker_costs)[0].path is None
     worker_costs.forget()
     assert worker_costs.known == {}
     # On another map, robots may be where there was an obstacle.
     worker_costs.set_environment(replace(HALL, obstacles=()))
-    worker_costs.ask(0, 3.0, INSIDE)
+    worker_costs.request(0, 3.0, INSIDE)
     assert wait_for_answers(worker_costs)[0].time == 3.0
 
 
@@ -358,7 +358,7 @@ def test_another_process_evaluates_moving_obstacles(worker_costs):
     worker_costs.set_environment(CROSSED)
     speeds = np.array([0.5, 1.0])
     for when in (0.0, 2.5):
-        worker_costs.ask(0, when, POSITIONS, speeds=speeds)
+        worker_costs.request(0, when, POSITIONS, speeds=speeds)
         known = wait_for_answers(worker_costs)[0]
         cost = CoverageCost(CROSSED.at(when), 32)
         assert known.time == when
@@ -387,13 +387,13 @@ def test_a_map_without_a_cost_is_reported():
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 def test_a_killed_process_is_replaced(worker_costs):
     worker_costs.set_environment(HALL)
-    worker_costs.ask(0, 1.0, POSITIONS)
+    worker_costs.request(0, 1.0, POSITIONS)
     wait_for_answers(worker_costs)
     os.kill(worker_costs._worker.process.pid, signal.SIGKILL)
     end = time.monotonic() + TIMEOUT_S
     answers = []
     while not answers and time.monotonic() < end:
-        worker_costs.ask(0, 2.0, POSITIONS)
+        worker_costs.request(0, 2.0, POSITIONS)
         answers = worker_costs.poll()
         time.sleep(0.005)
     assert answers[0][1].time == 2.0

@@ -74,10 +74,10 @@ def test_each_force_is_described_with_its_cause():
     assert report.verdict == "moving 0.20 m/s east to its goal"
     assert list_texts(report) == [
         "at (2.00, 4.00) m, 0.20 m/s east",
-        "pulled 0.31 N to its goal, 3.0 m away",
-        "pushed 0.12 N by robot 7, 80 cm west (2 robots in range)",
-        "pushed 0.30 N by the obstacle, 42 cm south",
-        "held back 0.40 N by viscosity",
+        "pulled with 0.31 N towards its goal, 3.0 m away",
+        "pushed with 0.12 N by robot 7, 80 cm west (2 robots in range)",
+        "pushed with 0.30 N by the obstacle, 42 cm south",
+        "held back with 0.40 N by viscosity",
         "resultant 0.30 N north",
         "32 cm clear of the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
@@ -89,7 +89,9 @@ def test_each_force_is_described_with_its_cause():
 
 def test_robots_at_similar_distances_are_named_together():
     report = build_report([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
-    pushed = "pushed 0.36 N south-east by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
+    pushed = (
+        "pushed with 0.36 N south-east by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
+    )
     assert get_line(report, "repulsion_robots").text == pushed
 
 
@@ -105,7 +107,7 @@ def test_robots_at_similar_distances_are_named_together():
 def test_an_obstacle_is_named_by_its_kind(point, name):
     position = np.array(point) - [0.5, 0.0]
     report = build_report([position], points=[point], environment=ROOMS, repulsion_obstacle=[[-1.0, 0.0]])
-    assert get_line(report, "repulsion_obstacle").text == f"pushed 1.0 N by {name}, 50 cm east"
+    assert get_line(report, "repulsion_obstacle").text == f"pushed with 1.0 N by {name}, 50 cm east"
 
 
 @pytest.mark.parametrize(
@@ -125,7 +127,7 @@ def test_obstructed_goals_are_described(environment, position, goal, hidden):
     away = format_length(float(np.hypot(*pull))) + " away" + hidden
     size = format_force(float(np.hypot(*pull)))
     report = build_report([position], goals=[goal], environment=environment, attraction=[pull])
-    assert get_line(report, "attraction").text == f"pulled {size} to its goal, {away}"
+    assert get_line(report, "attraction").text == f"pulled with {size} towards its goal, {away}"
     held = build_report([position], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
     assert held.verdict.startswith("at rest, stuck: " if hidden else "at rest ")
     assert any(text.startswith("stuck: ") for text in list_texts(held)) == bool(hidden)
@@ -145,7 +147,7 @@ def test_two_balancing_forces_are_named():
     assert "stuck: the pull to its goal (0.31 N) and the push of the obstacle (0.30 N) balance" in list_texts(
         report
     )
-    assert "pushed 1 mN east by swarm cohesion" in list_texts(report)
+    assert "pushed with 1 mN east by swarm cohesion" in list_texts(report)
 
 
 def test_three_balancing_forces_are_named():
@@ -295,10 +297,11 @@ def test_a_goal_at_the_centroid_is_named():
 
 def test_unexplained_forces_are_described():
     calm = build_report([[4, 4]], forces=[[1.0, 0.0]])
-    assert get_line(calm, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
+    assert get_line(calm, UNEXPLAINED_FORCE).text == "pushed with 1.0 N east by its controller"
     windy = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
     assert (
-        get_line(windy, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
+        get_line(windy, UNEXPLAINED_FORCE).text
+        == "pushed with 1.1 N south-east by other forces of its controller"
     )
     for report in (calm, windy):
         assert_forces_sum_up(report)
@@ -322,16 +325,19 @@ def test_invalid_terms_of_user_controllers_are_ignored():
 
 def test_a_force_that_is_not_finite_is_reported():
     report = build_report([[4, 4]], velocities=[[0.5, 0]], forces=[[np.nan, 1.0]])
-    assert "its controller gives a force that is not a number" in list_texts(report)
+    assert "its controller returned an invalid force" in list_texts(report)
     assert get_line(report, "resultant").vector == (-1.0, 0.0)
 
 
 def test_braking_before_the_goal_is_not_described_as_a_pull():
     report = build_report([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
-    assert get_line(report, "attraction").text == "braked 3.0 N west on the way to its goal, 20 cm away"
+    assert get_line(report, "attraction").text == "slowed by 3.0 N west on the way to its goal, 20 cm away"
     assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
     aside = build_report([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
-    assert get_line(aside, "attraction").text == "pulled 1.4 N north-east on the way to its goal, 2.0 m away"
+    assert (
+        get_line(aside, "attraction").text
+        == "pulled with 1.4 N north-east on the way to its goal, 2.0 m away"
+    )
 
 
 # random observations and decisions

@@ -324,7 +324,7 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         session.fail_robot(2)
         driver.run_frames(20)
         failed = session.timeline.head
-        viewer.playback.look_at(0.2)
+        viewer.playback.show_time(0.2)
         session.fail_robot(3)
         driver.run_frames(20)
         driver.press_key("ctrl+b")

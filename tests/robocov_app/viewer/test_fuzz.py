@@ -85,7 +85,7 @@ class CostsOfSmallMaps(Costs):
             super().set_environment(environment)
         else:
             self.forget()
-            self._map_question = None
+            self._map_request = None
 
 
 class RandomUser:

@@ -73,7 +73,7 @@ def test_a_session_is_the_same_after_undo_recovery_loading_and_run(
         driver.press_key("shift+d")
         play(driver)
         failed = summarize(driver.session)
-        driver.viewer.playback.look_at(0.3)  # before the failure
+        driver.viewer.playback.show_time(0.3)  # before the failure
         driver.press_key("b")
         play(driver)
         driver.press_key("k")  # adds a pane, and restarts

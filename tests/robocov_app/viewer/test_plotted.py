@@ -49,15 +49,15 @@ def test_the_plotted_quantity_is_chosen_by_key_and_click(tmp_path: Path) -> None
         driver.run_frames(20)
         driver.session.playback.is_playing = False
         driver.run_frames(8)
-        assert chart.plotted is DISTANCE
+        assert chart.quantity is DISTANCE
         before = driver.copy_frame()
         driver.press_key("y")
         driver.run_frames(2)
-        assert chart.plotted is TIME
+        assert chart.quantity is TIME
         assert not driver.shows_frame(before)
         left, top, width, _ = chart.switch_box
         driver.click(left + width / 2, top + 6)
-        assert chart.plotted is DISTANCE
+        assert chart.quantity is DISTANCE
         assert driver.session.timeline.is_live, "the click does not reach the time line"
 
 
@@ -79,6 +79,6 @@ def test_teams_with_equal_speeds_have_no_choice(tmp_path: Path) -> None:
         driver.run_frames(3)
         assert driver.session.displayed.get_setup(driver.session.timeline.panes[0]).speed_limits is None
         driver.press_key("y")
-        assert driver.window.chart.plotted is DISTANCE
+        assert driver.window.chart.quantity is DISTANCE
         assert "equally fast" in driver.viewer.message
         assert driver.window.chart.switch_box is None

@@ -212,13 +212,13 @@ def test_branching_continues_from_the_past_only() -> None:
     for _ in range(30):
         run_command(viewer, "step")
     run_command(viewer, "branch:here")
-    assert "go back first" in viewer.message
+    assert "Go back in time first" in viewer.message
     assert not viewer.session.playback.is_playing
     run_command(viewer, "first")
     run_command(viewer, "branch:here")
     assert viewer.session.playback.is_playing
     assert viewer.session.timeline.end_time == 0.0
-    assert "ghost" in viewer.message
+    assert "another branch" in viewer.message
 
 
 # panes

@@ -125,7 +125,7 @@ class TestRobotProperties:
 
     def test_a_single_value_out_of_range_is_rejected(self):
         with pytest.raises(ParameterError, match="radius"):
-            RobotProperties(different={"radius": {1: -1.0}}).build_team((1,))
+            RobotProperties(values_by_robot={"radius": {1: -1.0}}).build_team((1,))
 
 
 class TestSessionScenario:

@@ -19,7 +19,7 @@ from robocov_app.viewer.window.status import describe_cursor, list_facts
 def viewer() -> Presenter:
     session = Session(SessionScenario(load_map("rooms")))
     viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "rooms")
-    viewer.costs.ask(0, 0.0, session.timeline.panes[0].simulation.positions)
+    viewer.costs.request(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
     return viewer
 
@@ -72,7 +72,7 @@ def test_cut_off_rooms_are_reported() -> None:
     closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))
     session = Session(SessionScenario(closed, robots=1, given_starts=np.array([[1.0, 1.0]])))
     viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "two")
-    viewer.costs.ask(0, 0.0, session.timeline.panes[0].simulation.positions)
+    viewer.costs.request(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
     viewer.inspection.cursor = 3.0, 1.0
     assert describe_cursor(viewer).endswith(": out of reach of all robots")

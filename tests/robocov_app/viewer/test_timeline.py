@@ -22,7 +22,7 @@ from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.edits import FailRobot, Restart
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session, parse_session
-from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
@@ -91,7 +91,7 @@ def test_an_edit_that_is_not_possible_leaves_the_timeline_as_it_was() -> None:
     session.show_time(0.1)
     before = describe_state(session)
 
-    def fail_unknown_robot(run: Lockstep) -> None:
+    def fail_unknown_robot(run: PaneGroup) -> None:
         run.apply(FailRobot(77))
 
     with pytest.raises(ParameterError, match="there is no robot 77"):

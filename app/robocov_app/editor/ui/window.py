@@ -155,7 +155,7 @@ class EditorWindow(CommandWindow):
         self.dialogs.close()
         self.editor.snapper.close()
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         """Return everything that can change the frame without an event; None to redraw it in any case."""
         editor = self.editor
         canvas = self.canvas

@@ -205,7 +205,7 @@ def create_list_choice(
 
     def accept_option(text: str, option: Option | None) -> None:
         if option is None:
-            raise InputError(f"expected a line of the list, got {text!r}")
+            raise InputError(f"no such entry: {text!r}")
         accept(option)
 
     return Choice(title, find_options, accept_option, placeholder="type to find")

@@ -61,7 +61,7 @@ def create_file_choice(
 
     empty_text = Choice.empty_text
     if saves:
-        empty_text = "Enter saves it there"
+        empty_text = "Press Enter to save here"
     return Choice(
         title,
         browser.list_options,

@@ -122,43 +122,60 @@ def snap_move(
     Snap
         The snapped displacement as `Snap.point`, m.
     """
-    best_rank = (math.inf, math.inf)
-    best = Snap((dx, dy))
-    # Among many points, some lie near the grid by chance, which is no reason to snap.
-    kinds_of_others = settings.kinds - {"grid", "angle", "midpoint", "intersection"}
-    settings_of_others = replace(settings, kinds=kinds_of_others)
-    for number, (x, y) in enumerate(_choose_moved_points(points)):
-        moved = (x + dx, y + dy)
-        ranked = _SnapSearch(moved, targets, settings if number == 0 else settings_of_others).find_best()
-        snapped_x, snapped_y = ranked.snap.point
-        shift = (dx + snapped_x - moved[0], dy + snapped_y - moved[1])
-        # The gap is computed from the shift, so that rounding errors do not extend the reach.
-        gap = math.hypot(shift[0] - dx, shift[1] - dy)
-        if ranked.snap.guides and gap <= settings.reach and (ranked.rank, gap) < best_rank:
-            best_rank = (ranked.rank, gap)
-            best = Snap(shift, ranked.snap.guides)
+    best = _find_best_displacement(points, (dx, dy), targets, settings)
     if "grid" not in settings.kinds or settings.grid <= 0.0 or not points:
         return best
     return Snap(_snap_remaining_axes(points[0], (dx, dy), best.point, settings.grid), best.guides)
 
 
-def _snap_remaining_axes(first: Point, offset: Point, snapped: Point, grid: float) -> Point:
-    """Return a displacement in which each axis that has not snapped yet takes the first point to the grid.
+def _find_best_displacement(
+    points: Sequence[Point], displacement: Point, targets: SnapTargets, settings: SnapSettings
+) -> Snap:
+    """Return the displacement by which the moved point with the best snap moves to its target.
+
+    The parameters are those of `snap_move`. If no point snaps, the displacement is unchanged.
+    """
+    dx, dy = displacement
+    best_rank = (math.inf, math.inf)
+    best = Snap(displacement)
+    # Among many points, some lie near the grid by chance, which is no reason to snap.
+    other_kinds = settings.kinds - {"grid", "angle", "midpoint", "intersection"}
+    other_settings = replace(settings, kinds=other_kinds)
+    for number, (x, y) in enumerate(_choose_moved_points(points)):
+        moved = (x + dx, y + dy)
+        ranked = _SnapSearch(moved, targets, settings if number == 0 else other_settings).find_best()
+        snapped_x, snapped_y = ranked.snap.point
+        snapped = (dx + snapped_x - moved[0], dy + snapped_y - moved[1])
+        # The gap is computed from the displacement, so that rounding errors do not extend the reach.
+        gap = math.hypot(snapped[0] - dx, snapped[1] - dy)
+        if ranked.snap.guides and gap <= settings.reach and (ranked.rank, gap) < best_rank:
+            best_rank = (ranked.rank, gap)
+            best = Snap(snapped, ranked.snap.guides)
+    return best
+
+
+def _snap_remaining_axes(first: Point, displacement: Point, snapped: Point, grid: float) -> Point:
+    """Snap the displacement to the grid along each axis along which it has not snapped yet.
 
     Parameters
     ----------
     first : Point
         The first moved point before the move, m.
-    offset, snapped : Point
+    displacement, snapped : Point
         Displacement before and after snapping, m.
     grid : float
         Spacing of the grid, m.
+
+    Returns
+    -------
+    Point
+        Displacement after which the first point lies on a grid line of each of these axes, m.
     """
-    shift = list(snapped)
+    on_grid = list(snapped)
     for axis in (0, 1):
-        if abs(snapped[axis] - offset[axis]) < _MIN_SHIFT_M:
-            shift[axis] = grid * round((first[axis] + snapped[axis]) / grid) - first[axis]
-    return shift[0], shift[1]
+        if abs(snapped[axis] - displacement[axis]) < _MIN_SHIFT_M:
+            on_grid[axis] = grid * round((first[axis] + snapped[axis]) / grid) - first[axis]
+    return on_grid[0], on_grid[1]
 
 
 def _choose_moved_points(points: Sequence[Point]) -> Sequence[Point]:

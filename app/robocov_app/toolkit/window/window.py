@@ -123,7 +123,7 @@ class BaseWindow:
     def draw(self) -> None:
         """Draw everything, and show it."""
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         """Return a value that changes whenever the frame must be redrawn; None while something moves."""
         return None
 
@@ -197,7 +197,7 @@ class BaseWindow:
     def _draw_if_changed(self, seconds: float, *, was_idle: bool) -> None:
         """Draw the window unless its visible state is unchanged, and measure how long nothing has changed."""
         window = self.replacement or self
-        state = window.get_visible_state()
+        state = window.build_frame_key()
         if self._had_events or state is None:
             self._idle_s = 0.0
         else:

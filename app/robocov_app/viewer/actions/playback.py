@@ -37,7 +37,7 @@ class PlaybackActions:
         if session.playback.stop_when_settled:
             session.playback.is_playing = True
             session.timeline.is_settled = False
-            self._viewer.show_message("plays until the team has settled")
+            self._viewer.show_message("Playing until the team has settled.")
 
     def restart(
         self, *, robots: int | None = None, start: str | None = None, seed: int | None = None
@@ -86,21 +86,21 @@ class PlaybackActions:
         self._viewer.session.playback.clock.speed = speed
         self._viewer.show_message(f"speed {format_speed(speed)}")
 
-    def look_by(self, steps: int) -> None:
+    def show_offset(self, steps: int) -> None:
         """Pause, and show the recorded state that is `steps` later, or earlier if negative."""
         self._viewer.session.playback.is_playing = False
         self._viewer.session.show_offset(steps)
 
-    def look_at(self, time: float) -> None:
+    def show_time(self, time: float) -> None:
         """Pause, and show a time, s."""
         self._viewer.session.playback.is_playing = False
         self._viewer.session.show_time(time)
 
-    def look_by_seconds(self, seconds: float) -> None:
+    def shift_time(self, seconds: float) -> None:
         """Pause, and show the state that is a time, s, later, or earlier if negative."""
-        self.look_at(self._viewer.session.displayed.time + seconds)
+        self.show_time(self._viewer.session.displayed.time + seconds)
 
-    def look_at_present(self) -> None:
+    def show_present(self) -> None:
         """Show the present."""
         session = self._viewer.session
         session.show_time(session.timeline.end_time)
@@ -110,29 +110,29 @@ class PlaybackActions:
         session = self._viewer.session
         if session.branch():
             session.playback.is_playing = True
-            self._viewer.show_message("continues from here; what came after stays as a ghost curve")
+            self._viewer.show_message("Continuing from here. The later steps are kept as another branch.")
         else:
-            self._viewer.show_message("this is the present: go back first (←, or drag the time line)")
+            self._viewer.show_message("Go back in time first (← or the time slider).")
 
     def list_branch_names(self) -> list[str]:
         """Return the numbers of the branches as strings, starting from 1."""
         count = len(self._viewer.session.timeline.document.list_branches())
         return [str(number) for number in range(1, count + 1)]
 
-    def enter_branch(self, name: str) -> None:
+    def go_to_branch(self, name: str) -> None:
         """Go to the end of a branch, given by its name or its number as a string."""
         session = self._viewer.session
         session.seek(session.timeline.document.find_branch(name).node)
 
-    def enter_next_branch(self, steps: int) -> None:
+    def go_to_next_branch(self, steps: int) -> None:
         """Go to the end of the branch that is `steps` places further in the list; the list is cyclic."""
         session = self._viewer.session
         ends = [branch.node for branch in session.timeline.document.list_branches()]
         head, _ = session.timeline.destination
         index = ends.index(head) if head in ends else -1
-        self.enter_node(ends[(index + steps) % len(ends)].number)
+        self.go_to_node(ends[(index + steps) % len(ends)].number)
 
-    def enter_node(self, number: int) -> None:
+    def go_to_node(self, number: int) -> None:
         """Go to the end of the branch whose last node has this number."""
         session = self._viewer.session
         branches = session.timeline.document.list_branches()

@@ -15,9 +15,9 @@ from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import name_failed_robot
 from robocov_app.viewer.session.document import Node, SessionDocument, replay
 from robocov_app.viewer.session.edits import PlaceRobot
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.session.scenario import SessionScenario
 
@@ -52,11 +52,11 @@ class SelectedBranch:
         """Scenario at the start of the run."""
         return self.root.require_scenario()
 
-    def replay(self) -> Iterator[tuple[Lockstep, Node]]:
+    def replay(self) -> Iterator[tuple[PaneGroup, Node]]:
         """Simulate the branch; yield the run at each step, with the node whose time span contains it."""
         return replay(self.document, self.node, self.last_step)
 
-    def is_end(self, run: Lockstep, node: Node) -> bool:
+    def is_end(self, run: PaneGroup, node: Node) -> bool:
         """Return whether a run has reached the end of the branch."""
         return node is self.node and run.step >= self.last_step
 
@@ -131,7 +131,7 @@ class BranchPart:
     placed: list[tuple[int, int]] = field(default_factory=list)
     last_step: int = 0
 
-    def add_step(self, run: Lockstep, node: Node) -> None:
+    def add_step(self, run: PaneGroup, node: Node) -> None:
         """Record the current step of a run, and what the user does to robots in it."""
         self.last_step = run.step
         for pane in run.panes:

@@ -23,8 +23,8 @@ from robocov_app.viewer.branch_output.parts import (
     build_part_records,
 )
 from robocov_app.viewer.session.document import Node
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.window.screen_video import copy_pixels
 
 CAPTION_PX = 30  # height of the strip with the last edit, px at scale 1
@@ -111,7 +111,7 @@ class _FrameDrawer:
     caption_height: int
     painters: dict[int, Painter]
 
-    def draw(self, run: Lockstep, node: Node) -> Frame:
+    def draw(self, run: PaneGroup, node: Node) -> Frame:
         """Draw the current step of a run, with the caption of the last edit."""
         names = name_folders([pane.controller.name for pane in run.panes])
         frames: list[Frame] = []
@@ -124,7 +124,7 @@ class _FrameDrawer:
         caption = _draw_caption(_describe_edit(node, run.scenario.dt), size, theme)
         return np.concatenate([page, caption])
 
-    def _get_painter(self, run: Lockstep, pane: Pane) -> Painter:
+    def _get_painter(self, run: PaneGroup, pane: Pane) -> Painter:
         """Return the painter of a pane; build a new one if the boundary of the map has changed."""
         environment = run.scenario.environment
         painter = self.painters.get(pane.number)
@@ -134,7 +134,7 @@ class _FrameDrawer:
         painter.environment = environment
         return painter
 
-    def _build_painter(self, run: Lockstep) -> Painter:
+    def _build_painter(self, run: PaneGroup) -> Painter:
         """Build the painter of a pane with the visible layers and the size that the layout gives it."""
         settings = self.settings
         if self.layout is None:

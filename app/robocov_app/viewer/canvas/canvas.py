@@ -46,6 +46,9 @@ MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, its caption s
 
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
+_ACTIVE_BAR_PX = 3  # height of the bar at the top of the active pane
+_FRAME_STRENGTH = 0.18  # fraction of the color of text in the frames of the panes
+_COLOR_LIMIT_MARGIN = 1.1  # so that the color scale does not have to change again soon
 _COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while the largest distance is in this fraction of it
 
 
@@ -259,8 +262,7 @@ class ViewerCanvas:
         """Adapt the color scale to the largest distance, m, but only when it has changed considerably."""
         low, high = _COLOR_LIMIT_RANGE
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
-            # Leave a margin of 10 %, so that the scale does not have to change again soon.
-            self._color_limit = choose_color_limit(1.1 * largest)
+            self._color_limit = choose_color_limit(_COLOR_LIMIT_MARGIN * largest)
 
     def _get_path(self, known: KnownCost | None) -> Array | None:
         """Return the path from the cursor to its nearest robot, (k, 2) m; None if it is not shown."""
@@ -327,9 +329,10 @@ class ViewerCanvas:
         theme = self.theme
         for pane, box in enumerate(self.layout.panes):
             rect = pygame.Rect(box)
-            pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
+            pygame.draw.rect(screen, mix(theme.background, theme.ink, _FRAME_STRENGTH), rect.inflate(2, 2), 2)
             if pane == self.viewer.active_pane:
-                bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * self.layout.scale))))
+                bar_height = max(2, round(_ACTIVE_BAR_PX * self.layout.scale))
+                bar = pygame.Rect(rect.topleft, (rect.width, bar_height))
                 controller = self.viewer.session.timeline.panes[pane].controller
                 screen.fill(theme.get_controller_color(controller.name), bar)
 

@@ -19,6 +19,13 @@ from robocov_app.viewer.tools.tool import ViewerToolOverlay
 # Lengths in pixels at scale 1.
 FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
 _MARK_PX = 3.0  # half the side of the mark of a point
+_LINE_PX = 1.5
+_CLOSING_LINE_PX = 1.0  # from the last point of an outline to its first one
+_DRAG_DASH_PX = 3.0
+_SELECTION_RING_PX = 2.2
+_SELECTION_GAP_PX = 4.0  # between a robot and the ring around it
+_HOVER_RING_PX = 1.2
+_HOVER_GAP_PX = 3.5
 _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
 _OBSTACLE_ALPHA = 89  # opacity of a preview, 0 to 255
@@ -33,7 +40,7 @@ def draw_drag(canvas: Canvas, scene: Scene, drag: Drag | None) -> None:
         return
     position = scene.now.positions[numbers.index(drag.robot)]
     start, end = canvas.camera.to_pixels(np.array([position, drag.target])).tolist()
-    canvas.draw_dashed_line(start, end, canvas.theme.ink, canvas.scale_width(1.5), dash=3.0)
+    canvas.draw_dashed_line(start, end, canvas.theme.ink, canvas.scale_width(_LINE_PX), dash=_DRAG_DASH_PX)
 
 
 def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) -> None:
@@ -42,9 +49,8 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
         return
     radius = scene.get_failed_radius(selected) * canvas.camera.zoom
     radius = max(radius, FAILED_RADIUS_PX * canvas.scale)
-    ring = partial(
-        sprites.render_ring, round(radius) + 4.0 * canvas.scale, canvas.theme.ink, 2.2 * canvas.scale
-    )
+    ring_radius = round(radius) + _SELECTION_GAP_PX * canvas.scale
+    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, _SELECTION_RING_PX * canvas.scale)
     canvas.draw_sprite(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())
 
 
@@ -56,26 +62,27 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
     row = numbers.index(number)
     if row == scene.selected:
         return
-    radius = compute_drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+    radius = compute_drawn_radii(canvas, scene)[row] + _HOVER_GAP_PX * canvas.scale
     center = canvas.camera.to_pixels(scene.now.positions[row]).tolist()
-    canvas.draw_sprite(partial(sprites.render_ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
+    ring = partial(sprites.render_ring, radius, canvas.theme.ink, _HOVER_RING_PX * canvas.scale)
+    canvas.draw_sprite(ring, center)
 
 
-def draw_tool_overlay(canvas: Canvas, state: ViewerToolOverlay) -> None:
+def draw_tool_overlay(canvas: Canvas, overlay: ViewerToolOverlay) -> None:
     """Draw the overlay of a tool in a pane."""
-    if state.obstacle is not None:
-        _draw_obstacle(canvas, state.obstacle)
-    if not state.line:
+    if overlay.obstacle is not None:
+        _draw_obstacle(canvas, overlay.obstacle)
+    if not overlay.line:
         return
-    points = canvas.camera.to_pixels(np.array(state.line))
-    _draw_line(canvas, points, is_closed=state.is_closed)
-    if state.has_marks:
+    points = canvas.camera.to_pixels(np.array(overlay.line))
+    _draw_line(canvas, points, is_closed=overlay.is_closed)
+    if overlay.has_marks:
         _draw_marks(canvas, points)
-    if state.label:
+    if overlay.label:
         x, y = points[-1].tolist()
         dx, dy = _LABEL_OFFSET_PX
         position = (x + dx * canvas.scale, y + dy * canvas.scale)
-        draw_tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
+        draw_tag(canvas.surface, overlay.label, position, canvas.theme, canvas.scale)
 
 
 def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
@@ -87,16 +94,16 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(1.5))
+        canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(_LINE_PX))
 
 
 def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
     if len(points) < 2:
         return
-    canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(1.5), is_closed=False)
+    canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(_LINE_PX), is_closed=False)
     if is_closed:
         canvas.draw_dashed_line(
-            points[-1].tolist(), points[0].tolist(), canvas.theme.accent, canvas.scale_width(1.0)
+            points[-1].tolist(), points[0].tolist(), canvas.theme.accent, canvas.scale_width(_CLOSING_LINE_PX)
         )
 
 
@@ -105,4 +112,4 @@ def _draw_marks(canvas: Canvas, points: Array) -> None:
     for x, y in points.tolist():
         box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
         pygame.draw.rect(canvas.surface, canvas.theme.background, box)
-        pygame.draw.rect(canvas.surface, canvas.theme.accent, box, canvas.scale_width(1.5))
+        pygame.draw.rect(canvas.surface, canvas.theme.accent, box, canvas.scale_width(_LINE_PX))

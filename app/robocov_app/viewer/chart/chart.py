@@ -19,7 +19,7 @@ from robocov_app.viewer.chart.events import draw_events
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.pointer_tag import draw_pointer_tag
 from robocov_app.viewer.chart.scale import ChartScale, TimeScale, build_chart_scale
-from robocov_app.viewer.chart.time_slider import draw_empty_time_line, draw_present
+from robocov_app.viewer.chart.time_slider import draw_empty_slider, draw_slider_state
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
 
@@ -50,7 +50,7 @@ class Chart:
         self.hover: tuple[int, int] | None = None
         self.ghosts: list[GhostLine] = []
         self.switch_box: Box | None = None
-        self._quantity = DISTANCE
+        self._selected_quantity = DISTANCE
         self._page: pygame.Surface | None = None
         self._scale: ChartScale
         self._page_key: object = None
@@ -64,10 +64,10 @@ class Chart:
         self._page = None
 
     @property
-    def plotted(self) -> PlottedQuantity:
+    def quantity(self) -> PlottedQuantity:
         """The quantity that the chart shows."""
         if self._has_times:
-            return self._quantity
+            return self._selected_quantity
         return DISTANCE
 
     @property
@@ -82,15 +82,15 @@ class Chart:
 
     @property
     def _frame(self) -> ChartFrame:
-        return ChartFrame(self._layout, self._theme, self.viewer.session, self.plotted)
+        return ChartFrame(self._layout, self._theme, self.viewer.session, self.quantity)
 
     def switch_quantity(self) -> str:
         """Show the other quantity, and return the status message."""
         if not self._has_times:
             return "all robots are equally fast: the mean time is proportional to the mean distance"
-        self._quantity = TIME if self.plotted is DISTANCE else DISTANCE
+        self._selected_quantity = TIME if self.quantity is DISTANCE else DISTANCE
         self._page = None
-        title = self._quantity.title
+        title = self._selected_quantity.title
         return f"plotted: {title[:1].lower()}{title[1:]}"
 
     def is_on_switch(self, pixel: tuple[int, int]) -> bool:
@@ -119,7 +119,7 @@ class Chart:
             page = self._draw_page(frame)
         screen.blit(page, self._layout.chart.position)
         draw_captions(screen, frame, self._scale)
-        draw_present(screen, frame)
+        draw_slider_state(screen, frame)
         if self.hover is not None:
             draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]))
 
@@ -170,5 +170,5 @@ class Chart:
         draw_events(canvas, frame, scale)
         self.ghosts = draw_ghosts(canvas, frame, scale)
         draw_curves(canvas, frame, scale)
-        draw_empty_time_line(canvas, frame, scale.times)
+        draw_empty_slider(canvas, frame, scale.times)
         return page

@@ -22,4 +22,4 @@ class TimeGesture(Gesture):
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
         """Display the time under the mouse."""
-        self._viewer.attempt(lambda: self._viewer.playback.look_at(self._chart.to_time(event.pos[0])))
+        self._viewer.attempt(lambda: self._viewer.playback.show_time(self._chart.to_time(event.pos[0])))

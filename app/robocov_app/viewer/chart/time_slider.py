@@ -22,7 +22,7 @@ _HANDLE_RADIUS_PX = 6.5
 _HANDLE_RING_PX = 2.0
 
 
-def draw_empty_time_line(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
+def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
     """Draw the empty bar of the time slider, and a label that tells whether present or past is shown.
 
     Parameters
@@ -63,7 +63,7 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
     canvas.draw_text(text, (left, middle), color=theme.start, size=size)
 
 
-def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
+def draw_slider_state(screen: pygame.Surface, frame: ChartFrame) -> None:
     """Draw the changing parts of the time slider onto the window: bar, events, and handle."""
     theme = frame.theme
     times = frame.times

@@ -129,13 +129,13 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
 def _list_time_commands(viewer: Presenter) -> list[Command]:
     """Return the commands that go to another time or branch."""
     playback = viewer.playback
-    step_back = partial(playback.look_by, -1)
-    step_forward = partial(playback.look_by, 1)
-    second_back = partial(playback.look_by_seconds, -1.0)
-    second_forward = partial(playback.look_by_seconds, 1.0)
-    go_to_start = partial(playback.look_at, 0.0)
-    previous_branch = partial(playback.enter_next_branch, -1)
-    next_branch = partial(playback.enter_next_branch, 1)
+    step_back = partial(playback.show_offset, -1)
+    step_forward = partial(playback.show_offset, 1)
+    second_back = partial(playback.shift_time, -1.0)
+    second_forward = partial(playback.shift_time, 1.0)
+    go_to_start = partial(playback.show_time, 0.0)
+    previous_branch = partial(playback.go_to_next_branch, -1)
+    next_branch = partial(playback.go_to_next_branch, 1)
     time_argument = Argument("seconds", partial(_read_positive_number, "time"))
     branch_argument = Argument("branch", list_values=playback.list_branch_names)
     group = CommandGroup("Time")
@@ -144,12 +144,12 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
     group.add("back:second", "Back by a second", second_back, "shift+left", repeats=True)
     group.add("forward:second", "Forward by a second", second_forward, "shift+right", repeats=True)
     group.add("first", "Go to the start", go_to_start, "home")
-    group.add("live", "Go to the present", playback.look_at_present, "end")
+    group.add("live", "Go to the present", playback.show_present, "end")
     group.add("branch:here", "Continue from here", playback.branch, "b")
     group.add("branch:previous", "Previous branch", previous_branch, "alt+left")
     group.add("branch:next", "Next branch", next_branch, "alt+right")
-    group.add("time", "Go to a time", playback.look_at, argument=time_argument)
-    group.add("branch", "Enter a branch", playback.enter_branch, argument=branch_argument)
+    group.add("time", "Go to a time", playback.show_time, argument=time_argument)
+    group.add("branch", "Enter a branch", playback.go_to_branch, argument=branch_argument)
     return group.commands
 
 

@@ -54,7 +54,7 @@ class CostCurves:
             and np.array_equal(known.result.positions, positions)
         )
         if not is_known:
-            costs.ask(
+            costs.request(
                 pane.number,
                 session.displayed.time,
                 positions,
@@ -93,7 +93,7 @@ class CostCurves:
             # Costs can only be computed on the displayed map.
             if state is None or state.setup.environment is not session.displayed.environment:
                 continue
-            self._viewer.costs.ask(
+            self._viewer.costs.request(
                 pane.number,
                 history.get_time(index),
                 state.positions,

@@ -63,7 +63,7 @@ class _SharedSites(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class CostQuestion:
+class CostRequest:
     """Request for the cost on a map; without positions, only a request to prepare the map.
 
     Attributes
@@ -126,29 +126,29 @@ class Costs:
         if not direct:
             service = "robocov_app.viewer.costs.costs:CostService"
             self._worker = LatestWorker(service, "computes the cost", _CostCodec)
-        self._map_question: CostQuestion | None = None
-        self._asked: CostQuestion | None = None
+        self._map_request: CostRequest | None = None
+        self._pending: CostRequest | None = None
         self._map_number = 0
         self._is_prepared = False
-        self._waiting: dict[int, CostQuestion] = {}
-        self._asked_pane: int | None = None  # None if the pending answer is no longer wanted
+        self._queued: dict[int, CostRequest] = {}
+        self._pending_pane: int | None = None  # None if the pending answer is no longer wanted
 
     def set_environment(self, environment: Environment) -> None:
         """Start to prepare the computation of costs on another map."""
         self._map_number += 1
-        self._map_question = CostQuestion(self._map_number, environment, self.lattice)
+        self._map_request = CostRequest(self._map_number, environment, self.lattice)
         self.known = {}
-        self._waiting = {}
+        self._queued = {}
         self._prepare_map()
         self.poll()
 
     def forget(self) -> None:
-        """Drop all known costs and pending questions, because they belong to another run."""
-        self._waiting = {}
+        """Drop all known costs and pending requests, because they belong to another run."""
+        self._queued = {}
         self.known = {}
-        self._asked_pane = None
+        self._pending_pane = None
 
-    def ask(
+    def request(
         self,
         pane: int,
         time: float,
@@ -158,7 +158,7 @@ class Costs:
         *,
         is_for_curve: bool = False,
     ) -> None:
-        """Queue a question about the cost of a pane; it replaces one about the same pane that still waits.
+        """Queue a request for the cost of a pane; it replaces an earlier one for the same pane.
 
         Parameters
         ----------
@@ -175,11 +175,11 @@ class Costs:
         is_for_curve : bool
             Whether the answer is only added to a curve.
         """
-        if self._map_question is None:
+        if self._map_request is None:
             return
-        # A replaced question keeps its place in the queue, so that panes take turns.
-        self._waiting[pane] = replace(
-            self._map_question,
+        # A replaced request keeps its place in the queue, so that panes take turns.
+        self._queued[pane] = replace(
+            self._map_request,
             time=time,
             positions=np.array(positions),
             point=point,
@@ -188,7 +188,7 @@ class Costs:
         )
 
     def poll(self) -> list[tuple[int, KnownCost]]:
-        """Collect answers, and send the next question to the worker.
+        """Collect answers, and send the next request to the worker.
 
         Returns
         -------
@@ -196,25 +196,29 @@ class Costs:
             The answers since the last call, each with the number of its pane.
         """
         answers: list[tuple[int, KnownCost]] = []
-        while self._asked is not None or self._ask_next():
+        while self._pending is not None or self._send_next():
             answer = self._worker.poll()
             if self._worker.is_busy:
                 self._show_progress()
                 break
-            asked = self._asked
-            self._asked = None
-            if asked is self._map_question:
+            request = self._pending
+            self._pending = None
+            if request is self._map_request:
                 self._is_prepared = answer is not None
                 self.state = "" if self._is_prepared else f"no cost: {self._worker.problem}"
             elif isinstance(answer, KnownCost):
-                if self._asked_pane is not None:
-                    answers.append((self._asked_pane, answer))
-                    if asked is None or not asked.is_for_curve:
-                        self.known[self._asked_pane] = answer
+                if self._pending_pane is not None:
+                    answers.append((self._pending_pane, answer))
+                    self._adopt_answer(request, self._pending_pane, answer)
             elif not self._worker.is_alive:
                 # The process has died. Preparing the map starts a new one; if it dies, too, there is no cost.
                 self._prepare_map()
         return answers
+
+    def _adopt_answer(self, request: CostRequest | None, pane: int, answer: KnownCost) -> None:
+        """Make an answer the latest cost of its pane, unless it was requested only for a curve."""
+        if request is None or not request.is_for_curve:
+            self.known[pane] = answer
 
     def close(self) -> None:
         """End the process."""
@@ -231,17 +235,17 @@ class Costs:
     def _prepare_map(self) -> None:
         self._is_prepared = False
         self.state = "cost: preparing the map"
-        self._asked = self._map_question
-        self._asked_pane = None
-        self._worker.put(self._map_question)
+        self._pending = self._map_request
+        self._pending_pane = None
+        self._worker.put(self._map_request)
 
-    def _ask_next(self) -> bool:
-        """Send the question that has waited longest; return whether there was one."""
-        if not self._waiting or not self._is_prepared:
+    def _send_next(self) -> bool:
+        """Send the oldest queued request; return whether there was one."""
+        if not self._queued or not self._is_prepared:
             return False
-        self._asked_pane = next(iter(self._waiting))
-        self._asked = self._waiting.pop(self._asked_pane)
-        self._worker.put(self._asked)
+        self._pending_pane = next(iter(self._queued))
+        self._pending = self._queued.pop(self._pending_pane)
+        self._worker.put(self._pending)
         return True
 
 
@@ -263,13 +267,13 @@ class _CostCodec(Codec):
         self._shared: _SharedSites | None = None
         self._get_lattice: Callable[[], FieldLattice] | None = None
 
-    def encode(self, question: CostQuestion) -> CostQuestion:
-        """Remove the map from a question if it was sent before."""
-        if question.number == self._sent_map or question.environment is None:
-            return replace(question, environment=None)
-        self._sent_map = question.number
+    def encode(self, request: CostRequest) -> CostRequest:
+        """Remove the map from a request if it was sent before."""
+        if request.number == self._sent_map or request.environment is None:
+            return replace(request, environment=None)
+        self._sent_map = request.number
         # A copy lacks the cached properties, which are large and quickly computed again.
-        return replace(question, environment=replace(question.environment))
+        return replace(request, environment=replace(request.environment))
 
     def decode(self, answer: _Answer) -> KnownCost | _SharedSites:
         """Complete an answer with the shared data."""
@@ -293,7 +297,7 @@ class _CostCodec(Codec):
 
 
 class CostService:
-    """Service in the other process: prepares the latest map, and answers the latest question about it."""
+    """Service in the other process: prepares the latest map, and answers the latest request about it."""
 
     failure_message = "the cost could not be computed"
 
@@ -304,29 +308,29 @@ class CostService:
         self._sent_cost: CoverageCost | None = None  # the cost whose shared data were sent last
         self._varying_cost: TimeVaryingCost | None = None
 
-    def __call__(self, questions: list[CostQuestion], channel: Channel) -> _Answer:
-        """Answer the last of several questions; the map may have come with an earlier one."""
-        maps = [question for question in questions if question.environment is not None]
+    def __call__(self, questions: list[CostRequest], channel: Channel) -> _Answer:
+        """Answer the last of several requests; the map may have come with an earlier one."""
+        maps = [request for request in questions if request.environment is not None]
         if maps:
             self._prepare(maps[-1], channel)
         cost = self._cost
         varying_cost = self._varying_cost
-        question = questions[-1]
+        request = questions[-1]
         if cost is None or varying_cost is None:
             raise InputError("the map has no cost")
         answer = _Answer(None)
-        if question.positions is not None:
-            answer = _evaluate(varying_cost, question, question.positions)
-            cost = varying_cost.get_cost(question.time)
+        if request.positions is not None:
+            answer = _evaluate(varying_cost, request, request.positions)
+            cost = varying_cost.get_cost(request.time)
         shared = None
         if cost is not self._sent_cost:
             shared = _SharedSites(cost.sites, cost.corners, cost.weights)
         self._sent_cost = cost
         return answer._replace(shared=shared)
 
-    def _prepare(self, question: CostQuestion, channel: Channel) -> None:
+    def _prepare(self, request: CostRequest, channel: Channel) -> None:
         """Prepare the cost of a map; stop with a RobocovError as soon as a newer map has been sent."""
-        environment = question.environment
+        environment = request.environment
         assert environment is not None
         started_at = time.perf_counter()
         reported_at = started_at
@@ -349,27 +353,27 @@ class CostService:
         before = self._cost
         is_reusable = (
             before is not None
-            and before.lattice == question.lattice
+            and before.lattice == request.lattice
             and before.environment.has_same_geometry(environment)
         )
         if before is not None and is_reusable:
             self._cost = before.with_density(environment)
         else:
-            self._cost = CoverageCost(environment, question.lattice, progress=report_progress)
+            self._cost = CoverageCost(environment, request.lattice, progress=report_progress)
         self._varying_cost = TimeVaryingCost(self._cost, progress=stop_for_newer_map)
 
 
-def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:
-    """Compute the answer to a question, without the shared data."""
-    result = cost.evaluate_all_robots(question.time, positions)
+def _evaluate(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> _Answer:
+    """Compute the answer to a request, without the shared data."""
+    result = cost.evaluate_all_robots(request.time, positions)
     if result is None:
         raise InputError("positions: expected at least one at a free position, got none")
     path: Array | None = None
-    if question.point is not None:
+    if request.point is not None:
         # There is no path from a point that is not free.
         with suppress(RobocovError):
-            available = cost.find_available_robots(question.time, positions)
-            path = cost.get_cost(question.time).find_path(positions[available], question.point)
+            available = cost.find_available_robots(request.time, positions)
+            path = cost.get_cost(request.time).find_path(positions[available], request.point)
     # Sending 32-bit integers takes half as long.
     result = replace(
         result,
@@ -382,15 +386,15 @@ def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -
         environment=None,
         sites=None,
     )
-    travel_time = _compute_travel_time(cost, question, positions)
-    return _Answer(None, question.time, result, path, travel_time)
+    travel_time = _compute_travel_time(cost, request, positions)
+    return _Answer(None, request.time, result, path, travel_time)
 
 
-def _compute_travel_time(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> float | None:
+def _compute_travel_time(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> float | None:
     """Return the mean time until the first robot can reach a point, s; None without speeds."""
-    if question.speeds is None:
+    if request.speeds is None:
         return None
-    result = cost(question.time, positions, speeds=question.speeds)
+    result = cost(request.time, positions, speeds=request.speeds)
     if result is None:
         return None
     return result.mean_time

@@ -5,6 +5,13 @@ import math
 MIN_FORCE_N = 5e-4
 """Smaller forces are written as 0 N and are drawn without an arrow."""
 
+_MAX_NUMBER = 1e6
+# Limits at which rounding to a number of decimals would add a digit: 9.95 becomes 10, 0.995 becomes 1.0.
+_NO_DECIMALS = 9.95
+_ONE_DECIMAL = 0.995
+_TWO_DECIMALS = 0.00995
+_MIN_NUMBER = 0.005
+"""Smaller numbers are rounded to 0."""
 _DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 
 
@@ -25,13 +32,13 @@ def format_number(value: float) -> str:
     >>> [format_number(value) for value in (0.001, 0.314, 2.44, 12.3, 1e9)]
     ['0', '0.31', '2.4', '12', 'over a million']
     """
-    if value >= 1e6:
+    if value >= _MAX_NUMBER:
         return "over a million"
-    if value >= 9.95:
+    if value >= _NO_DECIMALS:
         return f"{value:.0f}"
-    if value >= 0.995:
+    if value >= _ONE_DECIMAL:
         return f"{value:.1f}"
-    if value >= 0.005:
+    if value >= _MIN_NUMBER:
         return f"{value:.2f}"
     return "0"
 
@@ -42,9 +49,9 @@ def format_length(meters: float) -> str:
     >>> [format_length(length) for length in (0.0042, 0.42, 2.44)]
     ['4 mm', '42 cm', '2.4 m']
     """
-    if meters < 0.00995:
+    if meters < _TWO_DECIMALS:
         return f"{1000 * max(meters, 0.0):.0f} mm"
-    if meters < 0.995:
+    if meters < _ONE_DECIMAL:
         return f"{100 * meters:.0f} cm"
     return f"{format_number(meters)} m"
 
@@ -55,7 +62,7 @@ def format_force(newtons: float) -> str:
     >>> [format_force(force) for force in (0.0042, 0.314)]
     ['4 mN', '0.31 N']
     """
-    if MIN_FORCE_N <= newtons < 0.00995:
+    if MIN_FORCE_N <= newtons < _TWO_DECIMALS:
         return f"{1000 * newtons:.0f} mN"
     return f"{format_number(newtons)} N"
 

@@ -73,7 +73,7 @@ def list_force_lines(situation: RobotSituation) -> list[ReportLine]:
         lines.append(_build_force_line(describe(situation, kind, force), kind, force))
     if situation.viscosity > 0.0:
         drag = abs(situation.drag)
-        text = f"held back {format_force(drag)}" if drag >= MIN_FORCE_N else "not held back"
+        text = f"held back with {format_force(drag)}" if drag >= MIN_FORCE_N else "not held back"
         lines.append(_build_force_line(f"{text} by viscosity", "viscosity", situation.drag))
     size = abs(situation.resultant)
     direction = format_direction(situation.resultant) if size >= MIN_FORCE_N else ""
@@ -95,13 +95,13 @@ def _describe_attraction(situation: RobotSituation, kind: str, force: complex) -
     direction = format_direction(force)
     alignment = compute_alignment(force, goal.offset)
     if abs(force) < MIN_FORCE_N:
-        text = "not pulled to"
+        text = "not pulled towards"
     elif alignment < 0.0:
-        text = f"braked {size} {direction} on the way to"
+        text = f"slowed by {size} {direction} on the way to"
     elif alignment > _STRAIGHT_ALIGNMENT:
-        text = f"pulled {size} to"
+        text = f"pulled with {size} towards"
     else:
-        text = f"pulled {size} {direction} on the way to"
+        text = f"pulled with {size} {direction} on the way to"
     return f"{text} {goal.name}, {goal.distance_text}"
 
 
@@ -115,8 +115,8 @@ def _describe_robot_repulsion(situation: RobotSituation, kind: str, force: compl
     names = " and ".join(neighbor.position_text for neighbor in nearest)
     source = f"{names} ({format_robot_count(len(neighbors))} in range)"
     if len(nearest) == 1 and compute_alignment(force, nearest[0].offset) < -_STRAIGHT_ALIGNMENT:
-        return f"pushed {format_force(abs(force))} by {source}"
-    return f"pushed {format_force(abs(force))} {format_direction(force)} by {source}"
+        return f"pushed with {format_force(abs(force))} by {source}"
+    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
 
 
 def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: complex) -> str:
@@ -127,8 +127,8 @@ def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: co
     if abs(force) < MIN_FORCE_N:
         return f"not pushed by {source}"
     if compute_alignment(force, obstacle.offset) < -_STRAIGHT_ALIGNMENT:
-        return f"pushed {format_force(abs(force))} by {source}"
-    return f"pushed {format_force(abs(force))} {format_direction(force)} by {source}"
+        return f"pushed with {format_force(abs(force))} by {source}"
+    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
 
 
 def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
@@ -138,7 +138,7 @@ def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
         source = "other forces of its controller"
     if abs(force) < MIN_FORCE_N:
         return f"not pushed by {source}"
-    return f"pushed {format_force(abs(force))} {format_direction(force)} by {source}"
+    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
 
 
 _FORCE_DESCRIPTIONS: dict[str, Callable[[RobotSituation, str, complex], str]] = {
@@ -157,7 +157,7 @@ def _list_limits(situation: RobotSituation) -> list[str]:
     """Return which limits of acceleration and speed the robot has reached."""
     texts: list[str] = []
     if not situation.forces:
-        texts.append("its controller gives a force that is not a number")
+        texts.append("its controller returned an invalid force")
     acceleration = abs(situation.resultant) / situation.mass
     limit = situation.max_acceleration
     if acceleration > _FAST_ACCELERATION * limit:

@@ -17,7 +17,7 @@ from robocov.observation import Decision, Snapshot
 from robocov.team import Team
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N, format_direction, format_length
 
-UNEXPLAINED_FORCE = "law"
+UNEXPLAINED_FORCE = "controller"
 """Kind of the remainder of a controller's force that its terms do not account for."""
 MIN_SHORTFALL_M = 0.3
 """A robot that rests farther from its goal than this has not arrived."""
@@ -25,6 +25,9 @@ MIN_SHORTFALL_M = 0.3
 _BALANCE_FRACTION = 0.1  # a resultant below this fraction of the largest force counts as zero;
 _BALANCE_ACCELERATION = 0.1  # so does one that accelerates the robot by less than this, m/s²
 _MIN_PRESSING_ALIGNMENT = 0.1  # cosine above which the resultant presses the robot against an object
+# A remainder of the force below the sum of these is a rounding error.
+_FORCE_TOLERANCE_N = 1e-6
+_RELATIVE_FORCE_TOLERANCE = 1e-9
 _MAX_VALUE = 1e100  # larger numbers would overflow in products
 _RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
 
@@ -217,7 +220,8 @@ def _split_force(decision: Decision, robot: int) -> dict[str, complex]:
         if term is not None and name not in _RESERVED_KINDS:
             terms[name] = term
     unexplained = total - sum(terms.values())
-    tolerance = 1e-6 + 1e-9 * max(map(abs, (total, *terms.values())))
+    largest = max(map(abs, (total, *terms.values())))
+    tolerance = _FORCE_TOLERANCE_N + _RELATIVE_FORCE_TOLERANCE * largest
     if not terms or abs(unexplained) > tolerance:
         terms[UNEXPLAINED_FORCE] = unexplained
     return terms

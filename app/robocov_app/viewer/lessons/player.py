@@ -17,6 +17,7 @@ from robocov_app.viewer.tools.tool import ViewerTool
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # bundled with robocov
 READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
 READING_S_PER_WORD = 0.25
+_CHAPTER_CHANGE_S = 0.5  # real time between two chapters, as a margin of the duration
 MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
 STEPS_PER_SECOND = 60
 BASE_LAYERS = frozenset(
@@ -214,7 +215,7 @@ class LessonPlayer:
         duration = 0.0
         for chapter in self.lesson.chapters:
             duration += (chapter.until.step or 0) / STEPS_PER_SECOND / chapter.speed
-            duration += READING_S + 0.5
+            duration += READING_S + _CHAPTER_CHANGE_S
             if chapter.question is not None:
                 duration += READING_S
         return duration

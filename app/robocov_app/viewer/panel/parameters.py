@@ -214,7 +214,7 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
     for name, slider in _LIMITS.items():
         label = slider.label
         meaning = slider.meaning
-        if name in limits.different:
+        if name in limits.values_by_robot:
             label += " ≠"
             meaning += "; robots differ in it until it is set here"
         yield NumberParameter(
@@ -269,5 +269,5 @@ def replace_limit(limits: RobotProperties, name: str, value: float | str | None)
         value = DEFAULT_TRACK_PER_RADIUS * limits.radius if is_unicycle else 0.0
     number = math.inf if value is None else float(value)
     # Values of single robots that differ from the others are dropped for this limit.
-    different = {other: values for other, values in limits.different.items() if other != name}
-    return replace(limits, **{name: number}, different=different)
+    values_by_robot = {key: values for key, values in limits.values_by_robot.items() if key != name}
+    return replace(limits, **{name: number}, values_by_robot=values_by_robot)

@@ -3,7 +3,7 @@
 - `session`: all edits that users can make
 - `document`, `edits`, `map_edits`: the tree of edits from which every state can be recomputed
 - `timeline`, `present`, `seek`, `displayed`: the present, the branches, and the displayed state
-- `pane`, `lockstep`: a team under one controller, and panes that advance together
+- `pane`, `pane_group`: a team under one controller, and panes that advance together
 - `drag_spring`: the spring with which the pointer pulls a robot
 - `past`: recorded states, trajectories and cost curves
 - `scenario`, `controller_choice`, `robot_properties`: one map and team under up to four controllers

@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.edits import RemovePane, Restart, SessionEdit, SetController
-from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
+from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup
 from robocov_app.viewer.session.past.curves import Curve, SessionEvent
 from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.past.trails import TrailSection
@@ -47,7 +47,7 @@ class Node:
         Last step of the time span that has been simulated.
     name : str
         Name of the branch that ends at this node; empty if it has none.
-    redo : Node or None
+    redo_child : Node or None
         The child from which the last undo returned to this node.
     cached_states : list of RunState
         States in the time span of the node. They are not saved in files, because they can be recomputed.
@@ -67,7 +67,7 @@ class Node:
     edits: list[SessionEdit]
     last_step: int
     name: str = ""
-    redo: "Node | None" = field(default=None, repr=False)
+    redo_child: "Node | None" = field(default=None, repr=False)
     cached_states: list[RunState] = field(default_factory=list, repr=False)
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
     trails: dict[int, list[TrailSection]] = field(default_factory=dict, repr=False)
@@ -94,7 +94,7 @@ class Node:
             return self.branch_step
         return 0
 
-    def apply_edits(self, run: Lockstep) -> None:
+    def apply_edits(self, run: PaneGroup) -> None:
         """Apply those edits of the node that were made at the current step of a run.
 
         Raises
@@ -290,9 +290,9 @@ def replay(
     document: SessionDocument,
     node: Node,
     step: int,
-    run: Lockstep | None = None,
-    since: Node | None = None,
-) -> Iterator[tuple[Lockstep, Node]]:
+    run: PaneGroup | None = None,
+    start_node: Node | None = None,
+) -> Iterator[tuple[PaneGroup, Node]]:
     """Simulate the path to a step of a node again, with all its edits.
 
     Parameters
@@ -303,14 +303,14 @@ def replay(
         The node.
     step : int
         The step.
-    run : Lockstep or None
-        A run at some step of the node `since`, with which to start; by default a new run at time 0.
-    since : Node or None
+    run : PaneGroup or None
+        A run at some step of the node `start_node`, with which to start; by default a new run at time 0.
+    start_node : Node or None
         The node whose time span contains the current step of `run`.
 
     Yields
     ------
-    run : Lockstep
+    run : PaneGroup
         The run at each step, before it advances.
     node : Node
         The node whose time span contains that step.
@@ -323,8 +323,8 @@ def replay(
     path = document.get_path(node)
     last_steps = document.get_last_steps(node, step)
     if run is None:
-        run = Lockstep(path[0].require_scenario())
-    first = 0 if since is None else path.index(since)
+        run = PaneGroup(path[0].require_scenario())
+    first = 0 if start_node is None else path.index(start_node)
     for index, current in enumerate(path[first:]):
         if index > 0:
             current.apply_edits(run)

@@ -301,7 +301,7 @@ def start_simulation(
     ParameterError
         If the controller or the team does not accept a value.
     """
-    return _build_scenario(setup, positions, dt, velocities).build_simulation()
+    return _build_pane_scenario(setup, positions, dt, velocities).build_simulation()
 
 
 def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
@@ -320,13 +320,13 @@ def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
     -------
     Simulation
     """
-    scenario = _build_scenario(state.setup, state.positions, dt, state.velocities, state.steering)
+    scenario = _build_pane_scenario(state.setup, state.positions, dt, state.velocities, state.steering)
     simulation = scenario.build_simulation(steps=step, is_computed=True)
     memory = simulation.memory if state.memory is None else state.memory
     return simulation.with_memory(memory, state.inbox)
 
 
-def _build_scenario(
+def _build_pane_scenario(
     setup: PaneSetup,
     positions: Array,
     dt: float,

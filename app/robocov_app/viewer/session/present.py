@@ -11,8 +11,8 @@ import numpy as np
 from robocov.metrics import SETTLED_WINDOW_S, is_team_at_rest
 from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.document import MAX_CACHED_STATES, Node, SessionDocument, replay
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.decision_replay import get_sensor
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import RunState
@@ -25,6 +25,8 @@ from robocov_app.viewer.session.past.trails import (
 
 MAX_SENSED_STATES = 300
 """Maximum number of states from which sensed points are recomputed after a move to another branch."""
+_STEP_MARGIN = 0.5
+"""Margin for the comparison of times, as a fraction of the control period."""
 
 
 @dataclass(eq=False)
@@ -35,14 +37,14 @@ class Present:
     ----------
     head : Node
         The node of the document whose time span contains the present.
-    run : Lockstep
+    run : PaneGroup
         The panes at the present step.
     history : RunHistory
         The recorded states up to the present, which is the last one.
     """
 
     head: Node
-    run: Lockstep
+    run: PaneGroup
     history: RunHistory
 
     @classmethod
@@ -65,7 +67,7 @@ class Present:
         ParameterError
             If a controller or the team does not accept a value.
         """
-        run = Lockstep(root.require_scenario())
+        run = PaneGroup(root.require_scenario())
         history = RunHistory(run.scenario.dt)
         history.append(run.build_state(root.number))
         return cls(root, run, history)
@@ -90,7 +92,7 @@ def build_present(
     old: Present,
     node: Node,
     step: int,
-    edit: Callable[[Lockstep], None] | None = None,
+    edit: Callable[[PaneGroup], None] | None = None,
 ) -> Generator[float, None, Present]:
     """Build the present at a step of a node, in small pieces. The old present is not changed.
 
@@ -124,16 +126,16 @@ def build_present(
     path = document.get_path(node)
     history = _copy_common_past(document, old, node, step)
     if len(history):
-        run = Lockstep.resume(history.last)
+        run = PaneGroup.resume(history.last)
     else:
         start = Present.start(path[0])
         run = start.run
         history = start.history
     # Simulate only from the last known state on.
-    since = next(ancestor for ancestor in path if ancestor.number == history.last.node)
+    start_node = next(ancestor for ancestor in path if ancestor.number == history.last.node)
     first_step = run.step
     step_count = max(step - first_step, 1)
-    for _, current in replay(document, node, step, run, since):
+    for _, current in replay(document, node, step, run, start_node):
         if (run.step, current.number) != (history.last.step, history.last.node):
             history.amend(run.build_state(current.number))
         yield (run.step - first_step) / step_count
@@ -206,7 +208,7 @@ def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, 
         end = last_steps[node.number] * dt
         if following is None:
             # The first row of a following node replaces the row of its step; the last node keeps that row.
-            end += 0.5 * dt
+            end += _STEP_MARGIN * dt
         sections += [section.cut(-np.inf, end) for section in node.trails.get(pane.number, [])]
     simulated = pane.trail.extract(-np.inf, np.inf)
     pane.trail = build_trail(merge_sections(sections, simulated))
@@ -216,9 +218,8 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
     """Return the known states on the path to a step of a node; an empty history if there are none."""
     path = document.get_path(node)
     last_steps = document.get_last_steps(node, step)
-    path_numbers = [ancestor.number for ancestor in path]
-    old_numbers = {ancestor.number for ancestor in document.get_path(old.head)}
-    common_numbers = old_numbers.intersection(path_numbers)
+    common_numbers = {ancestor.number for ancestor in document.get_path(old.head)}
+    common_numbers.intersection_update(last_steps)
     common_count = 0
     for state in old.history.states:
         if state.node in common_numbers and state.step <= last_steps[state.node]:
@@ -228,14 +229,30 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
         history = old.history.copy_until(common_count - 1)
     else:
         history = RunHistory(path[0].require_scenario().dt)
-    # Other states may be cached from an earlier visit to the branch.
-    first_missing = path_numbers.index(history.last.node) if common_count else 0
-    for ancestor in path[first_missing:]:
-        for state in ancestor.cached_states:
-            is_later = not len(history) or state.step >= history.last.step
-            if is_later and state.step <= last_steps[ancestor.number]:
-                history.amend(state)
+    _add_cached_states(history, path, last_steps)
     return history
+
+
+def _add_cached_states(history: RunHistory, path: list[Node], last_steps: Mapping[int, int]) -> None:
+    """Append the states that are cached from an earlier visit to a branch.
+
+    Parameters
+    ----------
+    history : RunHistory
+        The states that are known so far; it may be empty.
+    path : list of Node
+        Nodes from the root of the run to the end of the branch.
+    last_steps : mapping of int to int
+        Last step of each node on the path, by its number.
+    """
+    first_missing = 0
+    if len(history):
+        first_missing = [node.number for node in path].index(history.last.node)
+    for node in path[first_missing:]:
+        for state in node.cached_states:
+            is_later = not len(history) or state.step >= history.last.step
+            if is_later and state.step <= last_steps[node.number]:
+                history.amend(state)
 
 
 def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Iterator[None]:
@@ -248,7 +265,7 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Ite
     dt = new.run.scenario.dt
     for pane in new.run.panes:
         _restore_trail(path, last_steps, pane, dt)
-        if pane.trail.times[0] > new.history.get_time(0) + 0.5 * dt:
+        if pane.trail.times[0] > new.history.get_time(0) + _STEP_MARGIN * dt:
             # A pane that was removed later: its trail was not stored in the nodes.
             earlier = rebuild_trail(new.history, pane.number).extract(-np.inf, np.inf)
             pane.trail = build_trail(merge_sections(earlier, pane.trail.extract(-np.inf, np.inf)))

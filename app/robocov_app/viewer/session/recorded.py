@@ -16,9 +16,9 @@ from robocov.record import Record
 from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import SessionDocument
-from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
 from robocov_app.viewer.session.missing_controller import find_controller, use_placeholder
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
+from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup
 from robocov_app.viewer.session.past.history import MAX_HISTORY_BYTES, RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
 from robocov_app.viewer.session.past.trails import rebuild_trail
@@ -63,7 +63,7 @@ def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] =
     records = [run.record for run in runs]
     choices = [find_controller(record, controllers) for record in records]
     placeholders = tuple(use_placeholder(choice) for choice in choices)
-    start_scenario = _build_scenario(records[0], placeholders)
+    start_scenario = _build_start_scenario(records[0], placeholders)
     history = _build_history(records, replace(start_scenario, controllers=tuple(choices)))
     document = SessionDocument.start(start_scenario)
     head = document.nodes[0]
@@ -132,7 +132,7 @@ def _describe_run(record: Record) -> Mapping[str, object]:
     }
 
 
-def _build_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
+def _build_start_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
     """Build the scenario of several runs from the record of the first run."""
     roster = build_roster(record)
     return SessionScenario(
@@ -252,13 +252,13 @@ def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
     return memories + [None] * (len(record) - len(memories))
 
 
-def _resume_end(last: RunState) -> Lockstep:
+def _resume_end(last: RunState) -> PaneGroup:
     """Resume the last state of a record; placeholders stand in for missing controllers."""
     states = {}
     for number, state in last.states.items():
         setup = replace(state.setup, controller=use_placeholder(state.setup.controller))
         states[number] = state._replace(setup=setup)
-    run = Lockstep.resume(last._replace(states=states))
+    run = PaneGroup.resume(last._replace(states=states))
     for pane in run.panes:
         pane.setup = last.states[pane.number].setup
     return run

@@ -41,7 +41,7 @@ class RobotProperties:
     radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range, track_width, \
 turning_rate : float
         As in `Team`, in SI units; infinite for no limit.
-    different : mapping
+    values_by_robot : mapping
         Values of single robots that differ, by property and robot number.
     """
 
@@ -56,7 +56,9 @@ turning_rate : float
     communication_range: PropertyValue = DEFAULT_COMMUNICATION_RANGE_M
     track_width: PropertyValue = DEFAULT_TRACK_WIDTH_M
     turning_rate: PropertyValue = DEFAULT_TURNING_RATE_RAD_S
-    different: Mapping[str, Mapping[int, PropertyValue]] = field(default_factory=dict)
+    values_by_robot: Annotated[Mapping[str, Mapping[int, PropertyValue]], Field(alias="different")] = field(
+        default_factory=dict
+    )
 
     @classmethod
     def from_team(cls, team: Team, numbers: Sequence[int] | None = None) -> Self:
@@ -73,17 +75,17 @@ turning_rate : float
         -------
         RobotProperties
             If a property is not the same for all robots, the common value is that of the first robot, and
-            `different` lists the values of all robots.
+            `values_by_robot` lists the values of all robots.
         """
         if numbers is None:
             numbers = range(1, len(team) + 1)
         values_by_name = {name: getattr(team, name).tolist() for name in UNITS}
-        different = {}
+        values_by_robot = {}
         for name, values in values_by_name.items():
             if len(set(values)) > 1:
-                different[name] = dict(zip(numbers, values, strict=True))
+                values_by_robot[name] = dict(zip(numbers, values, strict=True))
         first_values = {name: values[0] for name, values in values_by_name.items()}
-        return cls(**first_values, different=different)
+        return cls(**first_values, values_by_robot=values_by_robot)
 
     def build_team(self, numbers: Sequence[int]) -> Team:
         """Build the team of the robots with the given numbers.
@@ -95,7 +97,7 @@ turning_rate : float
         """
         team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
         changed = dict[str, Array]()
-        for name, values in self.different.items():
+        for name, values in self.values_by_robot.items():
             common_value = getattr(self, name)
             changed[name] = np.array([values.get(number, common_value) for number in numbers])
         if changed:

@@ -8,8 +8,8 @@ import numpy as np
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.edits import SessionEdit
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.past.trails import build_trail, merge_sections
@@ -33,7 +33,7 @@ class SavePoint:
         Number of nodes of the document.
     revision : int
         Revision of the document.
-    run : Lockstep
+    run : PaneGroup
         The run.
     run_key : tuple
         Values at least one of which changes with each edit or step.
@@ -55,7 +55,7 @@ class SavePoint:
     head_description: str
     node_count: int
     revision: int
-    run: Lockstep
+    run: PaneGroup
     run_key: tuple[object, ...]
     panes: tuple[Pane, ...]
     history: RunHistory
@@ -111,7 +111,7 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
     run = point.run
     # If the controller of a record no longer exists, its run cannot be resumed, but has not changed either.
     with suppress(RobocovError):
-        run = Lockstep.resume(point.last)
+        run = PaneGroup.resume(point.last)
     old_panes = {pane.number: pane for pane in point.panes}
     for pane in run.panes:
         if pane.number in old_panes:
@@ -133,15 +133,15 @@ def _restore_document(timeline: Timeline, point: SavePoint) -> None:
     nodes = timeline.document.nodes
     del nodes[point.node_count :]
     for node in nodes:
-        if node.redo is not None and node.redo not in nodes:
-            node.redo = None
+        if node.redo_child is not None and node.redo_child not in nodes:
+            node.redo_child = None
     point.head.edits[:] = point.head_edits
     point.head.kind = point.head_kind
     point.head.description = point.head_description
     timeline.document.revision = point.revision
 
 
-def _build_run_key(run: Lockstep) -> tuple[object, ...]:
+def _build_run_key(run: PaneGroup) -> tuple[object, ...]:
     """Return values of a run, at least one of which changes with each edit or step."""
     panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
     return run.step, run.drag, id(run.scenario), *panes

@@ -28,8 +28,8 @@ from robocov_app.viewer.session.edits import (
     compare_obstacles,
 )
 from robocov_app.viewer.session.files.session_file import SavedSession
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.playback import Playback
 from robocov_app.viewer.session.present import Present
 from robocov_app.viewer.session.robot_properties import RobotProperties
@@ -259,7 +259,7 @@ class Session:
         node, _ = self.timeline.destination
         if node.parent is None:
             return None
-        node.parent.redo = node
+        node.parent.redo_child = node
         self.seek(node.parent, node.branch_step)
         return node.description
 
@@ -271,7 +271,7 @@ class Session:
         str or None
             Description of the edit; None if there is none.
         """
-        node = self.timeline.destination[0].redo
+        node = self.timeline.destination[0].redo_child
         if node is None:
             return None
         self.seek(node)
@@ -436,7 +436,7 @@ def _apply_in_past(timeline: Timeline, edit: RunEdit) -> bool:
     shown = timeline.history[timeline.displayed_index]
     releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
 
-    def apply_to(run: Lockstep) -> None:
+    def apply_to(run: PaneGroup) -> None:
         if releases_robot:
             run.drag = None
         run.apply(edit)

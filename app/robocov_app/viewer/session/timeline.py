@@ -6,8 +6,8 @@ import numpy as np
 
 from robocov.errors import ParameterError
 from robocov_app.viewer.session.document import Node, SessionDocument
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.curves import GhostCurve, SessionEvent
 from robocov_app.viewer.session.past.ghosts import build_ghost_curves
 from robocov_app.viewer.session.past.history import RunHistory
@@ -41,7 +41,7 @@ class Timeline:
     ----------
     head : Node
         The node of the document whose time span contains the present.
-    run : Lockstep
+    run : PaneGroup
         The panes at the present step.
     history : RunHistory
         The recorded states up to the present, which is the last one.
@@ -56,7 +56,7 @@ class Timeline:
     """
 
     head: Node
-    run: Lockstep
+    run: PaneGroup
     history: RunHistory
     shown_index: int | None
     is_settled: bool
@@ -218,7 +218,7 @@ class Timeline:
         node: Node,
         step: int | None = None,
         *,
-        edit: Callable[[Lockstep], None] | None = None,
+        edit: Callable[[PaneGroup], None] | None = None,
         seconds: float = np.inf,
     ) -> None:
         """Make a step of a node the present; if an error is raised, nothing changes.

@@ -42,7 +42,7 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
             yield Option(text, branch.describe_end(timeline.scenario.dt), value=branch.node.number)
 
     def enter(option: Option) -> None:
-        viewer.playback.enter_node(int(str(option.value)))
+        viewer.playback.go_to_node(int(str(option.value)))
 
     return create_list_choice("Branches", list_options, enter)
 

@@ -129,10 +129,10 @@ class ViewerPointer(Pointer):
             return None
         node = chart.find_ghost(pixel)
         if node is not None:
-            viewer.attempt(lambda: viewer.playback.enter_node(node))
+            viewer.attempt(lambda: viewer.playback.go_to_node(node))
             return None
         self._leave_lesson()
-        viewer.attempt(lambda: viewer.playback.look_at(chart.to_time(pixel[0])))
+        viewer.attempt(lambda: viewer.playback.show_time(chart.to_time(pixel[0])))
         return TimeGesture(viewer, chart)
 
     def _press_tool(self, event: pygame.event.Event, pane: int, now: float) -> Gesture:

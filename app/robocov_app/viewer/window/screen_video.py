@@ -12,6 +12,7 @@ from robocov.errors import OutputError
 from robocov_app.runs.encoding import Frame, build_encoder_command
 
 VIDEO_FPS = 30
+_FRAME_TOLERANCE = 1e-6  # a frame that is due up to rounding errors is added
 MAX_WAITING_FRAMES = 45  # if so many frames wait for the encoder, new ones are dropped
 
 
@@ -72,7 +73,7 @@ class ScreenVideo:
     def add(self, screen: pygame.Surface, seconds: float) -> None:
         """Add the frame that the window has shown for a time, s, as often as the frame rate requires."""
         self._due_frames += seconds * VIDEO_FPS
-        count = int(self._due_frames + 1e-6)
+        count = int(self._due_frames + _FRAME_TOLERANCE)
         self._due_frames -= count
         if count <= 0:
             return

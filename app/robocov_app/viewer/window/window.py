@@ -199,7 +199,7 @@ class ViewerWindow(CommandWindow):
         self.panel.update(seconds)
         self.pointer.show_action(self.cursor)
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         """Return all values that the frame depends on, to detect changes; None while something moves."""
         viewer = self.viewer
         session = viewer.session

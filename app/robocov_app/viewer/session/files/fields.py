@@ -69,4 +69,4 @@ def keep_none(convert: Callable[[Any, Any], object]) -> Callable[[Any, Any], obj
 
 def build_refusal(error: object) -> PydanticCustomError:
     """Build the validation error for an unusable value, with the message of another error."""
-    return PydanticCustomError("refused", "{words}", {"words": str(error)})
+    return PydanticCustomError("invalid", "{message}", {"message": str(error)})

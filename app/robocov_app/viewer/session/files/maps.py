@@ -79,7 +79,7 @@ class FileContext:
         """Build the map with a number from its representation in the file."""
         if number >= len(self.maps):
             expected = f"the number of a map, 0 to {len(self.maps) - 1}"
-            raise PydanticCustomError("wanted", "{words}", {"words": expected})
+            raise PydanticCustomError("expected", "{message}", {"message": expected})
         content = self.maps[number]
         if isinstance(content, BundledMapModel):
             return self._load_bundled_map(number, content)

@@ -33,6 +33,13 @@ _EDIT_WRITER: TypeAdapter[SessionEdit] = TypeAdapter(SessionEdit)
 _UNKNOWN_TAG = re.compile(
     r"Input tag '(?P<found>.*?)' found using '(?P<key>\w+)' .* expected tags: (?P<known>.*)"
 )
+# Rewrites of messages of pydantic, from "Input should be a valid integer" to "an integer", for example.
+_REWRITES = (
+    (r"^Input should be ", ""),
+    (r"a valid integer", "an integer"),
+    (r"a valid ", "a "),
+    (r".* should have (.*?)( after validation)?, not \d+", r"\1"),
+)
 # In the location of a validation error, pydantic inserts the kind that it has chosen after `KEY, index` for
 # each KEY of these.
 _STEPS_BEFORE_KIND = ("changes", "added", "maps", "gains")
@@ -299,7 +306,7 @@ def _build_mistake(detail: Any) -> Mistake:
     match detail["type"]:
         case "missing":
             return Mistake.at_path(path, "missing")
-        case "refused":
+        case "invalid":
             return Mistake.at_path(path, message)
         case "extra_forbidden":
             return Mistake.at_path(path, "unknown key", at_key=True)
@@ -310,7 +317,7 @@ def _build_mistake(detail: Any) -> Mistake:
         expected = f"one of {unknown_tag['known']}"
         found = quote_json(unknown_tag["found"])
         return Mistake.at_path((*path, unknown_tag["key"]), f"expected {expected}, got {found}")
-    expected = message.removeprefix("Input should be ")
-    expected = expected.replace("a valid integer", "an integer").replace("a valid ", "a ")
-    expected = re.sub(r".* should have (.*?)( after validation)?, not \d+", r"\1", expected)
+    expected = message
+    for pattern, replacement in _REWRITES:
+        expected = re.sub(pattern, replacement, expected)
     return Mistake.at_path(path, f"expected {expected}, got {quote_json(detail['input'])}")

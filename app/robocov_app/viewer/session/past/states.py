@@ -69,7 +69,7 @@ class PaneSetup:
     @property
     def speed_limits(self) -> Array | None:
         """Maximum speeds of the working robots, (n,) m/s; None if all robots have the same."""
-        if "max_speed" not in self.properties.different:
+        if "max_speed" not in self.properties.values_by_robot:
             return None
         return self.team.max_speed
 

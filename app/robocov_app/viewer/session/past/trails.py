@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -79,7 +79,7 @@ class Trail:
         self._closed_sections: list[TrailSection] = []
         self._section_start = 0
         self._start_arrays: dict[Numbers, Array] = {}
-        self._earlier_trail: tuple[int, Trail] | None = None
+        self._earlier_trail: _EarlierTrail | None = None
 
     def __len__(self) -> int:
         return self._count
@@ -218,18 +218,27 @@ class Trail:
 
     def _find_trail(self, time: float) -> "Trail":
         """Return the trail with the team at a time, s: this one, or one built from earlier sections."""
-        index = len(self._closed_sections)
-        starts = [section.times[0] for section in self._closed_sections]
-        if self._section_start < self._count:
-            starts.append(self._times[self._section_start])
-            index += 1
-        while index > 1 and starts[index - 1] > time + _TIME_TOLERANCE_S:
-            index -= 1
-        if index > len(self._closed_sections) or not self._closed_sections:
+        section_count = self._count_sections_until(time)
+        if section_count > len(self._closed_sections) or not self._closed_sections:
             return self
-        if self._earlier_trail is None or self._earlier_trail[0] != index:
-            self._earlier_trail = (index, build_trail(self._closed_sections[:index]))
-        return self._earlier_trail[1]
+        earlier = self._earlier_trail
+        if earlier is None or earlier.section_count != section_count:
+            trail = build_trail(self._closed_sections[:section_count])
+            earlier = self._earlier_trail = _EarlierTrail(section_count, trail)
+        return earlier.trail
+
+    def _count_sections_until(self, time: float) -> int:
+        """Return the number of sections that have started by a time, s; the first one always counts.
+
+        The section that is still open counts if it has rows.
+        """
+        starts = [float(section.times[0]) for section in self._closed_sections]
+        if self._section_start < self._count:
+            starts.append(float(self._times[self._section_start]))
+        count = len(starts)
+        while count > 1 and starts[count - 1] > time + _TIME_TOLERANCE_S:
+            count -= 1
+        return count
 
     def _simplify(self) -> None:
         """Remove a quarter of the rows: those whose removal changes the trajectories least.
@@ -247,6 +256,13 @@ class Trail:
         self._positions[:count] = self.positions[is_kept]
         self._times[:count] = self.times[is_kept]
         self._count = count
+
+
+class _EarlierTrail(NamedTuple):
+    """A trail of the first closed sections of another one, cached because it is often needed again."""
+
+    section_count: int
+    trail: Trail
 
 
 def build_trail(sections: Sequence[TrailSection]) -> Trail:

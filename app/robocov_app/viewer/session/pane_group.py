@@ -52,7 +52,7 @@ class AutomaticEvent(NamedTuple):
     text: str
 
 
-class Lockstep:
+class PaneGroup:
     """The panes of a session, which are always at the same step.
 
     Parameters
