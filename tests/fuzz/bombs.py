@@ -167,7 +167,7 @@ _LEVELS = {"level": [{"properties": {}}] * 400_000, "unit": []}
 BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "stage: each other": (_include_each_other, _READ, "does not include itself"),
     "stage: tenfold": (_include_tenfold, _READ, "expected at most 200 (a file read twice"),
-    "stage: much": (_include_much, _READ, "more than 5 MB together"),
+    "stage: much": (_include_much, _READ, "expected at most 5 MB in total"),
     "stage: macros": (_macros, _READ, "expected at most 10000 models and blocks"),
     "tmx: many tilesets": (lambda: _tilesets(1, 30_000), _READ, "expected at most 200 (a file read twice"),
     "tmx: long tilesets": (lambda: _tilesets(90_000, 9), _READ, "at most 100000 elements in all tilesets"),

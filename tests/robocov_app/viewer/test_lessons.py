@@ -37,10 +37,10 @@ def write_short_lesson(tmp_path: Path, **changes: object) -> Path:
             build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
         )
     )
-    first = {"title": "Failure", "text": "One fails.", "touch": 1, "until": {"step": 30}}
+    first = {"title": "Failure", "text": "One fails.", "edit": 1, "until": {"step": 30}}
     question = {"text": "What now?", "answers": ["Nothing", "Much"], "right": 2, "why": "So it is."}
     task = {"text": "drag robot 1.", "until": {"robot": 1, "inside": [0, 0, 2, 2]}, "done": "Well done."}
-    second = {"title": "Far", "text": "From far.", "touch": 2, "until": {"step": 5}, **changes}
+    second = {"title": "Far", "text": "From far.", "edit": 2, "until": {"step": 5}, **changes}
     chapters = [first, {"question": question, "task": task, **second}]
     content["lesson"] = {"title": "Two", "chapters": chapters}
     path = tmp_path / "two.robocov"
@@ -230,11 +230,9 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
     with pytest.raises(MapError, match="lesson: missing"):
         load_lesson(path)
     content = json.loads(never.read_text())
-    content["lesson"]["chapters"][0]["touch"] = 9
+    content["lesson"]["chapters"][0]["edit"] = 9
     path.write_text(json.dumps(content))
-    with pytest.raises(
-        MapError, match=r"lesson\.chapters\[0\]\.touch: expected the index of an edit, 0 to 2"
-    ):
+    with pytest.raises(MapError, match=r"lesson\.chapters\[0\]\.edit: expected the index of an edit, 0 to 2"):
         load_lesson(path)
 
 

@@ -15,14 +15,20 @@ DATA_FOLDER = Path(__file__).parents[2] / "data"
 FILES = sorted(DATA_FOLDER.glob("*.robocov"))
 TOLERANCE_M = 1e-6
 """Other processors may round the last digits differently."""
+NEW_KEYS = {'"touches":': '"edits":', '"words":': '"description":'}
+"""Keys that have another name since; the files have the old names."""
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_a_file_that_is_read_and_written_again_stays_the_same(file: Path) -> None:
+def test_a_file_that_is_read_and_written_again_differs_only_in_its_keys(file: Path) -> None:
     saved = load_session(file)
     content = build_session_content(saved.document, saved.head, saved.step, saved.view)
     content["robocov"] = json.loads(file.read_text())["robocov"]
-    assert format_session(content) == file.read_text()
+    expected = file.read_text()
+    for old_key, new_key in NEW_KEYS.items():
+        assert old_key in expected
+        expected = expected.replace(old_key, new_key)
+    assert format_session(content) == expected
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

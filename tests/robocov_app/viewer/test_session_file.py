@@ -131,24 +131,24 @@ def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_pat
     [
         (("head",), 9, "head: expected the index of an edit, 0 to 1, got 9"),
         (("step",), 999, "step: expected a step of the head, 10 to 30, got 999"),
-        (("touches", 1, "parent"), 1, "touches[1].parent: expected null for the first"),
-        (("touches", 1, "at"), 999, "touches[1].at: expected a step of edit 0, 0 to 10, got 999"),
+        (("edits", 1, "parent"), 1, "edits[1].parent: expected null for the first"),
+        (("edits", 1, "at"), 999, "edits[1].at: expected a step of edit 0, 0 to 10, got 999"),
         (
-            ("touches", 1, "end"),
+            ("edits", 1, "end"),
             9,
-            "touches[1].end: expected a step at or after its changes, whose steps must ascend",
+            "edits[1].end: expected a step at or after its changes, whose steps must ascend",
         ),
-        (("touches", 1, "changes", 0, "robot"), "two", 'changes[0].robot: expected an integer, got "two"'),
-        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0].do: expected one of 'drag', "),
-        (("touches", 1, "changes"), [], "touches[1].changes: expected at least 1 item, got []"),
-        (("touches", 1, "curves"), {"0 speed": [[0], [1]]}, 'touches[1].curves: expected "0 distance", '),
+        (("edits", 1, "changes", 0, "robot"), "two", 'changes[0].robot: expected an integer, got "two"'),
+        (("edits", 1, "changes", 0, "do"), "fly", "edits[1].changes[0].do: expected one of 'drag', "),
+        (("edits", 1, "changes"), [], "edits[1].changes: expected at least 1 item, got []"),
+        (("edits", 1, "curves"), {"0 speed": [[0], [1]]}, 'edits[1].curves: expected "0 distance", '),
         (
-            ("touches", 0, "changes", 0, "scenario", "robots"),
+            ("edits", 0, "changes", 0, "scenario", "robots"),
             0,
-            "touches[0].changes[0].scenario.robots: expected greater than or equal to 1, got 0",
+            "edits[0].changes[0].scenario.robots: expected greater than or equal to 1, got 0",
         ),
-        (("touches", 0, "changes", 0, "scenario", "map"), 7, "scenario.map: expected the number of a map"),
-        (("touches", 0, "changes", 0, "scenario"), 7, "changes[0].scenario: expected an object, got 7"),
+        (("edits", 0, "changes", 0, "scenario", "map"), 7, "scenario.map: expected the number of a map"),
+        (("edits", 0, "changes", 0, "scenario"), 7, "changes[0].scenario: expected an object, got 7"),
         (("maps", 0, "boundary"), [], "maps[0]: boundary: "),
         (("version",), 2, "version: expected 1, got 2; it was written by a newer robocov"),
         (("nonsense",), 1, "nonsense: unknown key"),
@@ -171,11 +171,11 @@ def test_errors_name_the_file_and_the_place(tmp_path: Path, json_path, value, me
 
 def test_an_edit_that_cannot_be_repeated_is_named(tmp_path: Path, capsys) -> None:
     content = build_content_with_edit()
-    content["touches"][1]["changes"][0]["robot"] = 77
+    content["edits"][1]["changes"][0]["robot"] = 77
     file = tmp_path / "session.robocov"
     file.write_text(json.dumps(content))
     assert main(["run", str(file), "--out", str(tmp_path / "run")]) == 2
-    assert f"{file}: touches[1], “robot 1 failed”: there is no robot 77\n" in capsys.readouterr().err
+    assert f"{file}: edits[1], “robot 1 failed”: there is no robot 77\n" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
@@ -190,3 +190,31 @@ def test_a_controller_in_a_file_is_only_run_if_the_user_names_it(tmp_path: Path)
         load_session(path)
     opened = Session.open(load_session(path, [name]))
     assert opened.timeline.end_time == session.timeline.end_time
+
+
+def test_early_files_with_other_keys_are_read_and_saved_with_the_present_keys(tmp_path: Path) -> None:
+    content = build_content_with_edit()
+    early = dict(content)
+    early["touches"] = [dict(node) for node in early.pop("edits")]
+    for node in early["touches"]:
+        node["words"] = node.pop("description")
+    path = tmp_path / "early.robocov"
+    path.write_text(json.dumps(early))
+    session = Session.open(load_session(path))
+    assert [event.text for event in session.timeline.events] == ["robot 1 failed"]
+    save(session, path)
+    saved = json.loads(path.read_text())
+    assert saved["edits"] == content["edits"]
+    assert "touches" not in saved
+    early["touches"][1]["words"] = 7
+    path.write_text(json.dumps(early))
+    with pytest.raises(MapError, match=r"touches\[1\]\.words: expected a string, got 7"):
+        load_session(path)
+    early["edits"] = content["edits"]
+    path.write_text(json.dumps(early))
+    with pytest.raises(MapError, match="touches: unknown key"):
+        load_session(path)
+    del early["edits"], early["touches"]
+    path.write_text(json.dumps(early))
+    with pytest.raises(MapError, match="edits: missing"):
+        load_session(path)

@@ -106,7 +106,7 @@ def test_an_error_on_the_way_leaves_the_timeline_as_it_was() -> None:
     forget_cached_states(session)
     timeline.document.nodes[1].edits[:] = [FailRobot(77, step=10)]
     before = describe_state(session)
-    with pytest.raises(InputError, match=r"touches\[1\], “robot 2 failed”: there is no robot 77"):
+    with pytest.raises(InputError, match=r"edits\[1\], “robot 2 failed”: there is no robot 77"):
         timeline.seek(timeline.document.nodes[1], 20)
     assert describe_state(session) == before
     assert len(timeline.document.nodes) == 3

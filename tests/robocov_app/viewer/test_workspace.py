@@ -52,7 +52,7 @@ def test_unsaved_work_is_recovered(tmp_path: Path) -> None:
     assert find_recoverable_drafts(tmp_path) == ()
 
 
-@pytest.mark.parametrize("session", [None, [], {}, {"touches": 3}])
+@pytest.mark.parametrize("session", [None, [], {}, {"edits": 3}, {"touches": 3}])
 def test_a_damaged_draft_is_not_offered(session: object, tmp_path: Path) -> None:
     folder = tmp_path / "damaged"
     folder.mkdir()

@@ -160,9 +160,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
     finally:
         browser.driver.quit()
     (saved,) = folder.glob("*.robocov")
-    changes = [
-        change["do"] for touch in json.loads(saved.read_text())["touches"] for change in touch["changes"]
-    ]
+    changes = [change["do"] for edit in json.loads(saved.read_text())["edits"] for change in edit["changes"]]
     assert changes[-1] == "leave"
 
 

@@ -149,5 +149,5 @@ def test_a_killed_served_viewer_loses_at_most_about_a_second(tmp_path: Path, num
         client.press("s", held=2)
         wait_for(lambda: list(tmp_path.glob("*.robocov")))
     (saved,) = tmp_path.glob("*.robocov")
-    _, removal = json.loads(saved.read_text())["touches"]
+    _, removal = json.loads(saved.read_text())["edits"]
     assert [change["do"] for change in removal["changes"]] == ["leave"]

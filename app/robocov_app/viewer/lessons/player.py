@@ -351,7 +351,7 @@ class LessonPlayer:
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:
     """Go to the start of a chapter's run, and let its edits be repeated when their time comes."""
-    target = session.timeline.document.nodes[chapter.touch]
+    target = session.timeline.document.nodes[chapter.edit]
     session.seek(session.timeline.document.get_path(target)[0], 0)
     session.timeline.finish_seek()
     session.timeline.follow(target)

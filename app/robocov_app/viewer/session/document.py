@@ -107,7 +107,7 @@ class Node:
                 try:
                     run.apply(edit)
                 except InputError as error:
-                    place = f"touches[{self.number}], “{self.description}”"
+                    place = f"edits[{self.number}], “{self.description}”"
                     raise InputError(f"{place}: {error}") from None
 
 

@@ -30,9 +30,9 @@ def check_lesson_references(lesson: LessonModel, where: str, nodes: Sequence[Nod
     robot_count = count_robots(nodes)
     for index, chapter in enumerate(lesson.chapters):
         path: _Path = ("lesson", "chapters", index)
-        if chapter.touch >= len(nodes):
+        if chapter.edit >= len(nodes):
             expected = f"the index of an edit, 0 to {len(nodes) - 1}"
-            refuse_value(where, (*path, "touch"), chapter.touch, expected)
+            refuse_value(where, (*path, "edit"), chapter.edit, expected)
         _check_answer(chapter, where, path)
         _check_robot(chapter.robot, where, (*path, "robot"), robot_count)
         _check_condition(chapter.until, where, (*path, "until"), robot_count)

@@ -1,9 +1,13 @@
-"""Models of session files, from which their JSON schema is generated."""
+"""Models of session files, from which their JSON schema is generated.
+
+Files of early versions have other names for some keys, which are read, but never written: `touches` for
+`edits`, `touch` for `edit`, and `words` for `description`.
+"""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field
 
 from robocov_app.viewer.session.edits import (
     DragRobot,
@@ -59,7 +63,7 @@ class NodeModel(_Model):
     parent: Annotated[int | None, Field(ge=0, description="Number of the edit before; null for the first")]
     at: Step
     kind: Text
-    words: Text
+    description: Text = Field(validation_alias=AliasChoices("description", "words"))
     name: Text = ""
     end: Step
     changes: Annotated[list[_FileEdit], Field(min_length=1)]
@@ -121,7 +125,11 @@ class ChapterModel(_Model):
 
     title: Annotated[str, Field(min_length=1, max_length=MAX_CHAPTER_TITLE_CHARS)]
     text: Text
-    touch: Annotated[int, Field(ge=0, description="Number of the edit at which its branch ends")]
+    edit: int = Field(
+        ge=0,
+        description="Index of the last edit that the chapter repeats",
+        validation_alias=AliasChoices("edit", "touch"),
+    )
     until: ConditionModel
     speed: Annotated[float, Field(ge=MIN_CHAPTER_SPEED, le=MAX_CHAPTER_SPEED)] = 1.0
     show: list[str] = Field([], description="Layers in addition to the usual ones")
@@ -151,7 +159,7 @@ class SessionModel(_Model, title="robocov session"):
     version: Literal[1]
     robocov: Text = ""
     maps: Annotated[list[BundledMapModel | dict[str, Any]], Field(min_length=1), AfterValidator(_note_maps)]
-    touches: Annotated[list[NodeModel], Field(min_length=1)]
+    edits: list[NodeModel] = Field(min_length=1, validation_alias=AliasChoices("edits", "touches"))
     head: Annotated[int, Field(ge=0, description="Number of the edit whose time span contains the present")]
     step: Step
     view: dict[str, Any] = Field({}, description="Displayed layers and theme")

@@ -100,11 +100,11 @@ def save_session(
 
 def format_session(content: Mapping[str, Any]) -> str:
     """Format the content of a session file as JSON, with one line for each node."""
-    nodes = [json.dumps(node, ensure_ascii=False, allow_nan=False) for node in content["touches"]]
-    other_content = {key: value for key, value in content.items() if key != "touches"}
+    nodes = [json.dumps(node, ensure_ascii=False, allow_nan=False) for node in content["edits"]]
+    other_content = {key: value for key, value in content.items() if key != "edits"}
     text = json.dumps(other_content, ensure_ascii=False, allow_nan=False, indent=1)
     lines = ",\n  ".join(nodes)
-    return text.removesuffix("\n}") + f',\n "touches": [\n  {lines}\n ]\n}}\n'
+    return text.removesuffix("\n}") + f',\n "edits": [\n  {lines}\n ]\n}}\n'
 
 
 def build_session_content(
@@ -120,7 +120,7 @@ def build_session_content(
         "version": VERSION,
         "robocov": __version__,
         "maps": context.maps,
-        "touches": nodes,
+        "edits": nodes,
         "head": head.number,
         "step": step,
         "view": dict(view),
@@ -133,7 +133,7 @@ def _build_node_content(node: Node, context: FileContext) -> dict[str, Any]:
         "parent": None if node.parent is None else node.parent.number,
         "at": node.branch_step,
         "kind": node.kind,
-        "words": node.description,
+        "description": node.description,
     }
     if node.name:
         content["name"] = node.name
@@ -219,7 +219,7 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
     except ValidationError as error:
         raise build_document_error(error, where, _build_mistake) from None
     nodes: list[Node] = []
-    for node_model in model.touches:
+    for node_model in model.edits:
         nodes.append(_NodeReader(where, nodes).read(node_model))
     if model.head >= len(nodes):
         refuse_value(where, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
@@ -257,7 +257,7 @@ class _NodeReader:
             None if model.parent is None else self._nodes[model.parent],
             model.at,
             model.kind,
-            model.words,
+            model.description,
             model.to_edits(),
             model.end,
             model.name,
@@ -267,7 +267,7 @@ class _NodeReader:
         return node
 
     def _refuse(self, path: tuple[str | int, ...], value: object, expected: str) -> None:
-        refuse_value(self._where, ("touches", len(self._nodes), *path), value, expected)
+        refuse_value(self._where, ("edits", len(self._nodes), *path), value, expected)
 
     def _check_parent(self, model: NodeModel) -> None:
         is_first = not self._nodes
