@@ -22,6 +22,21 @@ def round_down(number: float) -> float:
     return float(f"{factor * power:.12g}")
 
 
+def round_up(number: float) -> float:
+    """Round a positive number up to 1, 2 or 5 times a power of ten.
+
+    Examples
+    --------
+    >>> [round_up(number) for number in (0.7, 1.0, 3.9, 49.0)]
+    [1.0, 1.0, 5.0, 50.0]
+    """
+    lower = round_down(number)
+    if lower >= number:
+        return lower
+    # Steps grow by a factor of 2 or 2.5, so the result is the next step after the lower one.
+    return round_down(2.5001 * lower)
+
+
 def format_scale_length(meters: float) -> str:
     """Format a length for a scale bar, in centimeters, meters or kilometers.
 

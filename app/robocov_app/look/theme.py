@@ -46,6 +46,8 @@ class Theme:
         Color scale of distances, from near to far.
     density, density_strength : Color, float
         Color of the density, and its opacity where it is highest.
+    fine_grid_share, coarse_grid_share : float
+        Fractions of the grid color in the lines of a grid under a map.
     tint, paper_tint : float
         Fraction of the robot's hue in the color of its cell, by default and in the scheme of the paper.
     text, small_text, line, trajectory_line, boundary_line, arrow_line : float
@@ -75,6 +77,8 @@ class Theme:
     unreached: Color
     density: Color
     density_strength: float
+    fine_grid_share: float
+    coarse_grid_share: float
     tint: float
     paper_tint: float
     text: float = 12.0
@@ -236,9 +240,26 @@ def _lighten(hue: Color) -> Color:
 
 
 _HUES = [parse_hex_color(code) for code in _MUTED]
-LIGHT = _build_theme("light", _LIGHT_CODES, _HUES, density_strength=0.5, tint=0.25, paper_tint=0.13)
+LIGHT = _build_theme(
+    "light",
+    _LIGHT_CODES,
+    _HUES,
+    density_strength=0.5,
+    fine_grid_share=0.32,
+    coarse_grid_share=0.75,
+    tint=0.25,
+    paper_tint=0.13,
+)
+# Equal shares of the grid color would look stronger on a dark background.
 DARK = _build_theme(
-    "dark", _DARK_CODES, [_lighten(hue) for hue in _HUES], density_strength=0.45, tint=0.26, paper_tint=0.19
+    "dark",
+    _DARK_CODES,
+    [_lighten(hue) for hue in _HUES],
+    density_strength=0.45,
+    fine_grid_share=0.2,
+    coarse_grid_share=0.5,
+    tint=0.26,
+    paper_tint=0.19,
 )
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 

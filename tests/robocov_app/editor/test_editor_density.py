@@ -185,7 +185,7 @@ def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
         driver.click_at((6.0, 5.0))
         assert driver.editor.tool.chosen == 0
         driver.press_key("escape")
-        assert driver.editor.tool.chosen is None and driver.editor.tool.build_overlay(driver.editor).rings
+        assert driver.editor.tool.chosen is None and driver.editor.tool.build_overlay(driver.editor).outlines
         driver.run_command("floor 0.2")
         driver.run_command("weight 3")
         assert driver.sketch.density.floor == 0.2 and driver.editor.tool.weight == 3.0

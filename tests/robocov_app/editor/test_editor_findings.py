@@ -53,7 +53,7 @@ def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as driver:
         driver.open_tab("map")
         assert len(driver.editor.measurement.components) == 2
-        assert not driver.editor.measurement.sealed.is_empty
+        assert not driver.editor.measurement.cut_off.is_empty
         words = [entry.text for entry in driver.window.canvas.entries]
         assert "cut off" in words
 

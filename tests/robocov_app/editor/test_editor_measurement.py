@@ -82,14 +82,14 @@ def test_robots_pass_doors_wider_than_they_are(width, radius, passes):
     words = [problem.message for problem in result.problems]
     if passes:
         assert result.impassable.is_empty
-        assert result.sealed.is_empty
+        assert result.cut_off.is_empty
         assert words == []
     else:
         # the door is marked, and nothing else; one of the two rooms is cut off
         (mark,) = result.impassable.geoms
         assert mark.distance(shapely.Point(6.0, 4.0)) == 0.0
         assert math.pi * (width / 2) ** 2 * 0.99 <= mark.area <= width * (0.2 + 2 * radius)
-        assert result.sealed.area == pytest.approx(5.9 * 8.0, abs=0.5)
+        assert result.cut_off.area == pytest.approx(5.9 * 8.0, abs=0.5)
         assert words[0] == (
             f"the gap at (5.9, 4) is {width:.3g} m wide: too narrow for robots of radius {radius:g} m"
         )

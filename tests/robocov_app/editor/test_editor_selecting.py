@@ -27,7 +27,7 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
 def find_handle_pixel(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
     """Return the pixel of a handle."""
     (found,) = (each for each in driver.editor.handles if each.kind == kind and each.side == side)
-    return driver.find_pixel(found.at)
+    return driver.find_pixel(found.position)
 
 
 def test_a_click_selects_shift_toggles_and_the_floor_clears(driver: EditorDriver) -> None:
@@ -145,7 +145,7 @@ def test_the_rim_of_a_circle_and_of_a_start_are_dragged(driver: EditorDriver) ->
 
 def test_the_knob_turns_by_dragging_and_by_degrees(driver: EditorDriver) -> None:
     driver.select(2)
-    x, y = find_handle_pixel(driver, "turn")
+    x, y = find_handle_pixel(driver, "rotate")
     driver.press(x, y)
     driver.move(x + 60, y + 20, held=1)
     driver.type("90")
@@ -163,7 +163,7 @@ def test_the_knob_turns_by_dragging_and_by_degrees(driver: EditorDriver) -> None
 
 def test_shift_turns_in_steps(driver: EditorDriver) -> None:
     driver.select(0)
-    x, y = find_handle_pixel(driver, "turn")
+    x, y = find_handle_pixel(driver, "rotate")
     driver.hold_keys("shift")
     cx, cy = driver.find_pixel((3, 3))
     driver.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
@@ -233,7 +233,7 @@ def test_many_objects_are_dragged_as_an_image_with_the_same_result(tmp_path: Pat
         driver.press(*driver.find_pixel((3, 3)))
         driver.move_to((3.5, 3.2), (4, 3.5), held=1)
         assert driver.editor.displayed[0] is driver.sketch
-        assert driver.editor.toolbox.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
+        assert driver.editor.toolbox.selector.drag.dragged_image.offset == pytest.approx((1.0, 0.5))
         driver.release()
         assert driver.shapes == [item.shape for item in expected.obstacles]
 

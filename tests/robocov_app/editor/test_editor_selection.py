@@ -116,11 +116,11 @@ def test_boxes_select_objects(sketch):
     assert find_in_box(sketch, (0.5, 0.5), (5.4, 5.5)) == Selection(frozenset({0}))
     everything = find_in_box(sketch, (13.0, 9.0), (-1.0, -1.0))
     assert everything == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}), boundary=True)
-    touched = find_in_box(sketch, (4.9, 0.5), (8.5, 6.5), touched=True)
+    touched = find_in_box(sketch, (4.9, 0.5), (8.5, 6.5), includes_partial=True)
     assert touched == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}))
     # a disc that the corner of the box does not reach
-    assert not find_in_box(sketch, (5.3, 2.8), (6.0, 3.0), touched=True).starts
-    assert find_in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), touched=True) == Selection()
+    assert not find_in_box(sketch, (5.3, 2.8), (6.0, 3.0), includes_partial=True).starts
+    assert find_in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), includes_partial=True) == Selection()
     corners = find_vertices_in_box(sketch, (0.0, 0.0), (2.5, 2.5), [0, BOUNDARY, 2])
     assert corners.vertices == {Vertex(0, 0, 0), Vertex(0, 1, 0), Vertex(BOUNDARY, 0, 0)}
 
@@ -131,7 +131,7 @@ def test_boxes_agree_with_shapely(sketch, a, b):
     inside = {item.key for item in sketch.obstacles if box.covers(item.shape.polygon.envelope)}
     assert find_in_box(sketch, a, b).items == inside
     touched = {item.key for item in sketch.obstacles if box.intersects(item.shape.polygon)}
-    assert find_in_box(sketch, a, b, touched=True).items == touched
+    assert find_in_box(sketch, a, b, includes_partial=True).items == touched
 
 
 def test_selections_can_be_united_and_toggled(sketch):
@@ -183,7 +183,7 @@ def test_picking_among_a_thousand_obstacles_measures_only_nearby_ones(monkeypatc
     for x, y in rng.uniform(0, 50, (50, 2)).tolist():
         owner_at(sketch, (x, y), 0.1)
         find_edge(sketch, (x, y), 0.1, keys)
-        find_in_box(sketch, (x, y), (x + 5, y + 5), touched=True)
+        find_in_box(sketch, (x, y), (x + 5, y + 5), includes_partial=True)
     assert measured and sum(measured) < 50 * 20
 
 

@@ -94,9 +94,9 @@ class Watched(Sheet):
         super().__init__()
         self.boxes: list[pygame.Rect] = []
 
-    def _paint(self, page: pygame.Surface, build_view: View, *what) -> None:
+    def _redraw_box(self, page: pygame.Surface, build_view: View, *what) -> None:
         self.boxes.append(what[-1])
-        super()._paint(page, build_view, *what)
+        super()._redraw_box(page, build_view, *what)
 
     def painted(self, at: View, sketch: Sketch) -> str | int:
         self.boxes.clear()

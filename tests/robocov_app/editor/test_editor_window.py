@@ -382,9 +382,9 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = driver.find_pixel((spot.x, spot.y))
         driver.press(x, y)
-        paint = sheet._paint
+        paint = sheet._redraw_box
         boxes = []
-        sheet._paint = lambda *what: (boxes.append(what[-1]), paint(*what))  # type: ignore[method-assign]
+        sheet._redraw_box = lambda *what: (boxes.append(what[-1]), paint(*what))  # type: ignore[method-assign]
         for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
             driver.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))

@@ -35,6 +35,7 @@ from robocov_app.toolkit.window.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
 MARGIN_PX = 26.0  # around the map when all of it is shown
+LEGEND_MARGIN_PX = 10  # below the legend
 SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved to the center of the view
 BADGE_REACH_PX = 10
 SCALE_BAR_LABEL_PX = 90
@@ -78,7 +79,7 @@ class EditorCanvas:
         The team that is shown at a start.
     hovered : Problem or None
         Problem under the cursor.
-    at : Point or None
+    cursor_pixel : Point or None
         Position of the cursor, px; None while it is not over the map.
     camera : Camera
         The view.
@@ -90,7 +91,7 @@ class EditorCanvas:
         self.entries: list[LegendEntry] = []
         self.team: Team | None = None
         self.hovered: Problem | None = None
-        self.at: Point | None = None
+        self.cursor_pixel: Point | None = None
         self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
         self._layers = build_layers(self.sheet)
         self._legend_rows = 1
@@ -114,7 +115,7 @@ class EditorCanvas:
         scale = self.layout.scale
         legend_height = 0
         if "legend" in self.editor.shown:
-            legend_height = round((10 + legend_strip.ROW_HEIGHT_PX * self._legend_rows) * scale)
+            legend_height = round((LEGEND_MARGIN_PX + legend_strip.ROW_HEIGHT_PX * self._legend_rows) * scale)
         view_height = max(height - legend_height - round(scale_bar.STRIP_HEIGHT_PX * scale), 1)
         return float(left), float(top + legend_height), float(width), float(view_height)
 
@@ -179,15 +180,16 @@ class EditorCanvas:
         if not visible.collidepoint(self.to_pixel((point.x, point.y))):
             self._set_camera(replace(self.camera, center=(point.x, point.y)))
 
-    def zoom(self, factor: float, at: Point | None = None) -> None:
+    def zoom(self, factor: float, pixel: Point | None = None) -> None:
         """Zoom about a pixel of the window, by default the cursor or else the center of the view."""
-        if at is None and self.at is not None and self.contains(self.at):
-            at = self.at
-        if at is None:
-            at = self.camera.middle
+        cursor = self.cursor_pixel
+        if pixel is None and cursor is not None and self.contains(cursor):
+            pixel = cursor
+        if pixel is None:
+            pixel = self.camera.middle
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         extent = max(high_x - low_x, high_y - low_y, 1.0)
-        self._set_camera(zoom_about(self.camera, factor, at, extent))
+        self._set_camera(zoom_about(self.camera, factor, pixel, extent))
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the view by a number of pixels, but not so far that the map leaves it."""
@@ -257,7 +259,7 @@ class EditorCanvas:
             layer.draw(scene)
         screen.set_clip(None)
         self._draw_legend(scene)
-        self._draw_foot(scene)
+        self._draw_status_strip(scene)
 
     def _build_scene(self, screen: Surface) -> EditorScene:
         """Build the scene of one frame, with the state of the active tool and of a drag."""
@@ -274,10 +276,10 @@ class EditorCanvas:
             saved=editor.sketch,
             sketch=sketch,
             selection=selection,
-            lifted=_find_lifted_keys(editor.sketch, sketch, state),
+            hidden_keys=_find_hidden_keys(editor.sketch, sketch, state),
             team=self.team,
             hovered=self.hovered,
-            cursor=self.at,
+            cursor=self.cursor_pixel,
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
@@ -291,7 +293,7 @@ class EditorCanvas:
         if scene.state.pending is not None:
             sketch = replace(sketch, density=scene.state.pending.density)
         clip = scene.view.clip
-        scene.screen.blit(self.sheet.draw(scene.view, sketch, scene.lifted), clip, clip)
+        scene.screen.blit(self.sheet.draw(scene.view, sketch, scene.hidden_keys), clip, clip)
         image = self.sheet.reference_image
         if image.error:
             self.editor.show_message(image.error, is_error=True)
@@ -308,7 +310,7 @@ class EditorCanvas:
         legend = self._legend.get(None, key, lambda: legend_strip.render_legend_strip(self.entries, strip))
         scene.screen.blit(legend, box)
 
-    def _draw_foot(self, scene: EditorScene) -> None:
+    def _draw_status_strip(self, scene: EditorScene) -> None:
         """Draw the status strip at the bottom: scale bar and status line."""
         box = Rect(self.layout.arena)
         scale = scene.canvas.scale
@@ -323,13 +325,13 @@ class EditorCanvas:
         canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
 
 
-def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorToolOverlay) -> frozenset[int]:
+def _find_hidden_keys(saved: Sketch, displayed: Sketch, state: EditorToolOverlay) -> frozenset[int]:
     """Return the keys of obstacles to leave out of the sheet: those that are dragged, changed or removed."""
-    carried = state.carried
-    if carried is not None and not carried.are_copies:
-        return carried.selection.items
-    # Copies are carried: the originals stay on the sheet.
-    if carried is not None or displayed is saved:
+    dragged_image = state.dragged_image
+    if dragged_image is not None and not dragged_image.shows_copies:
+        return dragged_image.selection.items
+    # The originals of copies stay on the sheet.
+    if dragged_image is not None or displayed is saved:
         return frozenset()
     items = {item.key: item for item in displayed.obstacles}
     return frozenset(item.key for item in saved.obstacles if items.get(item.key) is not item)

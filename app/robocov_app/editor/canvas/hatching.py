@@ -11,7 +11,8 @@ from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color
 
 HATCH_STEP_PX = 7  # distance between hatch lines, at scale 1
-CUT_OFF_FORCE = "repulsion_robots"  # cut-off areas have the color of this force
+LINE_WIDTH_PX = 1.2  # of hatch lines, at scale 1
+MIN_HATCH_STEP_PX = 4  # at any scale
 CUT_OFF_STRENGTH = 0.5
 _WHITE = (255, 255, 255)
 _TRANSPARENT = (0, 0, 0, 0)
@@ -27,7 +28,7 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
     view : View
         The view of the sheet.
     measurement : Measurement
-        Its `impassable` area is too narrow, and its `sealed` area is cut off.
+        Its `impassable` area is too narrow, and its `cut_off` area is cut off.
 
     Returns
     -------
@@ -35,42 +36,44 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
         A premultiplied image and its position in the window, px; None if nothing is visible.
     """
     areas: list[tuple[Outline, Color, float]] = []
-    if not measurement.sealed.is_empty:
-        outline = build_outline(measurement.sealed)
-        areas.append((outline, view.theme.forces[CUT_OFF_FORCE], CUT_OFF_STRENGTH))
+    if not measurement.cut_off.is_empty:
+        outline = build_outline(measurement.cut_off)
+        areas.append((outline, view.theme.cut_off, CUT_OFF_STRENGTH))
     if not measurement.impassable.is_empty:
-        areas.append((build_outline(measurement.impassable), view.theme.trajectory, 1.0))
+        areas.append((build_outline(measurement.impassable), view.theme.error, 1.0))
     if not areas:
         return None
     bounds = total_bounds([outline.geometry for outline, _, _ in areas])
     box = compute_pixel_box(view.camera, bounds).clip(view.clip)
     if not box:
         return None
-    patch = Surface(box.size, pygame.SRCALPHA, 32)
+    image = Surface(box.size, pygame.SRCALPHA, 32)
     for outline, color, strength in areas:
-        _hatch_area(view, patch, box, outline, (color, strength))
-    return patch, box
+        _hatch_area(view, image, box, outline, color, strength)
+    return image, box
 
 
-def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tuple[Color, float]) -> None:
+def _hatch_area(
+    view: View, image: Surface, box: Rect, outline: Outline, color: Color, strength: float
+) -> None:
     """Hatch one area.
 
     Parameters
     ----------
     view : View
         The view of the sheet.
-    patch : Surface
+    image : Surface
         Premultiplied image to draw on.
     box : Rect
-        Position of the patch in the window, px.
+        Position of the image in the window, px.
     outline : Outline
         Outline of the area.
-    ink : (tuple of int, float)
-        Color, and opacity from 0 to 1.
+    color : tuple of int
+    strength : float
+        Opacity, from 0 to 1.
     """
-    color, strength = ink
     mask = view.build_canvas(Surface(box.size, pygame.SRCALPHA, 32))
-    edges = view.build_canvas(patch)
+    edges = view.build_canvas(image)
     rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
@@ -79,15 +82,15 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
             mask.draw_outline(ring, _WHITE, 1)
         else:
             mask.fill_polygon(ring, _TRANSPARENT)
-    lines = draw_hatch_page(box, color, view.scale, strength)
+    lines = draw_hatch_pattern(box, color, view.scale, strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
-    patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+    image.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
             edges.draw_outline(ring, color, edges.scale_width(1.0))
 
 
-def draw_hatch_page(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
+def draw_hatch_pattern(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
     """Draw an image of diagonal lines over a tint.
 
     Parameters
@@ -106,13 +109,13 @@ def draw_hatch_page(box: Rect, color: Color, scale: float, strength: float = 1.0
     Surface
         Image of the size of the box.
     """
-    page = Surface(box.size, pygame.SRCALPHA, 32)
-    page.fill((*color, round(_TINT_OPACITY * strength)))
-    step = max(4, round(HATCH_STEP_PX * scale))
-    thickness = max(1, round(1.2 * scale))
+    image = Surface(box.size, pygame.SRCALPHA, 32)
+    image.fill((*color, round(_TINT_OPACITY * strength)))
+    step = max(MIN_HATCH_STEP_PX, round(HATCH_STEP_PX * scale))
+    thickness = max(1, round(LINE_WIDTH_PX * scale))
     line_color = (*color, round(_LINE_OPACITY * strength))
     # The lines have fixed positions in the window, whatever the position of the box.
     first = -((box.left + box.top) % step)
     for x in range(first, box.width + box.height, step):
-        pygame.draw.line(page, line_color, (x, 0), (x - box.height, box.height), thickness)
-    return page
+        pygame.draw.line(image, line_color, (x, 0), (x - box.height, box.height), thickness)
+    return image

@@ -16,7 +16,7 @@ from robocov_app.editor.edits import paths
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.tools.handles import compute_frame, list_handles
-from robocov_app.editor.tools.tool_overlay import CarriedItems
+from robocov_app.editor.tools.tool_overlay import DraggedImage
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
@@ -24,6 +24,23 @@ from robocov_app.render.crowding import fit_radii
 from robocov_app.render.layers.robots import READABLE_RADIUS_PX
 from robocov_app.render.surface_cache import LatestValue
 
+# Shares of the strong color in a mix with the background.
+PATH_SHARE = 0.6
+EDGE_SHARE = 0.55  # a thin gray line around each robot separates robots that touch
+HOVERED_SHARE = 0.7
+FRAME_SHARE = 0.6
+
+# Lengths in pixels at scale 1.
+OUTLINE_WIDTH_PX = 2.0  # of selected and dragged objects
+HOVERED_WIDTH_PX = 1.5
+BOUNDARY_EXTRA_WIDTH_PX = 0.5  # the outline of the boundary is wider by this
+FRAME_DASH_PX = 3.0
+ROBOT_GAP_PX = 2.4  # between enlarged robots
+MIN_ROBOT_RADIUS_PX = 3.0  # at any scale
+ROBOT_RING_PX = 1.4
+MAX_RING_RADII = 0.3  # maximum width of the ring, relative to the radius of the robot
+
+OUTLINED_DOT_SCALE = 1.3  # enlargement of the rings of a selected start
 MANY_OBJECTS = 200  # the outlines of more selected objects are cached as an image
 DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged
 MAX_RADIUS_PX = 400.0  # maximum radius of a robot that is drawn as a sprite
@@ -47,35 +64,37 @@ class DraggedObstacles:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the obstacles."""
-        if scene.state.carried is not None:
-            self._draw_carried_items(scene, scene.state.carried)
+        if scene.state.dragged_image is not None:
+            self._draw_dragged_image(scene, scene.state.dragged_image)
         elif scene.sketch is not scene.saved:
             theme = scene.canvas.theme
-            # The sheet shows all obstacles of the saved map except for the lifted ones.
-            keys = scene.saved.index_by_key.keys() - scene.lifted
+            # The sheet shows all obstacles of the saved map except for the hidden ones.
+            keys = scene.saved.index_by_key.keys() - scene.hidden_keys
             items = [item for item in scene.sketch.obstacles if item.key not in keys]
-            self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.final, DRAGGED_TINT))
+            self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.accent, DRAGGED_TINT))
 
-    def _draw_carried_items(self, scene: EditorScene, carried: CarriedItems) -> None:
+    def _draw_dragged_image(self, scene: EditorScene, dragged: DraggedImage) -> None:
         camera = scene.view.camera
         image = self._image.get(
             scene.saved,
-            (carried.selection, camera, scene.view.theme.name),
-            lambda: self._draw_image(scene, carried.selection),
+            (dragged.selection, camera, scene.view.theme.name),
+            lambda: self._draw_image(scene, dragged.selection),
         )
-        dx = round(camera.zoom * carried.offset[0])
-        dy = round(-(camera.zoom * carried.offset[1]))
+        dx = round(camera.zoom * dragged.offset[0])
+        dy = round(-(camera.zoom * dragged.offset[1]))
         scene.screen.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
 
     def _draw_image(self, scene: EditorScene, selection: Selection) -> Surface:
         theme = scene.view.theme
-        page = scene.view.build_page()
+        canvas = scene.view.build_transparent_canvas()
         items = [item for item in scene.saved.obstacles if item.key in selection.items]
-        fill = mix(theme.obstacle, theme.final, DRAGGED_TINT)
-        self._sheet.draw_items(page, items, fill, theme.final)
+        fill = mix(theme.obstacle, theme.accent, DRAGGED_TINT)
+        self._sheet.draw_items(canvas, items, fill, theme.accent)
         for owner in selection.owners - selection.items:
-            draw_object_outline(page, self._sheet, scene.saved, owner, color=theme.final, width=2.0)
-        return page.surface
+            draw_object_outline(
+                canvas, self._sheet, scene.saved, owner, color=theme.accent, width=OUTLINE_WIDTH_PX
+            )
+        return canvas.surface
 
 
 class Passages:
@@ -91,9 +110,9 @@ class Passages:
             return
         view = scene.view
         look = (view.camera, view.theme.name, view.scale, view.size)
-        patch = self._hatching.get(measurement, look, lambda: draw_hatching(view, measurement))
-        if patch is not None:
-            surface, position = patch
+        hatching = self._hatching.get(measurement, look, lambda: draw_hatching(view, measurement))
+        if hatching is not None:
+            surface, position = hatching
             scene.screen.blit(surface, position, special_flags=_PREMULTIPLIED)
         if measurement.gap is not None:
             overlay.draw_gap(scene.canvas, measurement.gap, measurement.radius)
@@ -110,9 +129,9 @@ class Paths:
             item = sketch.get_item(key)
             path = item.shape.path
             assert path is not None
-            color = mix(theme.background, theme.ink, 0.6)
+            color = mix(theme.background, theme.ink, PATH_SHARE)
             if key in scene.editor.selection.items:
-                color = theme.final
+                color = theme.accent
             overlay.draw_path(scene.canvas, path, color)
             if scene.editor.moves_since is not None and paths.leads_somewhere(path):
                 shift = path.compute_displacement(scene.editor.now - scene.editor.moves_since)
@@ -147,9 +166,11 @@ class TeamAtStart:
         centers = canvas.camera.to_pixels(np.array(team.positions))
         true_radii = np.full(len(centers), team.radius * canvas.camera.zoom)
         readable = min(READABLE_RADIUS_PX * scale, MAX_RADIUS_PX)
-        radii = np.minimum(fit_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
-        # 0.55: a thin gray line around each robot separates robots that touch.
-        edge = mix(theme.background, theme.ink, 0.55)
+        radii = np.minimum(
+            fit_radii(centers, true_radii, ROBOT_GAP_PX * scale, readable),
+            true_radii.clip(MIN_ROBOT_RADIUS_PX),
+        )
+        edge = mix(theme.background, theme.ink, EDGE_SHARE)
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             # Half pixels, so that sprites can be reused.
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
@@ -158,7 +179,7 @@ class TeamAtStart:
                 size,
                 fill=theme.robots[k % len(theme.robots)],
                 ring=theme.robot_ring,
-                ring_width=min(1.4 * scale, 0.3 * size),
+                ring_width=min(ROBOT_RING_PX * scale, MAX_RING_RADII * size),
                 edge=edge,
                 text=_choose_number(k + 1, size, scale),
             )
@@ -183,7 +204,7 @@ class SelectedObjects:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw outlines, frame and handles. Objects that are dragged have outlines already."""
-        if scene.state.carried is not None:
+        if scene.state.dragged_image is not None:
             return
         selection = scene.selection.restrict_to(scene.sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.owner for vertex in selection.vertices}
@@ -198,8 +219,10 @@ class SelectedObjects:
             return
         if Selection.of(hovered).restrict_to(scene.sketch):
             theme = scene.canvas.theme
-            color = mix(theme.background, theme.final, 0.7)
-            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color=color, width=1.5)
+            color = mix(theme.background, theme.accent, HOVERED_SHARE)
+            draw_object_outline(
+                scene.canvas, self._sheet, scene.sketch, hovered, color=color, width=HOVERED_WIDTH_PX
+            )
 
     def _draw_outlines(self, scene: EditorScene, selection: Selection, owners: set[Owner]) -> None:
         """Draw the outlines of the selected objects; those of many are cached as an image."""
@@ -207,18 +230,20 @@ class SelectedObjects:
             self._draw_all(scene.canvas, scene.sketch, owners)
             return
 
-        def draw_page() -> Surface:
-            page = scene.view.build_page()
-            self._draw_all(page, scene.sketch, owners)
-            return page.surface
+        def draw_image() -> Surface:
+            canvas = scene.view.build_transparent_canvas()
+            self._draw_all(canvas, scene.sketch, owners)
+            return canvas.surface
 
         look = (selection, scene.view.camera, scene.view.theme.name, scene.view.scale)
-        page = self._outlines.get(scene.sketch, look, draw_page)
-        scene.canvas.surface.blit(page, (0, 0), special_flags=_PREMULTIPLIED)
+        image = self._outlines.get(scene.sketch, look, draw_image)
+        scene.canvas.surface.blit(image, (0, 0), special_flags=_PREMULTIPLIED)
 
     def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:
         for owner in owners:
-            draw_object_outline(canvas, self._sheet, sketch, owner, color=canvas.theme.final, width=2.0)
+            draw_object_outline(
+                canvas, self._sheet, sketch, owner, color=canvas.theme.accent, width=OUTLINE_WIDTH_PX
+            )
 
     def _draw_handles(self, scene: EditorScene, selection: Selection) -> None:
         """Draw the dashed frame of a selection, and its handles."""
@@ -227,8 +252,8 @@ class SelectedObjects:
         frame = compute_frame(scene.sketch, selection, editor.pixel)
         if frame is not None:
             corners = overlay.to_pixels(canvas, shapely.box(*frame).exterior.coords).tolist()
-            color = mix(canvas.theme.background, canvas.theme.final, 0.6)
-            overlay.draw_dashes(canvas, corners, color, 3.0)
+            color = mix(canvas.theme.background, canvas.theme.accent, FRAME_SHARE)
+            overlay.draw_dashes(canvas, corners, color, FRAME_DASH_PX)
         handles = editor.handles
         if scene.sketch is not editor.sketch:
             handles = list_handles(scene.sketch, selection, editor.pixel)
@@ -306,10 +331,12 @@ def draw_object_outline(
 ) -> None:
     """Draw the outline of an obstacle, a start or the boundary; `width` in px at scale 1."""
     if isinstance(owner, str):
-        overlay.draw_start(canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=1.3)
+        overlay.draw_start(
+            canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=OUTLINED_DOT_SCALE
+        )
     elif owner == BOUNDARY:
         corners = overlay.to_pixels(canvas, sketch.boundary or ())
-        canvas.draw_outline(corners, color, canvas.scale_width(width + 0.5))
+        canvas.draw_outline(corners, color, canvas.scale_width(width + BOUNDARY_EXTRA_WIDTH_PX))
     else:
         for ring in sheet.outlines.get(sketch.get_item(owner)).rings:
             canvas.draw_outline(canvas.camera.to_pixels(ring), color, canvas.scale_width(width))

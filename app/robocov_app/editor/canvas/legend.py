@@ -5,11 +5,21 @@ from functools import partial
 from pygame import Rect
 
 from robocov_app.editor.canvas import overlay
-from robocov_app.editor.canvas.hatching import CUT_OFF_FORCE, draw_hatch_page
-from robocov_app.editor.canvas.view import choose_outside_color
+from robocov_app.editor.canvas.hatching import draw_hatch_pattern
+from robocov_app.editor.canvas.view import choose_hull_excess_color, choose_hull_excess_edge
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color, mix
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
+
+# Lengths in pixels at scale 1.
+_BOUNDARY_HALF_LENGTH_PX = 9
+_START_RADIUS_PX = 5.0
+_START_WIDTH_PX = 1.6
+_ROBOT_RADIUS_PX = 6.5
+_ROBOT_RIM_PX = 1.4
+_HATCHING_SIDE_PX = 12
+
+_ROBOT_EDGE_SHARE = 0.55  # of the ink in the edge of a robot
 
 
 def build_legend_entries(
@@ -44,7 +54,7 @@ def build_legend_entries(
     if measurement is not None:
         badge = partial(overlay.draw_badge, is_error=True, is_small=True)
         rows.append((bool(measurement.impassable), "too narrow for a robot", _draw_narrow_area))
-        rows.append((bool(measurement.sealed), "cut off", _draw_cut_off_area))
+        rows.append((bool(measurement.cut_off), "cut off", _draw_cut_off_area))
         rows.append((bool(measurement.problems), "problem", badge))
     return [LegendEntry(text, glyph) for is_present, text, glyph in rows if is_present]
 
@@ -54,37 +64,36 @@ def _draw_obstacle(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _draw_boundary(canvas: Canvas, x: float, y: float) -> None:
-    half = 9 * canvas.scale
+    half = _BOUNDARY_HALF_LENGTH_PX * canvas.scale
     width = canvas.scale_width(canvas.theme.boundary_line)
     canvas.draw_line((x - half, y), (x + half, y), canvas.theme.boundary, width)
 
 
 def _draw_hull_excess(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
-    fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
-    canvas.draw_swatch(x, y, fill, mix(fill, theme.obstacle_edge, 0.5))
+    canvas.draw_swatch(x, y, choose_hull_excess_color(theme), choose_hull_excess_edge(theme))
 
 
 def _draw_start(canvas: Canvas, x: float, y: float) -> None:
-    overlay.draw_ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)
+    overlay.draw_ring(canvas, (x, y), _START_RADIUS_PX, canvas.theme.start, _START_WIDTH_PX)
 
 
 def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
-    edge = mix(theme.background, theme.ink, 0.55)
+    edge = mix(theme.background, theme.ink, _ROBOT_EDGE_SHARE)
     colors = overlay.DiscColors(theme.robots[0], theme.robot_ring, edge)
-    overlay.draw_disc(canvas, (x, y), 6.5, colors, rim=1.4)
+    overlay.draw_disc(canvas, (x, y), _ROBOT_RADIUS_PX, colors, rim=_ROBOT_RIM_PX)
 
 
 def _draw_narrow_area(canvas: Canvas, x: float, y: float) -> None:
-    _draw_hatching(canvas, x, y, canvas.theme.trajectory)
+    _draw_hatching(canvas, x, y, canvas.theme.error)
 
 
 def _draw_cut_off_area(canvas: Canvas, x: float, y: float) -> None:
-    _draw_hatching(canvas, x, y, canvas.theme.forces[CUT_OFF_FORCE])
+    _draw_hatching(canvas, x, y, canvas.theme.cut_off)
 
 
 def _draw_hatching(canvas: Canvas, x: float, y: float, color: Color) -> None:
-    size = round(12 * canvas.scale)
-    page = draw_hatch_page(Rect(0, 0, size, size), color, canvas.scale)
-    canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))
+    size = round(_HATCHING_SIDE_PX * canvas.scale)
+    pattern = draw_hatch_pattern(Rect(0, 0, size, size), color, canvas.scale)
+    canvas.surface.blit(pattern, (round(x - size / 2), round(y - size / 2)))

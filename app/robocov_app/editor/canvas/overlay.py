@@ -35,7 +35,54 @@ SMALL_BADGE_RADIUS_PX = 6.5
 STEM_PX = 17.0  # between a problem and its badge
 ARROW_MIN_LEG_PX = 24  # shorter legs of a path have no arrow
 LABEL_OFFSET_PX = (18, -22)  # from the cursor to a tool's label
+MARK_RADIUS_PX = 5.0  # rings at positions of a start, and at positions to which the cursor has snapped
+MARK_WIDTH_PX = 1.6
+SELECTED_LINE_PX = 2.2  # selected start or chosen outline
+LINE_PX = 1.6  # start or leg of a path
+THIN_LINE_PX = 1.2  # outline that is not chosen
+EDGE_LINE_PX = 1.5  # edges of handles, previews and text boxes
+KNOB_RADIUS_PX = 4.5
+LARGE_KNOB_RADIUS_PX = 5.5
+KNOB_RIM_PX = 1.6
+GUIDE_LABEL_OFFSET_PX = (11, 15)  # from the end of a guide to its label
+DISC_LABEL_GAP_PX = 10  # between a disc-shaped start and its label above
+POINTS_LABEL_OFFSET_PX = (-5, -14)  # from the first position of a start to its label
+PATH_DASH_PX = 4.0
+WAYPOINT_RADIUS_PX = 2.5
+ARROW_AHEAD_PX = 4  # from the middle of a leg to the tip of its arrow
+ARROW_LENGTH_PX = 7
+ARROW_HALF_WIDTH_PX = 4
+LENGTH_OFFSET_PX = 9  # from an edge to the label with its length
+TEXT_BOX_HEIGHT_PX = 26
+TEXT_BOX_OFFSET_PX = 14  # from the cursor to a box with typed text
+TEXT_BOX_PADDING_PX = 8
+TEXT_BOX_SPACE_PX = 26  # to the left and right of the text and between it and the hint, together
+TEXT_BOX_RADIUS_PX = 5
+GAP_END_HALF_PX = 5  # half the length of the lines across the ends of a gap
+GAP_DOT_RADIUS_PX = 2.2
+GAP_LABEL_ENDS = 2.4  # from the middle of a gap to its label, relative to GAP_END_HALF_PX
+GAP_LABEL_OFFSET_PX = (8, -16)  # from there
+CURSOR_LABEL_WIDTH_PX = 200  # assumed width of a tool's label
+CURSOR_LABEL_HEIGHT_PX = 24
+LABEL_SEPARATION_PX = 20  # between labels side by side
+STEM_FOOT_RADIUS_PX = 1.8
+CHOSEN_RING_GAP_PX = 4  # between a badge and the ring around the chosen one
+MESSAGE_GAP_PX = 10  # between a badge and its message to the right
+MESSAGE_RISE_PX = 14  # between a badge and its message above
+MESSAGE_EDGE_PX = 8  # between a message and the edge of the view
+BADGE_RIM_PX = 1.4
+SMALL_BADGE_RIM_PX = 1.0
 
+# Shares of the second color in mixes.
+START_LABEL_INK_SHARE = 0.45
+GHOST_ACCENT_SHARE = 0.35
+LENGTH_INK_SHARE = 0.85
+BADGE_EDGE_INK_SHARE = 0.3
+
+GHOST_OPACITY = 130  # of 255
+SELECTION_BOX_OPACITY = 34  # of 255
+TYPED_TEXT_FACTOR = 1.1  # size of typed text, relative to other texts
+TEXT_CURSOR = "▏"
 MAX_SPRITE_RADIUS_PX = 300.0  # larger circles are polygons; sprites are smoother, but large images
 MAX_CIRCLE_SIDES = 720
 MAX_EDGE_LABELS = 40  # edges of a line that is being drawn whose lengths are shown
@@ -58,11 +105,11 @@ class DiscColors(NamedTuple):
     edge: Color
 
 
-def choose_problem_color(theme: Theme, *, is_error: bool) -> Color:
+def get_problem_color(theme: Theme, *, is_error: bool) -> Color:
     """Return the color of errors or of warnings."""
     if is_error:
-        return theme.trajectory
-    return theme.others[1]
+        return theme.error
+    return theme.warning
 
 
 def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
@@ -84,14 +131,14 @@ def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
     return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-MAX_PIXEL)
 
 
-def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: float) -> None:
+def draw_ring(canvas: Canvas, pixel: Point, radius: float, color: Color, width: float) -> None:
     """Draw a ring centered at a pixel; radius and line width in px at scale 1."""
     sprite = partial(sprites.render_ring, radius * canvas.scale, color, width * canvas.scale)
-    canvas.draw_sprite(sprite, at)
+    canvas.draw_sprite(sprite, pixel)
 
 
 def draw_disc(
-    canvas: Canvas, at: Point, radius: float, colors: DiscColors, *, rim: float, text: str = ""
+    canvas: Canvas, pixel: Point, radius: float, colors: DiscColors, *, rim: float, text: str = ""
 ) -> None:
     """Draw a disc with a text, centered at a pixel; radius and rim width in px at scale 1."""
     scale = canvas.scale
@@ -104,7 +151,7 @@ def draw_disc(
         edge=colors.edge,
         text=text,
     )
-    canvas.draw_sprite(sprite, at)
+    canvas.draw_sprite(sprite, pixel)
 
 
 def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], color: Color, dash: float = 4.0) -> None:
@@ -130,14 +177,14 @@ def draw_handles(
         Handle under the cursor. It is drawn larger.
     """
     floor = canvas.theme.background
-    accent = canvas.theme.final
-    positions = to_pixels(canvas, (handle.at for handle in handles)).tolist()
+    accent = canvas.theme.accent
+    positions = to_pixels(canvas, (handle.position for handle in handles)).tolist()
     for handle, (x, y) in zip(handles, positions, strict=True):
         is_large = handle == hovered
-        if handle.kind == "turn":
+        if handle.kind == "rotate":
             canvas.draw_line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.scale_width(1.0))
-            radius = 5.5 if is_large else 4.5
-            draw_disc(canvas, (x, y), radius, DiscColors(floor, accent, accent), rim=1.6)
+            radius = LARGE_KNOB_RADIUS_PX if is_large else KNOB_RADIUS_PX
+            draw_disc(canvas, (x, y), radius, DiscColors(floor, accent, accent), rim=KNOB_RIM_PX)
         elif handle.kind == "scale":
             _draw_square(canvas, (x, y), floor, is_large=is_large)
         else:
@@ -148,19 +195,19 @@ def draw_handles(
 
 
 def _draw_square(
-    canvas: Canvas, at: Point, fill: Color, *, is_large: bool = False, is_rounded: bool = False
+    canvas: Canvas, pixel: Point, fill: Color, *, is_large: bool = False, is_rounded: bool = False
 ) -> None:
     """Draw the square of a handle, centered at a pixel; that of a vertex has rounded corners."""
     half = HANDLE_HALF_PX * canvas.scale
     if is_large:
         half *= LARGE_HANDLE_FACTOR
     side = round(2 * half) + 1
-    box = Rect(round(at[0] - half), round(at[1] - half), side, side)
+    box = Rect(round(pixel[0] - half), round(pixel[1] - half), side, side)
     if canvas.surface.get_rect().colliderect(box):
         radius = round(half) if is_rounded else 0
         pygame.draw.rect(canvas.surface, fill, box, border_radius=radius)
-        accent = canvas.theme.final
-        pygame.draw.rect(canvas.surface, accent, box, canvas.scale_width(1.5), border_radius=radius)
+        accent = canvas.theme.accent
+        pygame.draw.rect(canvas.surface, accent, box, canvas.scale_width(EDGE_LINE_PX), border_radius=radius)
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
@@ -174,11 +221,12 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         if line:
             end = (line[-1][0], line[-1][1])
             if guide.kind in ("vertex", "midpoint", "center", "intersection", "edge"):
-                draw_ring(canvas, end, 5.0, color, 1.6)
+                draw_ring(canvas, end, MARK_RADIUS_PX, color, MARK_WIDTH_PX)
         if guide.kind != "grid" and guide.label not in labels:
             labels.append(guide.label)
     if end is not None and labels:
-        position = (end[0] + 11 * canvas.scale, end[1] + 15 * canvas.scale)
+        dx, dy = GUIDE_LABEL_OFFSET_PX
+        position = (end[0] + dx * canvas.scale, end[1] + dy * canvas.scale)
         canvas.draw_text(" · ".join(labels), position, size=canvas.theme.small_text, color=color)
 
 
@@ -202,23 +250,25 @@ def draw_start(
     """
     theme = canvas.theme
     scale = canvas.scale
-    width = 2.2 if is_selected else 1.6
+    width = SELECTED_LINE_PX if is_selected else LINE_PX
     if isinstance(start, DiscStart):
         ((x, y),) = to_pixels(canvas, (start.center,)).tolist()
         radius = start.radius * canvas.camera.zoom
         _draw_circle(canvas, (x, y), radius, width)
-        label_position = (x, y - radius - 10 * scale)
+        label_position = (x, y - radius - DISC_LABEL_GAP_PX * scale)
         anchor: TextAnchor = "middle"
     elif isinstance(start, PointsStart) and start.positions:
         positions = to_pixels(canvas, start.positions).tolist()
         for position in positions:
-            draw_ring(canvas, position, 5.0 * dot_scale, theme.start, width)
-        label_position = (positions[0][0] - 5 * scale, positions[0][1] - 14 * scale)
+            draw_ring(canvas, position, MARK_RADIUS_PX * dot_scale, theme.start, width)
+        x, y = positions[0]
+        dx, dy = POINTS_LABEL_OFFSET_PX
+        label_position = (x + dx * scale, y + dy * scale)
         anchor = "left"
     else:
         return
     if label:
-        color = mix(theme.start, theme.ink, 0.45)
+        color = mix(theme.start, theme.ink, START_LABEL_INK_SHARE)
         canvas.draw_text(label, label_position, size=theme.small_text, color=color, anchor=anchor)
 
 
@@ -244,11 +294,11 @@ def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
     for number, (start, end) in enumerate(legs):
         # The leg of a loop from the last waypoint back to the first one.
         is_closing = number == len(points) - 1
-        width = canvas.scale_width(1.0 if is_closing else 1.6)
-        canvas.draw_dashed_line(start.tolist(), end.tolist(), color, width, dash=4.0)
+        width = canvas.scale_width(1.0 if is_closing else LINE_PX)
+        canvas.draw_dashed_line(start.tolist(), end.tolist(), color, width, dash=PATH_DASH_PX)
         _draw_arrow(canvas, start, end, color)
     for point in points.tolist():
-        canvas.draw_sprite(partial(sprites.render_dot, 2.5 * canvas.scale, color), point)
+        canvas.draw_sprite(partial(sprites.render_dot, WAYPOINT_RADIUS_PX * canvas.scale, color), point)
 
 
 def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
@@ -259,44 +309,44 @@ def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
         return
     along = (end - start) / length
     across = np.array([-along[1], along[0]])
-    tip = (start + end) / 2 + 4 * scale * along
+    tip = (start + end) / 2 + ARROW_AHEAD_PX * scale * along
     for side in (1.0, -1.0):
-        wing = tip - 7 * scale * along + side * 4 * scale * across
-        canvas.draw_line(tip.tolist(), wing.tolist(), color, canvas.scale_width(1.6))
+        wing = tip - ARROW_LENGTH_PX * scale * along + side * ARROW_HALF_WIDTH_PX * scale * across
+        canvas.draw_line(tip.tolist(), wing.tolist(), color, canvas.scale_width(LINE_PX))
 
 
 def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
     """Draw a translucent obstacle: one that is being drawn, or one that is shown in motion."""
-    accent = canvas.theme.final
-    fill = (*mix(canvas.theme.obstacle, accent, 0.35), 130)
+    accent = canvas.theme.accent
+    fill = (*mix(canvas.theme.obstacle, accent, GHOST_ACCENT_SHARE), GHOST_OPACITY)
     for ring in build_outline(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
         bounds = [*ring.min(axis=0), *ring.max(axis=0)]
         box = compute_pixel_box(canvas.camera, bounds).clip(canvas.surface.get_clip())
         if box:
-            page = Surface(box.size, pygame.SRCALPHA, 32)
+            image = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = np.clip(corners - np.array(box.topleft), -MAX_POLYGON_PX, MAX_POLYGON_PX)
-            pygame.draw.polygon(page, fill, np.rint(shifted).tolist())
-            canvas.surface.blit(page, box)
-        canvas.draw_outline(corners, accent, canvas.scale_width(1.5))
+            pygame.draw.polygon(image, fill, np.rint(shifted).tolist())
+            canvas.surface.blit(image, box)
+        canvas.draw_outline(corners, accent, canvas.scale_width(EDGE_LINE_PX))
 
 
 def draw_preview(canvas: Canvas, state: EditorToolOverlay, cursor: Point | None) -> None:
     """Draw the preview of a tool; its label is next to the cursor, px."""
     floor = canvas.theme.background
-    accent = canvas.theme.final
+    accent = canvas.theme.accent
     for shape in state.shapes:
         draw_ghost(canvas, shape.polygon)
     if state.start is not None:
         draw_start(canvas, state.start, "", is_selected=True)
     _draw_preview_line(canvas, state)
-    for number, ring in enumerate(state.rings):
-        width = 2.2 if number == state.chosen else 1.2
+    for number, ring in enumerate(state.outlines):
+        width = SELECTED_LINE_PX if number == state.chosen else THIN_LINE_PX
         canvas.draw_outline(to_pixels(canvas, ring), accent, canvas.scale_width(width))
-    for number, (x, y) in enumerate(to_pixels(canvas, state.dots).tolist()):
+    for number, (x, y) in enumerate(to_pixels(canvas, state.markers).tolist()):
         _draw_square(canvas, (x, y), floor, is_large=number == state.chosen, is_rounded=True)
     if state.box is not None:
-        _draw_selection_box(canvas, state.box, selects_touched=state.box_selects_touched)
+        _draw_selection_box(canvas, state.box, selects_partial=state.box_selects_partial)
     if state.label and cursor is not None:
         position = _place_cursor_label(canvas, cursor)
         draw_tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
@@ -309,10 +359,10 @@ def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
 
 def _draw_preview_line(canvas: Canvas, state: EditorToolOverlay) -> None:
     """Draw the line that is being drawn, with its vertices, closing edge and lengths."""
-    accent = canvas.theme.final
+    accent = canvas.theme.accent
     line = to_pixels(canvas, state.line)
     if len(line) > 1:
-        canvas.draw_outline(line, accent, canvas.scale_width(1.5), is_closed=False)
+        canvas.draw_outline(line, accent, canvas.scale_width(EDGE_LINE_PX), is_closed=False)
         if state.is_closed:
             canvas.draw_dashed_line(line[-1].tolist(), line[0].tolist(), accent, canvas.scale_width(1.0))
     for x, y in line.tolist():
@@ -323,7 +373,7 @@ def _draw_preview_line(canvas: Canvas, state: EditorToolOverlay) -> None:
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
     """Write the length of each edge next to it, except for the last edge, which follows the cursor."""
-    color = mix(canvas.theme.background, canvas.theme.ink, 0.85)
+    color = mix(canvas.theme.background, canvas.theme.ink, LENGTH_INK_SHARE)
     size = canvas.theme.small_text
     for start, end in list(pairwise(line[:-1]))[-MAX_EDGE_LABELS:]:
         start_pixel, end_pixel = to_pixels(canvas, (start, end))
@@ -338,50 +388,52 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
         points_down = across[1] > 0 or (across[1] == 0 and across[0] < 0)
         if points_down:
             across = -across
-        offset = 9 * canvas.scale + abs(float(across[0])) * label_width / 2
+        offset = LENGTH_OFFSET_PX * canvas.scale + abs(float(across[0])) * label_width / 2
         position = (start_pixel + end_pixel) / 2 + offset * across
         canvas.draw_text(label, position.tolist(), size=size, color=color, anchor="middle")
 
 
-def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects_touched: bool) -> None:
-    """Draw the selection box between two corners, m; dashed if it selects what it touches."""
+def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects_partial: bool) -> None:
+    """Draw the selection box between two corners, m; dashed if it selects objects partly inside."""
     ends = to_pixels(canvas, corners)
     low = ends.min(axis=0)
     high = ends.max(axis=0)
     left, top, width, height = np.rint([*low, *(high - low)]).astype(int).tolist()
     box = Rect(left, top, width, height).clip(canvas.surface.get_clip())
-    color = canvas.theme.final
-    if selects_touched:
+    color = canvas.theme.accent
+    if selects_partial:
         color = canvas.theme.start
     if box:
-        page = Surface(box.size, pygame.SRCALPHA, 32)
-        page.fill((*color, 34))
-        canvas.surface.blit(page, box)
+        image = Surface(box.size, pygame.SRCALPHA, 32)
+        image.fill((*color, SELECTION_BOX_OPACITY))
+        canvas.surface.blit(image, box)
     outline = shapely.get_coordinates(shapely.box(*low, *high, ccw=False))
-    if selects_touched:
+    if selects_partial:
         draw_dashes(canvas, outline.tolist(), color)
     else:
         canvas.draw_outline(outline, color, canvas.scale_width(1.0), is_closed=False)
 
 
-def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
+def draw_typed_text(canvas: Canvas, text: str, pixel: Point) -> None:
     """Draw a box next to a pixel with the value that is being typed, and the hint to press Enter."""
     theme = canvas.theme
     scale = canvas.scale
     surface = canvas.surface
-    value = f"{text}▏"
+    value = text + TEXT_CURSOR
     hint = "Enter"
-    value_size = theme.text * 1.1
+    value_size = theme.text * TYPED_TEXT_FACTOR
     width = canvas.measure_text(value, value_size, bold=True) + canvas.measure_text(hint, theme.small_text)
-    box = Rect(0, 0, width + round(26 * scale), round(26 * scale))
-    box.topleft = (round(at[0] + 14 * scale), round(at[1] + 14 * scale))
+    box = Rect(0, 0, width + round(TEXT_BOX_SPACE_PX * scale), round(TEXT_BOX_HEIGHT_PX * scale))
+    offset = TEXT_BOX_OFFSET_PX * scale
+    box.topleft = (round(pixel[0] + offset), round(pixel[1] + offset))
     box.clamp_ip(surface.get_rect())
-    pygame.draw.rect(surface, theme.panel, box, border_radius=round(5 * scale))
-    pygame.draw.rect(surface, theme.final, box, canvas.scale_width(1.5), border_radius=round(5 * scale))
+    radius = round(TEXT_BOX_RADIUS_PX * scale)
+    pygame.draw.rect(surface, theme.panel, box, border_radius=radius)
+    pygame.draw.rect(surface, theme.accent, box, canvas.scale_width(EDGE_LINE_PX), border_radius=radius)
     size = canvas.scale_text_size(value_size) / scale
     y = box.centery
-    canvas.draw_text(value, (box.left + 8 * scale, y), size=size, bold=True)
-    hint_position = (box.right - 8 * scale, y)
+    canvas.draw_text(value, (box.left + TEXT_BOX_PADDING_PX * scale, y), size=size, bold=True)
+    hint_position = (box.right - TEXT_BOX_PADDING_PX * scale, y)
     canvas.draw_text(hint, hint_position, size=theme.small_text, color=theme.faint, anchor="right")
 
 
@@ -390,11 +442,17 @@ def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.start
     if gap.width < 2 * radius:
-        color = canvas.theme.trajectory
-    for a, b in ((start, end), (start - across, start + across), (end - across, end + across)):
-        canvas.draw_line(a.tolist(), b.tolist(), color, canvas.scale_width(2))
+        color = canvas.theme.error
+    for line_start, line_end in (
+        (start, end),
+        (start - across, start + across),
+        (end - across, end + across),
+    ):
+        canvas.draw_line(line_start.tolist(), line_end.tolist(), color, canvas.scale_width(2))
     for point in (start, end):
-        canvas.draw_sprite(partial(sprites.render_dot, 2.2 * canvas.scale, color), point.tolist())
+        canvas.draw_sprite(
+            partial(sprites.render_dot, GAP_DOT_RADIUS_PX * canvas.scale, color), point.tolist()
+        )
 
 
 def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None = None) -> None:
@@ -420,23 +478,33 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     if abs(across[0]) >= MIN_LENGTH_PX:
         # The label is to the right of the gap.
         side = float(np.sign(across[0]))
-    position = (start + end) / 2 + across * side * 2.4
-    x = float(position[0]) + 8 * scale
-    y = float(position[1]) - 16 * scale
+    x, y = ((start + end) / 2 + across * side * GAP_LABEL_ENDS).tolist()
+    dx, dy = GAP_LABEL_OFFSET_PX
+    position = (x + dx * scale, y + dy * scale)
     if cursor is not None:
-        cursor_x, cursor_y = _place_cursor_label(canvas, cursor)
-        low_x = cursor_x - canvas.measure_text(label) - 20 * scale
-        if low_x < x < cursor_x + 200 * scale and abs(y - cursor_y) < 24 * scale:
-            y = cursor_y - 24 * scale
-    draw_tag(canvas.surface, label, (x, y), canvas.theme, scale)
+        position = _move_above_cursor_label(canvas, label, position, cursor)
+    draw_tag(canvas.surface, label, position, canvas.theme, scale)
+
+
+def _move_above_cursor_label(canvas: Canvas, label: str, position: Point, cursor: Point) -> Point:
+    """Return the position of a label, px, moved up if it would overlap the label of a tool at the cursor."""
+    scale = canvas.scale
+    x, y = position
+    cursor_label_x, cursor_label_y = _place_cursor_label(canvas, cursor)
+    low_x = cursor_label_x - canvas.measure_text(label) - LABEL_SEPARATION_PX * scale
+    high_x = cursor_label_x + CURSOR_LABEL_WIDTH_PX * scale
+    height = CURSOR_LABEL_HEIGHT_PX * scale
+    if low_x < x < high_x and abs(y - cursor_label_y) < height:
+        return x, cursor_label_y - height
+    return position
 
 
 def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
-    """Return the ends of a gap, px, and a vector perpendicular to it with a length of 5 px at scale 1."""
+    """Return the ends of a gap, px, and a vector perpendicular to it with a length of `GAP_END_HALF_PX`."""
     start, end = canvas.camera.to_pixels(np.array(gap.between))
     length = max(float(np.hypot(*(end - start))), MIN_LENGTH_PX)
     normal = np.array([end[1] - start[1], start[0] - end[0]]) / length
-    return start, end, normal * 5 * canvas.scale
+    return start, end, normal * GAP_END_HALF_PX * canvas.scale
 
 
 def place_badges(problems: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
@@ -468,21 +536,22 @@ def draw_problems(
     badges = place_badges(problems, view)
     # Earlier problems are drawn on top of later ones.
     for problem, (x, y) in reversed(badges):
-        color = choose_problem_color(canvas.theme, is_error=problem.is_error)
+        color = get_problem_color(canvas.theme, is_error=problem.is_error)
         foot = y + STEM_PX * canvas.scale
-        canvas.draw_line((x, y), (x, foot), color, canvas.scale_width(1.5))
-        canvas.draw_sprite(partial(sprites.render_dot, 1.8 * canvas.scale, color), (x, foot))
+        canvas.draw_line((x, y), (x, foot), color, canvas.scale_width(EDGE_LINE_PX))
+        canvas.draw_sprite(partial(sprites.render_dot, STEM_FOOT_RADIUS_PX * canvas.scale, color), (x, foot))
         draw_badge(canvas, x, y, is_error=problem.is_error)
     is_single_error = len(problems) == 1 and problems[0].is_error
     for problem, position in badges:
         if problem in noted or is_single_error:
             _draw_problem_message(canvas, problem, position)
             if problem is chosen:
-                draw_ring(canvas, position, BADGE_RADIUS_PX + 4, canvas.theme.ink, 1.6)
+                radius = BADGE_RADIUS_PX + CHOSEN_RING_GAP_PX
+                draw_ring(canvas, position, radius, canvas.theme.ink, MARK_WIDTH_PX)
 
 
 def _draw_problem_outline(canvas: Canvas, problem: Problem) -> None:
-    color = choose_problem_color(canvas.theme, is_error=problem.is_error)
+    color = get_problem_color(canvas.theme, is_error=problem.is_error)
     for part in shapely.get_parts(problem.geometry):
         lines = [part]
         if isinstance(part, shapely.Polygon):
@@ -497,20 +566,20 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
     """Write the message of a problem to the right of its badge, or above it if there is too little space."""
     x, y = badge
     scale = canvas.scale
-    text_x = x + (BADGE_RADIUS_PX + 10) * scale
-    free_width = canvas.surface.get_width() - text_x - 8 * scale
+    text_x = x + (BADGE_RADIUS_PX + MESSAGE_GAP_PX) * scale
+    free_width = canvas.surface.get_width() - text_x - MESSAGE_EDGE_PX * scale
     text_y = y
     if free_width <= canvas.measure_text(problem.message):
-        text_y = y - (BADGE_RADIUS_PX + 14) * scale
+        text_y = y - (BADGE_RADIUS_PX + MESSAGE_RISE_PX) * scale
     draw_tag(canvas.surface, problem.message, (text_x, text_y), canvas.theme, scale)
 
 
 def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: bool = False) -> None:
     """Draw the badge of a problem, a disc with an exclamation mark, at a pixel."""
     theme = canvas.theme
-    fill = choose_problem_color(theme, is_error=is_error)
-    colors = DiscColors(fill, theme.background, mix(fill, theme.ink, 0.3))
+    fill = get_problem_color(theme, is_error=is_error)
+    colors = DiscColors(fill, theme.background, mix(fill, theme.ink, BADGE_EDGE_INK_SHARE))
     if is_small:
-        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, rim=1.0, text="!")
+        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, rim=SMALL_BADGE_RIM_PX, text="!")
     else:
-        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, rim=1.4, text="!")
+        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, rim=BADGE_RIM_PX, text="!")

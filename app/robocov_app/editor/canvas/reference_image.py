@@ -31,12 +31,14 @@ class ReferenceImage:
         self._picture: Surface | None = None
         self._reduction = 1.0  # pixels of the file per pixel of the cached picture
 
-    def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
+    def draw(
+        self, surface: Surface, background: Background, folder: Path, camera: Camera, clip: Rect
+    ) -> None:
         """Draw a picture; nothing if it is hidden or cannot be loaded.
 
         Parameters
         ----------
-        page : Surface
+        surface : Surface
             Surface to draw on.
         background : Background
             Position and opacity of the picture.
@@ -45,7 +47,7 @@ class ReferenceImage:
         camera : Camera
             The view.
         clip : Rect
-            Visible part of the page, px.
+            Visible part of the surface, px.
         """
         self._load(folder / background.path)
         if self._picture is None or not background.shown or background.opacity <= 0.0:
@@ -58,7 +60,7 @@ class ReferenceImage:
         if drawn is not None:
             picture, position = drawn
             picture.set_alpha(round(255 * background.opacity))
-            page.blit(picture, position)
+            surface.blit(picture, position)
 
     def _load(self, path: Path) -> None:
         """Load a picture unless it is the cached one; set `error` if that fails."""
@@ -96,8 +98,7 @@ class ReferenceImage:
 
         The whole picture could be too large after scaling.
         """
-        # Corner 3 is the upper left one.
-        left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
+        left, top = camera.to_pixels(np.array(background.upper_left)).tolist()
         width, height = picture.get_size()
         first_x = max(int((clip.left - left) / factor) - 1, 0)
         first_y = max(int((clip.top - top) / factor) - 1, 0)
@@ -109,11 +110,11 @@ class ReferenceImage:
         size_y = max(round(top + last_y * factor) - low_y, 1)
         if last_x <= first_x or last_y <= first_y or max(size_x, size_y) > MAX_SHOWN_PX:
             return None
-        part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
+        visible = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
         position = Rect(low_x, low_y, 0, 0)
         if factor < MIN_PIXELATED_FACTOR:
-            return pygame.transform.smoothscale(part, (size_x, size_y)), position
-        return pygame.transform.scale(part, (size_x, size_y)), position
+            return pygame.transform.smoothscale(visible, (size_x, size_y)), position
+        return pygame.transform.scale(visible, (size_x, size_y)), position
 
 
 def _convert_to_rgb(picture: Image.Image) -> Image.Image:

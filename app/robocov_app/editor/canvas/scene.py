@@ -38,7 +38,7 @@ class EditorScene:
         The map as it is displayed.
     selection : Selection
         The selection as it is displayed.
-    lifted : frozenset of int
+    hidden_keys : frozenset of int
         Keys of obstacles that are dragged or changed, and therefore not drawn on the sheet.
     team : Team or None
         The team that is shown at a start.
@@ -56,7 +56,7 @@ class EditorScene:
     saved: Sketch
     sketch: Sketch
     selection: Selection
-    lifted: frozenset[int]
+    hidden_keys: frozenset[int]
     team: Team | None
     hovered: Problem | None
     cursor: Point | None

@@ -1,4 +1,4 @@
-"""The sheet: floor, picture, grid, obstacles and boundary on one cached page; only changes are redrawn."""
+"""The sheet: floor, picture, grid, obstacles and boundary on a cached image; only changes are redrawn."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,12 +11,17 @@ from pygame import Rect, Surface
 from robocov.arrays import Array
 from robocov_app.editor.canvas.outlines import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
-from robocov_app.editor.canvas.view import View, choose_outside_color, compute_pixel_box
+from robocov_app.editor.canvas.view import (
+    View,
+    choose_hull_excess_color,
+    choose_hull_excess_edge,
+    choose_outside_color,
+    compute_pixel_box,
+)
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.look.colors import Color, mix
-from robocov_app.look.lengths import round_down
-from robocov_app.look.theme import LIGHT
+from robocov_app.look.lengths import round_up
 from robocov_app.render import fonts
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
@@ -28,20 +33,22 @@ from robocov_app.render.surface_cache import LatestValue
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
 MIN_COARSE_GRID_PX = 55.0  # between the coarse lines
 REDRAW_MARGIN_PX = 6  # around changed objects
+FLAT_LINE_WIDTH_PX = 1.5  # of parts of obstacles that have no area
 NAME_MARGIN_PX = 8.0  # free space to the left and right of a name, both together
 
 PIXEL_BIAS = 1e-4  # small shift of the camera, because round coordinates would lie exactly between two pixels
 MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pixels for scrolling
-MAX_REDRAWN_FRACTION = 0.5  # of the page; if more has changed, all of it is redrawn
+MAX_REDRAWN_FRACTION = 0.5  # of the image; if more has changed, all of it is redrawn
 MAX_BOXES = 40  # more boxes are merged into one
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
+NAME_INK_SHARE = 0.9  # of the ink in the color of names, which are on obstacles
 OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
 _TRANSPARENT = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)
-class _PageState:
-    """Content of the cached page."""
+class _ImageState:
+    """Content of the cached image."""
 
     look: tuple[object, ...]  # everything except for the obstacles and the position of the camera
     camera: Camera
@@ -49,7 +56,7 @@ class _PageState:
 
 
 class Sheet:
-    """Draws the sheet on a page, which is cached and updated.
+    """Draws the sheet on an image, which is cached and updated.
 
     Attributes
     ----------
@@ -62,11 +69,11 @@ class Sheet:
     def __init__(self) -> None:
         self.outlines = Outlines()
         self.reference_image = ReferenceImage()
-        self._page: Surface | None = None
-        self._state: _PageState | None = None
+        self._cached_image: Surface | None = None
+        self._state: _ImageState | None = None
         self._hull_excess: LatestValue[shapely.Geometry] = LatestValue()
 
-    def draw(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
+    def draw(self, view: View, sketch: Sketch, hidden_keys: frozenset[int] = frozenset()) -> Surface:
         """Draw the sheet; redraw only what has changed since the last call.
 
         Parameters
@@ -75,29 +82,31 @@ class Sheet:
             The view.
         sketch : Sketch
             The map.
-        lifted : frozenset of int
-            Keys of obstacles that are not drawn, because they are dragged.
+        hidden_keys : frozenset of int
+            Keys of obstacles that are not drawn, because they are dragged or changed.
 
         Returns
         -------
         Surface
-            The cached page, as large as the window. The next call draws on it again.
+            The cached image, as large as the window. The next call draws on it again.
         """
         left, top, width, height = view.camera.view
         camera = view.camera.with_view((left + PIXEL_BIAS, top + PIXEL_BIAS, width, height))
         view = replace(view, camera=camera)
-        items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
-        state = _PageState(_describe_look(view, sketch), camera, items)
+        items = {
+            item.key: item for item in sketch.obstacles if item.key not in hidden_keys and not item.hidden
+        }
+        state = _ImageState(_describe_look(view, sketch), camera, items)
         boxes = self._find_changes(view, self._state, state)
-        if self._page is None or self._page.get_size() != view.size:
-            self._page = Surface(view.size, 0, 32)
+        if self._cached_image is None or self._cached_image.get_size() != view.size:
+            self._cached_image = Surface(view.size, 0, 32)
         self._state = state
         for box in boxes:
-            self._paint(self._page, view, sketch, items, box)
-        return self._page
+            self._redraw_box(self._cached_image, view, sketch, items, box)
+        return self._cached_image
 
-    def _find_changes(self, view: View, before: _PageState | None, after: _PageState) -> list[Rect]:
-        """Scroll the page if the camera has moved, and return the boxes that must be redrawn, px."""
+    def _find_changes(self, view: View, before: _ImageState | None, after: _ImageState) -> list[Rect]:
+        """Scroll the image if the camera has moved, and return the boxes that must be redrawn, px."""
         whole = view.clip
         if before is None or before.look != after.look:
             return [whole]
@@ -120,12 +129,12 @@ class Sheet:
         return _merge_boxes(visible)
 
     def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
-        """Scroll the page from the view of a previous camera to the current view.
+        """Scroll the image from the view of a previous camera to the current view.
 
         Returns
         -------
         list of Rect or None
-            Parts of the page that have become visible, px; None if the page cannot be scrolled, because the
+            Parts of the image that have become visible, px; None if the image cannot be scrolled, because the
             camera has moved too far or by a fraction of a pixel.
         """
         shift = np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))
@@ -136,10 +145,10 @@ class Sheet:
         is_far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
         if is_far or max(abs(dx - whole_x), abs(dy - whole_y)) > MAX_SCROLL_ERROR_PX:
             return None
-        assert self._page is not None
-        self._page.set_clip(clip)
-        self._page.scroll(whole_x, whole_y)
-        self._page.set_clip(None)
+        assert self._cached_image is not None
+        self._cached_image.set_clip(clip)
+        self._cached_image.scroll(whole_x, whole_y)
+        self._cached_image.set_clip(None)
         boxes = []
         if whole_x:
             left = clip.left if whole_x > 0 else clip.right + whole_x
@@ -151,24 +160,17 @@ class Sheet:
             boxes.append(Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
         return boxes
 
-    def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
-        """Paint everything inside a box of the page, px, from bottom to top."""
-        page.set_clip(box)
-        theme = view.theme
-        canvas = view.build_canvas(page)
-        page.fill(choose_outside_color(theme), box)
-        boundary = None
-        if sketch.boundary is not None and len(sketch.boundary) > 2:
-            boundary = view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
-            canvas.fill_polygon(boundary, theme.background)
-        background = None
-        if "picture" in view.shown:
-            background = sketch.background
-        has_picture = background is not None and background.shown
-        if background is not None:
-            self.reference_image.draw(page, background, view.folder, view.camera, view.clip)
+    def _redraw_box(
+        self, image: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect
+    ) -> None:
+        """Draw everything inside a box of the image, px, from bottom to top."""
+        image.set_clip(box)
+        canvas = view.build_canvas(image)
+        boundary = _compute_boundary_pixels(view, sketch)
+        _draw_floor(canvas, boundary, box)
+        has_picture = self._draw_picture(image, view, sketch)
         if "grid" in view.shown:
-            _draw_grid(page, view, box, has_fine_lines=not has_picture)
+            _draw_grid(image, view, box, has_fine_lines=not has_picture)
         if boundary is not None:
             _draw_density(canvas, sketch)
         self._draw_hull_excess(canvas, sketch)
@@ -179,21 +181,31 @@ class Sheet:
         else:
             self.draw_items(canvas, visible)
         if boundary is not None:
-            canvas.draw_outline(boundary, theme.boundary, canvas.scale_width(theme.boundary_line))
+            width = canvas.scale_width(view.theme.boundary_line)
+            canvas.draw_outline(boundary, view.theme.boundary, width)
         if "names" in view.shown:
             self._draw_names(canvas, visible)
-        page.set_clip(None)
+        image.set_clip(None)
+
+    def _draw_picture(self, image: Surface, view: View, sketch: Sketch) -> bool:
+        """Draw the reference picture if it is shown; return whether it is."""
+        background = sketch.background
+        if background is None or "picture" not in view.shown:
+            return False
+        self.reference_image.draw(image, background, view.folder, view.camera, view.clip)
+        return background.shown
 
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw the areas between the boundary and its convex hull, which robots consider to be free."""
         theme = canvas.theme
         excess = self._hull_excess.get(sketch.boundary, None, lambda: compute_hull_excess(sketch))
-        fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
+        fill = choose_hull_excess_color(theme)
+        edge = choose_hull_excess_edge(theme)
         for part in shapely.get_parts(excess):
             if isinstance(part, shapely.Polygon):
                 corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
                 canvas.fill_polygon(corners, fill)
-                canvas.draw_outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
+                canvas.draw_outline(corners, edge, 1)
 
     def _draw_translucent_items(self, canvas: Canvas, items: list[Item], box: Rect) -> None:
         """Draw translucent obstacles, so that the picture under them stays visible."""
@@ -232,14 +244,13 @@ class Sheet:
             for line in outline.lines:
                 points = canvas.camera.to_pixels(line)
                 if len(points) > 1:
-                    canvas.draw_outline(
-                        points, canvas.theme.trajectory, canvas.scale_width(1.5), is_closed=False
-                    )
+                    width = canvas.scale_width(FLAT_LINE_WIDTH_PX)
+                    canvas.draw_outline(points, canvas.theme.error, width, is_closed=False)
 
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
         """Write the names of obstacles, shortened if necessary; none on obstacles that are too small."""
         size = canvas.scale_text_size(canvas.theme.small_text)
-        color = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
+        color = mix(canvas.theme.obstacle, canvas.theme.ink, NAME_INK_SHARE)
         zoom = canvas.camera.zoom
         for item in items:
             name = item.shape.name
@@ -257,7 +268,7 @@ class Sheet:
 
 
 def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
-    """Return all that the page depends on, except for obstacles and camera position; for comparison."""
+    """Return everything except obstacles and camera position that determines the image, for comparison."""
     return (
         view.camera.zoom,
         view.camera.view,
@@ -281,7 +292,7 @@ def _list_changed_items(before: dict[int, Item], after: dict[int, Item]) -> list
 
 
 def _compute_visible_box(view: View, box: Rect) -> Box:
-    """Return the part of the map that is visible in a box of the page, px, with a margin, m."""
+    """Return the part of the map that is visible in a box of the image, px, with a margin, m."""
     ends = np.array([box.bottomleft, box.topright], dtype=float)
     (low_x, low_y), (high_x, high_y) = view.camera.to_world(ends).tolist()
     margin = REDRAW_MARGIN_PX * view.scale / view.camera.zoom
@@ -298,26 +309,38 @@ def compute_hull_excess(sketch: Sketch) -> shapely.Geometry:
     return shapely.difference(polygon.convex_hull, polygon)
 
 
+def _compute_boundary_pixels(view: View, sketch: Sketch) -> Array | None:
+    """Return the corners of the boundary, (k, 2) px; None if it has no area."""
+    if sketch.boundary is None or len(sketch.boundary) <= 2:
+        return None
+    return view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
+
+
+def _draw_floor(canvas: Canvas, boundary: Array | None, box: Rect) -> None:
+    """Fill a box of the image with the colors outside and inside the boundary."""
+    canvas.surface.fill(choose_outside_color(canvas.theme), box)
+    if boundary is not None:
+        canvas.fill_polygon(boundary, canvas.theme.background)
+
+
 def _draw_density(canvas: Canvas, sketch: Sketch) -> None:
     density = sketch.density
     if density is not None and not density.is_uniform and sketch.boundary is not None:
         draw_density_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
 
 
-def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) -> None:
+def _draw_grid(image: Surface, view: View, box: Rect, *, has_fine_lines: bool) -> None:
     theme = view.theme
     fine_step, coarse_step = compute_grid_steps(view.grid, view.camera.zoom, view.scale)
-    is_light = theme is LIGHT
-    # Shares of the grid color: the same shares would look stronger on a dark background.
-    fine_share = 0.32 if is_light else 0.2
-    coarse_share = 0.75 if is_light else 0.5
     if has_fine_lines:
-        _draw_grid_lines(page, view, box, fine_step, mix(theme.background, theme.grid, fine_share))
-    _draw_grid_lines(page, view, box, coarse_step, mix(theme.background, theme.grid, coarse_share))
+        fine_color = mix(theme.background, theme.grid, theme.fine_grid_share)
+        _draw_grid_lines(image, view, box, fine_step, fine_color)
+    coarse_color = mix(theme.background, theme.grid, theme.coarse_grid_share)
+    _draw_grid_lines(image, view, box, coarse_step, coarse_color)
 
 
-def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: Color) -> None:
-    """Draw the grid lines with a spacing, m, that cross a box of the page."""
+def _draw_grid_lines(image: Surface, view: View, box: Rect, step: float, color: Color) -> None:
+    """Draw the grid lines with a spacing, m, that cross a box of the image."""
     low_x, low_y, high_x, high_y = view.camera.compute_visible_bounds()
     width = max(1, round(view.scale))
     xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
@@ -325,9 +348,9 @@ def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: C
     columns = view.camera.to_pixels(np.column_stack([xs, np.zeros(len(xs))]))[:, 0]
     rows = view.camera.to_pixels(np.column_stack([np.zeros(len(ys)), ys]))[:, 1]
     for x in columns[(columns >= box.left - 2) & (columns <= box.right + 2)].tolist():
-        page.fill(color, Rect(round(x - width / 2), box.top, width, box.height))
+        image.fill(color, Rect(round(x - width / 2), box.top, width, box.height))
     for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
-        page.fill(color, Rect(box.left, round(y - width / 2), box.width, width))
+        image.fill(color, Rect(box.left, round(y - width / 2), box.width, width))
 
 
 def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
@@ -347,33 +370,24 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
     fine, coarse : float
         Spacings, m: multiples of the grid spacing that are far enough apart on the screen.
     """
-    fine = grid
     min_fine = MIN_FINE_GRID_PX * scale / zoom
-    if fine < min_fine:
-        # Steps are 1, 2, 5, 10, ...; 2.5001 times a step, rounded down, is the next larger one.
-        factor = round_down(min_fine / grid)
-        if factor < min_fine / grid:
-            factor = round_down(2.5001 * factor)
-        fine = grid * factor
+    fine = grid * round_up(max(min_fine / grid, 1.0))
     min_coarse = MIN_COARSE_GRID_PX * scale / zoom
-    factor = round_down(max(min_coarse / fine, 1.0))
-    if factor * fine < min_coarse:
-        factor = round_down(2.5001 * factor)
-    coarse = fine * factor
+    coarse = fine * round_up(max(min_coarse / fine, 1.0))
     return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
 
 
 def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
     """Fill an obstacle on a separate surface, so that whatever is below is visible through its holes."""
     clip = canvas.surface.get_clip()
-    page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
+    layer = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
     for ring, is_outer in zip(outline.rings, outline.outer, strict=True):
         corners = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
         if is_outer:
-            page.fill_polygon(corners, (*fill, 255))
+            layer.fill_polygon(corners, (*fill, 255))
         else:
-            page.fill_polygon(corners, _TRANSPARENT)
-    canvas.surface.blit(page.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
+            layer.fill_polygon(corners, _TRANSPARENT)
+    canvas.surface.blit(layer.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -> None:
@@ -400,7 +414,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
     edges = np.hstack([corners, corners[following]])
-    # Skipping edges outside the page saves time.
+    # Skipping edges outside the image saves time.
     clip = canvas.surface.get_clip()
     low = np.minimum(edges[:, :2], edges[:, 2:])
     high = np.maximum(edges[:, :2], edges[:, 2:])

@@ -14,6 +14,12 @@ from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 
+HULL_EXCESS_SHARE = 0.55  # of the obstacle color in areas between the boundary and its convex hull
+HULL_EXCESS_EDGE_SHARE = 0.5  # of the edge color of obstacles in the edges of these areas
+_LIGHT_OUTSIDE_SHARE = 0.05  # of the ink in the color outside the boundary
+_DARK_OUTSIDE_SHARE = 0.28  # of black in this color
+_BLACK = (0, 0, 0)
+
 MAX_RECT_PX = 30_000  # coordinates of rectangles are limited to this
 
 
@@ -56,7 +62,7 @@ class View:
         """Build a canvas that draws on a surface in this view."""
         return Canvas(surface, self.camera, self.theme, self.scale, choose_robot_hues(0))
 
-    def build_page(self) -> Canvas:
+    def build_transparent_canvas(self) -> Canvas:
         """Build a canvas with a transparent surface as large as the window."""
         return self.build_canvas(Surface(self.size, pygame.SRCALPHA, 32))
 
@@ -64,8 +70,18 @@ class View:
 def choose_outside_color(theme: Theme) -> Color:
     """Return the color of the sheet outside the boundary."""
     if theme is LIGHT:
-        return mix(theme.panel, theme.ink, 0.05)
-    return mix(theme.background, (0, 0, 0), 0.28)
+        return mix(theme.panel, theme.ink, _LIGHT_OUTSIDE_SHARE)
+    return mix(theme.background, _BLACK, _DARK_OUTSIDE_SHARE)
+
+
+def choose_hull_excess_color(theme: Theme) -> Color:
+    """Return the color of the areas between the boundary and its convex hull."""
+    return mix(choose_outside_color(theme), theme.obstacle, HULL_EXCESS_SHARE)
+
+
+def choose_hull_excess_edge(theme: Theme) -> Color:
+    """Return the color of the edges of these areas."""
+    return mix(choose_hull_excess_color(theme), theme.obstacle_edge, HULL_EXCESS_EDGE_SHARE)
 
 
 def compute_pixel_box(camera: Camera, bounds: Iterable[float]) -> Rect:

@@ -66,6 +66,11 @@ class Background:
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
 
     @property
+    def upper_left(self) -> Point:
+        """Position of the upper left corner, m."""
+        return self.to_world((0, 0))
+
+    @property
     def corners(self) -> tuple[Point, Point, Point, Point]:
         """Positions of the lower left, lower right, upper right and upper left corner, m."""
         width, height = self.pixels
@@ -73,7 +78,7 @@ class Background:
             self.to_world((0, height)),
             self.to_world((width, height)),
             self.to_world((width, 0)),
-            self.to_world((0, 0)),
+            self.upper_left,
         )
 
     def to_document(self) -> dict[str, Any]:

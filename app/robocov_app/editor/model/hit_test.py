@@ -93,7 +93,7 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
     return nearest
 
 
-def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
+def find_in_box(sketch: Sketch, a: Point, b: Point, *, includes_partial: bool = False) -> Selection:
     """Select the objects in a box.
 
     Parameters
@@ -102,12 +102,12 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
         The map.
     a, b : Point
         Opposite corners of the box, m.
-    touched : bool
+    includes_partial : bool
         Whether to include objects that are only partly in the box. The boundary must always be completely
         inside.
     """
     box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
-    if touched:
+    if includes_partial:
         indices = sketch.tree.query(box, predicate="intersects")
     else:
         corners = _is_in_box(shapely.bounds(sketch.geometries), a, b).reshape(-1, 2)
@@ -115,10 +115,10 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
     items = [sketch.obstacles[index] for index in indices.tolist()]
     starts = []
     for name, start in sketch.starts:
-        if touched and isinstance(start, DiscStart):
+        if includes_partial and isinstance(start, DiscStart):
             is_inside = shapely.distance(box, shapely.Point(start.center)) <= start.radius
         else:
-            is_inside = _is_start_in_box(sketch, name, a, b, touched=touched)
+            is_inside = _is_start_in_box(sketch, name, a, b, includes_partial=includes_partial)
         if is_inside:
             starts.append(name)
     boundary = _is_in_box(sketch.boundary or (), a, b)
@@ -127,10 +127,10 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
     return Selection(keys, starts=frozenset(starts), boundary=has_boundary)
 
 
-def _is_start_in_box(sketch: Sketch, name: str, a: Point, b: Point, *, touched: bool) -> bool:
-    """Return whether all vertices of a start (with `touched`, any of them) are in a box."""
+def _is_start_in_box(sketch: Sketch, name: str, a: Point, b: Point, *, includes_partial: bool) -> bool:
+    """Return whether all vertices of a start (with `includes_partial`, any of them) are in a box."""
     inside = _is_in_box([position for _, position in list_vertices(sketch, name)], a, b)
-    if touched:
+    if includes_partial:
         return bool(inside.any())
     return bool(inside.size and inside.all())
 

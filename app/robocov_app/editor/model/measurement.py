@@ -41,7 +41,7 @@ class Measurement:
     impassable : MultiPolygon
         Areas to mark as impassable: in each passage that is too narrow, the largest disc that fits through
         it; and the space that no robot can touch, see `compute_reach`.
-    sealed : MultiPolygon
+    cut_off : MultiPolygon
         Free space in which robots fit, but which they cannot reach from the largest part.
     vertices : int
         Number of vertices of the boundary, walls, polygons and their holes.
@@ -56,7 +56,7 @@ class Measurement:
     reached: tuple[float, ...]
     gap: Gap | None
     impassable: MultiPolygon
-    sealed: MultiPolygon
+    cut_off: MultiPolygon
     vertices: int
     problems: tuple[Problem, ...]
     radius: float
@@ -82,19 +82,19 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
     swept, untouched = compute_reach(free, radius)
     discs = [shapely.Point(_compute_middle(gap)).buffer(gap.width / 2) for gap in narrow_gaps]
     impassable = _list_polygons(shapely.union_all([*discs, untouched]) & free)
-    sealed = MultiPolygon([polygon for part in swept[1:] for polygon in _list_polygons(part)])
+    cut_off = MultiPolygon([polygon for part in swept[1:] for polygon in _list_polygons(part)])
     return Measurement(
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in swept),
         gap=narrowest_gap,
         impassable=MultiPolygon(impassable),
-        sealed=sealed,
+        cut_off=cut_off,
         vertices=_count_vertices(sketch),
         problems=(
             *rule_problems,
             *_build_gap_warnings(narrow_gaps, impassable, radius),
-            *_build_reach_warnings(free, swept, sealed, radius),
+            *_build_reach_warnings(free, swept, cut_off, radius),
         ),
         radius=radius,
     )
@@ -202,7 +202,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
 
 
 def _build_reach_warnings(
-    free: MultiPolygon, swept: tuple[shapely.Geometry, ...], sealed: MultiPolygon, radius: float
+    free: MultiPolygon, swept: tuple[shapely.Geometry, ...], cut_off: MultiPolygon, radius: float
 ) -> list[Problem]:
     """Warn if robots fit nowhere, or if they cannot reach all parts of the free space from the largest."""
     if not free.is_empty and not swept:
@@ -216,7 +216,7 @@ def _build_reach_warnings(
         f"robots of radius {radius:g} m cannot pass between {len(swept)} parts of the free space: "
         f"{sealed_area:.3g} m² are cut off from the largest"
     )
-    return [Problem(message, sealed, None, False, "cut off")]
+    return [Problem(message, cut_off, None, False, "cut off")]
 
 
 def _list_polygons(geometry: shapely.Geometry) -> list[Polygon]:

@@ -1,7 +1,7 @@
 """The density tool, by which hot spots and areas are dragged and their weights are typed."""
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -23,10 +23,21 @@ _OUTLINE_POINTS = 64
 
 
 class _Hit(NamedTuple):
-    """The feature at the pointer, and its corner or rim if the pointer is on one; None if there is none."""
+    """Element of the density at the pointer.
+
+    Attributes
+    ----------
+    feature : int or None
+        Index of the feature; None if there is none at the pointer.
+    kind : {"feature", "rim", "corner"}
+        Whether a drag moves the feature, the rim of a hot spot, or a corner of an area.
+    corner : int
+        Index of the corner.
+    """
 
     feature: int | None = None
-    corner: int | None = None  # index of a corner of an area; 0 for the rim of a hot spot
+    kind: Literal["feature", "rim", "corner"] = "feature"
+    corner: int = 0
 
 
 class DensityTool(EditorTool):
@@ -60,7 +71,7 @@ class DensityTool(EditorTool):
         """Choose the feature under the pointer."""
         super().press(context, event)
         self._hit = _find_feature(density.list_features(context.sketch), event)
-        if self._hit.feature is not None and self._hit.corner is None:
+        if self._hit.feature is not None and self._hit.kind == "feature":
             self.chosen = self._hit.feature
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
@@ -83,7 +94,7 @@ class DensityTool(EditorTool):
                 self.chosen = len(density.list_features(context.sketch)) - 1
             return
         self.chosen = None
-        if self._hit.corner is None:
+        if self._hit.kind == "feature":
             self.chosen = self._hit.feature
         if self.chosen is not None:
             context.show_message("type its weight, then Enter; Backspace removes it")
@@ -121,13 +132,13 @@ class DensityTool(EditorTool):
         label = self._build_label(features)
         if not features and not label:
             return EditorToolOverlay(pending=pending)
-        dots = [_find_center(feature) for feature in features]
+        markers = [_find_center(feature) for feature in features]
         for feature in features:
             if isinstance(feature, WeightedArea):
-                dots += feature.vertices
-        rings = tuple(_build_outline(feature) for feature in features)
+                markers += feature.vertices
+        outlines = tuple(_build_outline(feature) for feature in features)
         return EditorToolOverlay(
-            pending=pending, label=label, rings=rings, dots=tuple(dots), chosen=self.chosen
+            pending=pending, label=label, outlines=outlines, markers=tuple(markers), chosen=self.chosen
         )
 
     def _build_label(self, features: tuple[density.Feature, ...]) -> str:
@@ -154,7 +165,7 @@ class DensityTool(EditorTool):
     def _build_change(self, context: EditorContext, start: Point, end: Point) -> Change | None:
         """Return the change that a drag between two points, m, makes: it adds, moves or resizes a feature."""
         sketch = context.sketch
-        number, corner = self._hit
+        number = self._hit.feature
         if number is None:
             if isinstance(sketch.density, WeightedPolygons):
                 area = WeightedArea(build_rectangle(start, end), self.weight)
@@ -165,33 +176,33 @@ class DensityTool(EditorTool):
             return None
         feature = features[number]
         if isinstance(feature, Gaussian):
-            if corner is not None:
+            if self._hit.kind == "rim":
                 return density.resize_peak(sketch, number, distance(feature.center, end))
             start = feature.center
-        elif corner is not None:
-            return density.move_corner(sketch, number, corner, end)
+        elif self._hit.kind == "corner":
+            return density.move_corner(sketch, number, self._hit.corner, end)
         return density.move_feature(sketch, number, end[0] - start[0], end[1] - start[1])
 
 
 def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEvent) -> _Hit:
     """Find the feature at the pointer: first by centers, then by rims and corners, then inside areas."""
-    centers = [
-        (distance(_find_center(feature), event.unsnapped_point), k) for k, feature in enumerate(features)
-    ]
-    if centers and min(centers)[0] < event.reach:
-        return _Hit(min(centers)[1])
-    edges: list[tuple[float, int, int]] = []  # distance in m, feature, corner
+    point = event.unsnapped_point
+    center_distances = [distance(_find_center(feature), point) for feature in features]
+    if center_distances and min(center_distances) < event.reach:
+        return _Hit(center_distances.index(min(center_distances)))
+    hits: list[tuple[float, _Hit]] = []  # rims and corners with their distances, m
     for number, feature in enumerate(features):
         if isinstance(feature, WeightedArea):
-            for corner, point in enumerate(feature.vertices):
-                edges.append((distance(point, event.unsnapped_point), number, corner))
+            for corner, vertex in enumerate(feature.vertices):
+                hits.append((distance(vertex, point), _Hit(number, "corner", corner)))
         elif feature.sigma is not None:
-            edges.append((abs(distance(feature.center, event.unsnapped_point) - feature.sigma), number, 0))
-    if edges:
-        gap, number, corner = min(edges)
-        if gap < RIM_REACH_FRACTION * event.reach:
-            return _Hit(number, corner)
-    pointer = shapely.Point(event.unsnapped_point)
+            rim_distance = abs(distance(feature.center, point) - feature.sigma)
+            hits.append((rim_distance, _Hit(number, "rim")))
+    if hits:
+        smallest_distance, nearest = min(hits, key=lambda hit: hit[0])
+        if smallest_distance < RIM_REACH_FRACTION * event.reach:
+            return nearest
+    pointer = shapely.Point(point)
     # Later areas are on top.
     for number in reversed(range(len(features))):
         feature = features[number]

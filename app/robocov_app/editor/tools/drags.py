@@ -13,7 +13,7 @@ from robocov_app.editor.model.selection import Change, Selection, Vertex, find_p
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.editor.tools.tool_overlay import CarriedItems, EditorToolOverlay
+from robocov_app.editor.tools.tool_overlay import DraggedImage, EditorToolOverlay
 from robocov_app.toolkit.tools.geometry import compute_bearing
 from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tools.tool import CursorShape
@@ -62,20 +62,20 @@ class Drag:
         self._end = start
 
     @property
-    def carried(self) -> CarriedItems | None:
+    def dragged_image(self) -> DraggedImage | None:
         """Objects that are dragged as an image; None if they are dragged one by one."""
         return None
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
 
     def enter_text(self, text: str) -> None:
         """Set the drag to a value that the user typed; raise MapError if the value is invalid."""
-        raise MapError(f"“{text}”: there is nothing to type here")
+        raise MapError(f"“{text}”: this tool takes no typed value")
 
     def build_overlay(self) -> EditorToolOverlay:
         """Return what the drag shows on the sheet."""
-        return EditorToolOverlay(label=self.label, carried=self.carried, shows_handles=True)
+        return EditorToolOverlay(label=self.label, dragged_image=self.dragged_image, shows_handles=True)
 
     def end(self) -> None:
         """Apply the change, if there is one."""
@@ -103,18 +103,18 @@ class MoveDrag(Drag):
         for owner in selection.owners:
             points += [position for _, position in list_vertices(context.sketch, owner)]
         self._points = points[:: max(1, len(points) // MAX_SNAPPING_POINTS)]
-        self._is_carried = len(points) > MANY_POINTS
+        self._drags_image = len(points) > MANY_POINTS
         self._offset = (0.0, 0.0)
         self._copies = False
 
     @property
-    def carried(self) -> CarriedItems | None:
+    def dragged_image(self) -> DraggedImage | None:
         """Objects that are dragged as an image, because they have many vertices; otherwise None."""
-        if not self._is_carried:
+        if not self._drags_image:
             return None
-        return CarriedItems(self.selection, self._offset, self._copies)
+        return DraggedImage(self.selection, self._offset, self._copies)
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
         self._copies = event.alt
         self.guides = ()
@@ -133,7 +133,7 @@ class MoveDrag(Drag):
 
     def _move(self, dx: float, dy: float) -> None:
         self._end = (self._start[0] + dx, self._start[1] + dy)
-        if self._is_carried:
+        if self._drags_image:
             self._offset = (dx, dy)
         else:
             self.change = self._build_change(dx, dy)
@@ -149,7 +149,7 @@ class MoveDrag(Drag):
 
     def end(self) -> None:
         """Apply the change, if there is one."""
-        if self._is_carried:
+        if self._drags_image:
             self.change = self._build_change(*self._offset)
         super().end()
 
@@ -184,7 +184,7 @@ class VertexDrag(Drag):
             return points[min(1, len(points) - 1)]
         return points[vertex.index - 1]
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
         if event.shift and self._origin is not None:
             self.guides = ()
@@ -208,7 +208,7 @@ class VertexDrag(Drag):
         self._place(parse_next_point(text, self._origin or self._start, self._end))
 
 
-class TurnDrag(Drag):
+class RotateDrag(Drag):
     """Rotates objects about the center of their bounding box, with Shift in steps, with Ctrl freely."""
 
     def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
@@ -217,7 +217,7 @@ class TurnDrag(Drag):
         self._center = geometry.compute_center(bounds)
         self._start_angle = compute_bearing(self._center, start)
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
         bearing = compute_bearing(self._center, event.unsnapped_point)
         # Between -180 and 180 degrees.
@@ -226,9 +226,9 @@ class TurnDrag(Drag):
             degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)
         elif not event.ctrl:
             degrees = snap_angle(degrees, self.context.snap_angle)
-        self._turn(degrees)
+        self._rotate(degrees)
 
-    def _turn(self, degrees: float) -> None:
+    def _rotate(self, degrees: float) -> None:
         self.label = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
         self.change = None
         if degrees:
@@ -236,25 +236,25 @@ class TurnDrag(Drag):
 
     def enter_text(self, text: str) -> None:
         """Rotate by a typed angle."""
-        self._turn(parse_angle(text))
+        self._rotate(parse_angle(text))
 
 
 class ScaleDrag(Drag):
     """Scales objects by a handle of their frame. Shift keeps the proportions, Alt scales about the center."""
 
     def __init__(self, context: EditorContext, selection: Selection, handle: Handle) -> None:
-        super().__init__(context, selection, handle.at)
+        super().__init__(context, selection, handle.position)
         self._side = handle.side
         self._bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
         self._grip = compute_side_position(self._bounds, self._side)
         self._fixed = compute_side_position(self._bounds, (-self._side[0], -self._side[1]))
         # The handle is on the frame, which is outside the bounding box.
-        self._margin = (handle.at[0] - self._grip[0], handle.at[1] - self._grip[1])
+        self._margin = (handle.position[0] - self._grip[0], handle.position[1] - self._grip[1])
         # Circles and starts must be scaled equally in both directions, because ellipses are not supported.
         shapes = {type(item.shape) for item in selection.list_items(context.sketch)}
         self._keeps_proportion = bool(selection.starts) or shapes == {CircleObstacle}
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
         pointer = (event.unsnapped_point[0] - self._margin[0], event.unsnapped_point[1] - self._margin[1])
         position = self._snap(event, pointer)
@@ -320,10 +320,10 @@ class BoxDrag(Drag):
             self._previous = context.selection
 
     @property
-    def _selects_touched(self) -> bool:
+    def _selects_partial(self) -> bool:
         return self._end[0] < self._start[0]
 
-    def follow(self, event: EditorPointerEvent) -> None:
+    def update(self, event: EditorPointerEvent) -> None:
         """Update the drag after a move of the pointer."""
         self._end = event.unsnapped_point
 
@@ -331,7 +331,7 @@ class BoxDrag(Drag):
         """Return what the box selects: objects or, if it contains only some of the shown vertices, these."""
         sketch = self.context.sketch
         owners = self.context.vertex_owners
-        inside = find_in_box(sketch, self._start, self._end, touched=self._selects_touched)
+        inside = find_in_box(sketch, self._start, self._end, includes_partial=self._selects_partial)
         inside = inside.with_groups(sketch)
         has_other_objects = bool((inside.items | inside.starts) - set(owners))
         if owners and not self._adds and not has_other_objects:
@@ -349,4 +349,4 @@ class BoxDrag(Drag):
     def build_overlay(self) -> EditorToolOverlay:
         """Return the box for drawing."""
         box = (self._start, self._end)
-        return EditorToolOverlay(box=box, box_selects_touched=self._selects_touched, shows_handles=True)
+        return EditorToolOverlay(box=box, box_selects_partial=self._selects_partial, shows_handles=True)

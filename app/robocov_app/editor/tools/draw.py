@@ -28,9 +28,9 @@ class LineTool(EditorTool, ABC):
     ----------
     min_points, max_points : int
         Minimum number of points, and number at which the drawing is complete.
-    closes : bool
+    is_closable : bool
         Whether a click on the first point completes the drawing.
-    drags : bool
+    allows_drag : bool
         Whether the tool can also draw with a single drag.
     outline : DrawnOutline
         The points drawn so far.
@@ -39,12 +39,12 @@ class LineTool(EditorTool, ABC):
     starts_with_text = True
     min_points = 2
     max_points = 1_000_000
-    closes = False
-    drags = False
+    is_closable = False
+    allows_drag = False
 
     def __init__(self) -> None:
         super().__init__()
-        self.outline = DrawnOutline(self.min_points, self.max_points, self.closes, self.drags)
+        self.outline = DrawnOutline(self.min_points, self.max_points, self.is_closable, self.allows_drag)
 
     @abstractmethod
     def finish(self, context: EditorContext) -> None:
@@ -52,8 +52,9 @@ class LineTool(EditorTool, ABC):
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the preview of an unfinished drawing; the last of the points, m, is the cursor."""
-        is_closed = self.closes and len(points) > 2
-        label = format_bearing(points[-2], points[-1])
+        is_closed = self.is_closable and len(points) > 2
+        last_point, cursor = points[-2:]
+        label = format_bearing(last_point, cursor)
         if is_closed:
             label += f"   {shapely.Polygon(points).area:.2f} m²"
         return EditorToolOverlay(line=points, is_closed=is_closed, shows_lengths=True, label=label)
@@ -149,7 +150,7 @@ class LineTool(EditorTool, ABC):
 
     def _finish_drag(self, context: EditorContext, end: Point) -> None:
         start = self.points[0]
-        if self.closes:
+        if self.is_closable:
             self.outline.points = list(build_rectangle(start, end))
         else:
             self.outline.points = [start, end]
@@ -192,7 +193,7 @@ class PolygonTool(DrawTool):
     key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     min_points = 3
-    closes = True
+    is_closable = True
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the polygon."""
@@ -206,7 +207,7 @@ class WallTool(DrawTool):
     title = "Wall"
     key = "w"
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
-    drags = True
+    allows_drag = True
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the wall."""
@@ -214,11 +215,12 @@ class WallTool(DrawTool):
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorToolOverlay:
         """Return the line, and the wall with its width."""
+        last_point, cursor = points[-2:]
         line = points
-        if distance(points[-2], points[-1]) <= SAME_POINT_M:
+        if distance(last_point, cursor) <= SAME_POINT_M:
             line = points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
-        label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
+        label = f"{format_bearing(last_point, cursor)}   {format_length(context.wall_width)} wide"
         return EditorToolOverlay(line=points, shows_lengths=True, shapes=shapes, label=label)
 
 
@@ -229,7 +231,7 @@ class MeasureTool(LineTool):
     title = "Measure"
     key = "m"
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc removes the tape"
-    drags = True
+    allows_drag = True
 
     @property
     def measured(self) -> tuple[Point, ...]:
@@ -260,7 +262,7 @@ class MeasureTool(LineTool):
             points = [*self.points, self.outline.cursor]
         if len(points) < 2:
             return EditorToolOverlay()
-        start, end = points[-2], points[-1]
+        start, end = points[-2:]
         dx = end[0] - start[0]
         dy = end[1] - start[1]
         label = f"{format_bearing(start, end)}   Δx {dx:.2f}  Δy {dy:.2f}"
@@ -270,7 +272,7 @@ class MeasureTool(LineTool):
         return EditorToolOverlay(line=tuple(points), shows_lengths=True, label=label)
 
 
-class PlacesTool(DrawTool):
+class StartPositionsTool(DrawTool):
     """Draws a start with one position for each robot."""
 
     name = "places"
@@ -297,8 +299,8 @@ class BoundaryTool(DrawTool):
     key = "b"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     min_points = 3
-    closes = True
-    drags = True
+    is_closable = True
+    allows_drag = True
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that replaces the boundary."""
@@ -334,7 +336,7 @@ class RectangleTool(DrawTool):
     key = "r"
     hint = "drag from corner to corner, or click both; type 3 x 2 for meters; Shift makes a square"
     max_points = 2
-    drags = True
+    allows_drag = True
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the rectangle."""
@@ -372,7 +374,7 @@ class CircleTool(DrawTool):
     key = "c"
     hint = "drag from the middle to the rim, or click both; type the radius for meters"
     max_points = 2
-    drags = True
+    allows_drag = True
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the circle."""

@@ -10,7 +10,7 @@ from robocov_app.editor.model.geometry import Box, compute_center, distance
 from robocov_app.editor.model.selection import Selection, Vertex, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-HandleKind: TypeAlias = Literal["vertex", "scale", "turn"]
+HandleKind: TypeAlias = Literal["vertex", "scale", "rotate"]
 
 # Lengths in pixels at scale 1.
 FRAME_MARGIN_PX = 11.0  # between the selection and the frame around it
@@ -27,9 +27,9 @@ class Handle:
 
     Attributes
     ----------
-    kind : {"vertex", "scale", "turn"}
-        What dragging the handle does.
-    at : Point
+    kind : {"vertex", "scale", "rotate"}
+        Effect of dragging the handle.
+    position : Point
         Position, m.
     vertex : Vertex or None
         Vertex that the handle moves.
@@ -38,7 +38,7 @@ class Handle:
     """
 
     kind: HandleKind
-    at: Point
+    position: Point
     vertex: Vertex | None = None
     side: tuple[int, int] = (0, 0)
 
@@ -103,7 +103,7 @@ def _list_frame_handles(frame: Box, pixel: float) -> list[Handle]:
     sides = [side for side in product(columns, rows) if side != (0, 0)]
     handles = [Handle("scale", compute_side_position(frame, side), side=side) for side in sides]
     knob = (compute_center(frame)[0], high_y + KNOB_HEIGHT_PX * pixel)
-    handles.append(Handle("turn", knob))
+    handles.append(Handle("rotate", knob))
     return handles
 
 
@@ -125,5 +125,7 @@ def compute_side_position(box: Box, side: tuple[int, int]) -> Point:
 
 def find_handle(handles: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
     """Return the nearest handle within `reach` meters of a point; vertices take precedence over others."""
-    nearby = [handle for handle in handles if distance(handle.at, point) <= reach]
-    return min(nearby, key=lambda handle: (handle.kind != "vertex", distance(handle.at, point)), default=None)
+    nearby = [handle for handle in handles if distance(handle.position, point) <= reach]
+    return min(
+        nearby, key=lambda handle: (handle.kind != "vertex", distance(handle.position, point)), default=None
+    )

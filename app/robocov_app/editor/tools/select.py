@@ -7,7 +7,7 @@ from robocov_app.editor.model.hit_test import find_edge, find_owners
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, ScaleDrag, TurnDrag, VertexDrag
+from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, RotateDrag, ScaleDrag, VertexDrag
 from robocov_app.editor.tools.handles import Handle, find_handle
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
@@ -110,7 +110,7 @@ class SelectTool(EditorTool):
         if self.drag is None and event.has_moved_from(self.pressed.unsnapped_point):
             self.drag = self._start_drag(context, self.pressed)
         if self.drag is not None:
-            self.drag.follow(event)
+            self.drag.update(event)
             self.guides = self.drag.guides
 
     def _start_drag(self, context: EditorContext, pressed: EditorPointerEvent) -> Drag:
@@ -119,8 +119,8 @@ class SelectTool(EditorTool):
         objects = context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
             return VertexDrag(context, handle.vertex, context.selection)
-        if handle is not None and handle.kind == "turn":
-            return TurnDrag(context, objects, pressed.unsnapped_point)
+        if handle is not None and handle.kind == "rotate":
+            return RotateDrag(context, objects, pressed.unsnapped_point)
         if handle is not None:
             return ScaleDrag(context, objects, handle)
         if any(owner in objects.owners for owner in _find_owners(context, pressed)):
@@ -133,7 +133,7 @@ class SelectTool(EditorTool):
         drag = self.drag
         self._stop()
         if drag is not None:
-            drag.follow(event)
+            drag.update(event)
             drag.end()
         elif pressed is not None and self._handle is None and not event.shift:
             self._click(context, pressed)

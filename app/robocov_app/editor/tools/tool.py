@@ -116,7 +116,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     def enter_text(self, context: EditorContext, text: str) -> None:
         """Handle a value that the user typed; raise MapError if it is invalid."""
-        raise MapError(f"“{text}”: there is nothing to type here")
+        raise MapError(f"“{text}”: this tool takes no typed value")
 
     def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
         """Return what the tool shows on the sheet."""

@@ -11,7 +11,7 @@ from robocov_app.toolkit.tools.tool import ToolOverlay
 
 
 @dataclass(frozen=True)
-class CarriedItems:
+class DraggedImage:
     """Objects that are dragged as an image, because there are too many to move one by one.
 
     Attributes
@@ -20,13 +20,13 @@ class CarriedItems:
         The obstacles and starts that are dragged.
     offset : tuple of float
         Displacement, (x, y) m.
-    are_copies : bool
+    shows_copies : bool
         Whether copies are dragged and the originals stay in place.
     """
 
     selection: Selection
     offset: tuple[float, float]
-    are_copies: bool
+    shows_copies: bool
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,19 @@ class EditorToolOverlay(ToolOverlay):
         Preview of a start.
     box : tuple of Point or None
         Opposite corners of a selection box, m.
-    box_selects_touched : bool
+    box_selects_partial : bool
         Whether the box also selects objects that are only partly inside.
-    rings : tuple of Ring
+    outlines : tuple of Ring
         Outlines to draw, m.
-    dots : tuple of Point
+    markers : tuple of Point
         Positions to mark with a square, m.
     chosen : int or None
-        Index of the ring or dot that is highlighted.
+        Index of the outline or marker that is highlighted.
     pending : Sketch or None
         The map with the density or paths as the current drag changes them.
     background : Background or None
         The reference image at the position to which it is being dragged.
-    carried : CarriedItems or None
+    dragged_image : DraggedImage or None
         Objects that are dragged as an image.
     hovered : Owner or None
         Object under the cursor.
@@ -73,13 +73,13 @@ class EditorToolOverlay(ToolOverlay):
     shapes: tuple[Obstacle, ...] = ()
     start: StartSpec | None = None
     box: tuple[Point, Point] | None = None
-    box_selects_touched: bool = False
-    rings: tuple[Ring, ...] = ()
-    dots: tuple[Point, ...] = ()
+    box_selects_partial: bool = False
+    outlines: tuple[Ring, ...] = ()
+    markers: tuple[Point, ...] = ()
     chosen: int | None = None
     pending: Sketch | None = None
     background: Background | None = None
-    carried: CarriedItems | None = None
+    dragged_image: DraggedImage | None = None
     hovered: Owner | None = None
     hovered_handle: Handle | None = None
     shows_handles: bool = False

@@ -7,9 +7,9 @@ from robocov_app.editor.tools.draw import (
     CircleTool,
     DiscTool,
     MeasureTool,
-    PlacesTool,
     PolygonTool,
     RectangleTool,
+    StartPositionsTool,
     WallTool,
 )
 from robocov_app.editor.tools.motion_path import MotionPathTool
@@ -49,7 +49,7 @@ class EditorToolbox(Toolbox[EditorTool]):
             BoundaryTool(),
             self.tape,
             DiscTool(),
-            PlacesTool(),
+            StartPositionsTool(),
             self.density,
             MotionPathTool(),
             ReferenceImageTool(),

@@ -60,7 +60,7 @@ class EditorPointer(Pointer):
     def leave(self) -> None:
         """Forget the position of the mouse, which has left the map."""
         self.editor.cursor = None
-        self.canvas.at = None
+        self.canvas.cursor_pixel = None
         self.canvas.hovered = None
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
@@ -115,7 +115,7 @@ class EditorPointer(Pointer):
         self.leave()
         if is_over_map or is_using_tool:
             editor.cursor = canvas.to_world(event.pos)
-            canvas.at = (float(event.pos[0]), float(event.pos[1]))
+            canvas.cursor_pixel = (float(event.pos[0]), float(event.pos[1]))
         if self.is_busy:
             return
         if is_over_map:
