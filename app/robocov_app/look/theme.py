@@ -48,8 +48,11 @@ class Theme:
         Color of the density, and its opacity where it is highest.
     fine_grid_share, coarse_grid_share : float
         Fractions of the grid color in the lines of a grid under a map.
-    tint, paper_tint : float
-        Fraction of the robot's hue in the color of its cell, by default and in the scheme of the paper.
+    tints : tuple of float
+        Fraction of each robot's hue in the color of its cell. They differ, so that cells differ in lightness
+        and color-blind readers tell neighbors apart.
+    paper_tint : float
+        Factor of the tints in the paler scheme of the paper.
     text, small_text, line, trajectory_line, boundary_line, arrow_line : float
         Sizes of texts and widths of lines.
     """
@@ -79,7 +82,7 @@ class Theme:
     density_strength: float
     fine_grid_share: float
     coarse_grid_share: float
-    tint: float
+    tints: tuple[float, ...]
     paper_tint: float
     text: float = 12.0
     small_text: float = 11.0
@@ -132,11 +135,11 @@ class Theme:
 
     def get_cell_color(self, hue: int) -> Color:
         """Return the color of the cell of a robot with a hue, an index into `robots`."""
-        return mix(self.background, self.robots[hue], self.tint)
+        return mix(self.background, self.robots[hue], self.tints[hue])
 
     def get_paper_cell_color(self, hue: int) -> Color:
         """Return the paler color of a cell in the scheme of the paper."""
-        return mix(self.background, self.robots[hue], self.paper_tint)
+        return mix(self.background, self.robots[hue], self.paper_tint * self.tints[hue])
 
     def get_controller_color(self, name: str) -> Color:
         """Return the color of the curves of a controller; all that are not from the article share one."""
@@ -168,11 +171,11 @@ _COLORS = {
     "faint": ("5A6678", "9AA6B8"),
     "grid": ("C3CCD8", "4A5566"),
     "boundary": ("414D60", "A3AEC0"),
-    "obstacle": ("8C95A5", "485366"),
-    "obstacle_edge": ("5B6576", "8793A6"),
+    "obstacle": ("525C6F", "9AA6BA"),
+    "obstacle_edge": ("3E485A", "C3CBD8"),
     "cell_edge": ("66738A", "7A879B"),
     "robot_ring": ("FFFFFF", "FFFFFF"),
-    "start": ("1E9E36", "46D160"),
+    "start": ("17862C", "46D160"),
     "final": ("1F5FE0", "5B9BFF"),
     "trajectory": ("D62222", "FF6B63"),
     "velocity": ("1F5FE0", "5B9BFF"),
@@ -182,7 +185,7 @@ _COLORS = {
 _CONTROLLERS = {
     "rapf": ("1F5FE0", "5B9BFF"),
     "rpf": ("D62222", "FF6B63"),
-    "lloyd": ("118038", "46C46A"),
+    "lloyd": ("00795E", "2EC4A0"),
 }
 _FORCES = {
     "attraction": ("0B7A6F", "2DD4BF"),
@@ -195,7 +198,7 @@ _OTHERS = (
     ("8A3FA8", "CF8BE8"),
     ("7A5C00", "F0A94A"),
     ("28303C", "E8ECF2"),
-    ("007A8A", "2DD4BF"),
+    ("005F9E", "A8D8FF"),
     ("D4127E", "FF5CA4"),
 )
 _HEAT = (
@@ -240,6 +243,10 @@ def _lighten(hue: Color) -> Color:
 
 
 _HUES = [parse_hex_color(code) for code in _MUTED]
+# Found by a search: the least color difference between two of the first six cells, as seen by readers with
+# normal and with color-blind eyes, is as large as possible while obstacles stand out on every cell.
+_LIGHT_TINTS = (0.42, 0.40, 0.23, 0.17, 0.36, 0.34, 0.42, 0.33, 0.33)
+_DARK_TINTS = (0.10, 0.34, 0.14, 0.45, 0.37, 0.21, 0.42, 0.38, 0.32)
 LIGHT = _build_theme(
     "light",
     _LIGHT_CODES,
@@ -247,8 +254,8 @@ LIGHT = _build_theme(
     density_strength=0.5,
     fine_grid_share=0.32,
     coarse_grid_share=0.75,
-    tint=0.25,
-    paper_tint=0.13,
+    tints=_LIGHT_TINTS,
+    paper_tint=0.55,
 )
 # Equal shares of the grid color would look stronger on a dark background.
 DARK = _build_theme(
@@ -258,8 +265,8 @@ DARK = _build_theme(
     density_strength=0.45,
     fine_grid_share=0.2,
     coarse_grid_share=0.5,
-    tint=0.26,
-    paper_tint=0.19,
+    tints=_DARK_TINTS,
+    paper_tint=0.75,
 )
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 

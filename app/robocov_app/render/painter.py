@@ -72,6 +72,8 @@ class Painter:
     ----------
     visible : set of str
         Names of the layers that are drawn.
+    top_strip : float
+        Height of the strip that the world leaves free above, px at scale 1, for a legend of the caller.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class Painter:
         self.layers = list(layers)
         self.scale = scale
         self.visible = {layer.name for layer in self.layers if layer.is_default}
+        self.top_strip = 0.0
         self._camera: Camera | None = None  # None shows the whole region.
         self._hues = choose_robot_hues(0)
         self._static = LatestValue[pygame.Surface]()
@@ -145,6 +148,7 @@ class Painter:
         top = MARGIN_PX
         if rows:
             top = PADDING_PX + ROW_HEIGHT_PX * rows + PADDING_PX
+        top = max(top, self.top_strip)
         bottom = MARGIN_PX
         has_strip = bool({"scale_bar", "status"} & self.visible)
         if has_strip and not is_low_pane(height, self.scale, self.visible):

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from color_vision import find_least_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
@@ -37,6 +38,26 @@ class TestReadability:
         marks += [*theme.controllers.values(), *theme.forces.values()]
         for mark in marks:
             assert compute_contrast(mark, theme.background) >= 3.0
+
+    def test_obstacles_stand_out_on_every_cell(self, theme):
+        for hue in range(MAX_OWN_HUES):
+            for cell in (theme.get_cell_color(hue), theme.get_paper_cell_color(hue), theme.background):
+                assert compute_contrast(theme.obstacle, cell) >= 3.0
+                # Moving obstacles are paler, but have a wide outline.
+                assert compute_contrast(theme.obstacle_edge, cell) >= 3.0
+
+    def test_obstacles_or_their_outlines_stand_out_on_a_distance_map(self, theme):
+        for color in theme.build_heat_table(50).tolist():
+            contrasts = [compute_contrast(part, tuple(color)) for part in (theme.obstacle, theme.background)]
+            assert max(contrasts) >= 2.2
+
+    def test_color_blind_viewers_tell_cells_apart(self, theme):
+        cells = [theme.get_cell_color(hue) for hue in range(MAX_OWN_HUES)]
+        assert find_least_difference(cells[:N_SHARED_HUES]) >= 8.0
+        assert find_least_difference(cells) >= 4.5
+
+    def test_color_blind_viewers_tell_the_papers_controllers_apart(self, theme):
+        assert find_least_difference(list(theme.controllers.values())) >= 18.0
 
     def test_starts_and_trajectories_on_every_cell(self, theme):
         for hue in range(MAX_OWN_HUES):

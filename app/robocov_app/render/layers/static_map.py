@@ -69,6 +69,10 @@ def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordin
 def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
     """Draw all areas that block robots: obstacles, and areas outside a concave boundary."""
     theme = canvas.theme
+    edge = theme.obstacle_edge
+    if scene.field is not None and "distances" in canvas.visible_layers:
+        # On the dark colors of large distances, only an outline in the color of the page stands out.
+        edge = theme.background
     page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
     page.set_clip(canvas.surface.get_clip())
     draw_blocked_area(
@@ -76,7 +80,7 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
         scene,
         fill=theme.obstacle,
         moving_fill=theme.moving_obstacle,
-        edge=theme.obstacle_edge,
+        edge=edge,
     )
     canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 

@@ -19,7 +19,6 @@ from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, FigurePage, PageBox, style_axes, to_plot_color
-from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
@@ -182,7 +181,7 @@ def _find_frame(points: Array, aspect: float) -> PageBox:
 
 def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme) -> None:
     """Draw the cell, the only one of its partition, and the outline of the frame that is enlarged."""
-    fill = to_plot_color(mix(theme.background, theme.robots[1], theme.tint))
+    fill = to_plot_color(theme.get_cell_color(1))
     axes.add_patch(
         Polygon(cell.polygons[0], facecolor=fill, edgecolor=to_plot_color(theme.boundary), linewidth=1.6)
     )

@@ -22,7 +22,6 @@ from robocov_app.figures import arena
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, FigurePage, to_plot_color
-from robocov_app.look.colors import mix
 from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.assets import ASSETS
@@ -213,10 +212,8 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     page, (axes,) = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
     arena.draw_map(axes, environment, theme)
     cells = partition(positions, environment.region)
-    fills = []
-    for k in range(len(positions)):
-        color = theme.robots[k % len(theme.robots)]
-        fills.append(to_plot_color(mix(theme.background, color, theme.paper_tint)))
+    hues = [k % len(theme.robots) for k in range(len(positions))]
+    fills = [to_plot_color(theme.get_paper_cell_color(hue)) for hue in hues]
     collection = PolyCollection(
         list(cells.polygons), facecolors=fills, edgecolors=edge_color, linewidths=0.8, zorder=1
     )
