@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from robocov_app.viewer.layer_presets import LAYER_PRESETS, LayerPreset, find_preset
+
 FADE_S = 12.0  # duration for which fading trajectories are visible
 
 
@@ -35,6 +37,19 @@ class ViewState:
     def toggle_layer(self, name: str) -> None:
         """Show or hide a layer."""
         self.layers ^= {name}
+
+    def use_preset(self, preset: LayerPreset) -> str:
+        """Show exactly the layers of a preset; return a message."""
+        self.layers = set(preset.layers)
+        return preset.tip
+
+    def use_next_preset(self) -> str:
+        """Show the layers of the next preset, or of the first one; return a message."""
+        current = find_preset(self.layers)
+        index = 0
+        if current is not None:
+            index = (LAYER_PRESETS.index(current) + 1) % len(LAYER_PRESETS)
+        return self.use_preset(LAYER_PRESETS[index])
 
     def toggle_theme(self) -> None:
         """Switch between the light and the dark theme."""

@@ -1,35 +1,135 @@
-"""The legend that the panes share."""
+"""The layer bar: chips that explain the visible layers and toggle them, presets, and the menu of layers."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import pygame
 import pytest
 
 from robocov.mapfile import load_map
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.viewer.launch import ViewerLauncher
+from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window.window import ViewerWindow
 
 
-def list_legend_texts(tmp_path: Path, *controllers: str) -> list[str]:
-    choices = tuple(ControllerChoice(name) for name in controllers)
+@contextmanager
+def open_window(
+    tmp_path: Path, *controllers: str, size: tuple[int, int] = (1280, 720)
+) -> Iterator[ViewerWindow]:
+    choices = tuple(ControllerChoice(name) for name in controllers or ("rapf",))
     session = Session(SessionScenario(load_map("square"), choices))
-    with ViewerLauncher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
+    with ViewerLauncher(session, "square", tmp_path, size=size, headless=True, lattice=32).window() as window:
         for _ in range(10):
             window.run_frame(1 / 30)
-        return [entry.text for entry in window.canvas._list_legend_entries()]
+        yield window
+
+
+def find_chips(window: ViewerWindow) -> dict[str, pygame.Rect]:
+    return {chip.command: box for chip, box in window.layer_bar.chips}
+
+
+def list_texts(window: ViewerWindow) -> list[str]:
+    return [entry.text for chip, _ in window.layer_bar.chips for entry in chip.entries]
+
+
+def click(window: ViewerWindow, box: pygame.Rect) -> None:
+    for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
+        window.handle_event(pygame.event.Event(kind, pos=box.center, button=1, touch=False))
+    window.run_frame(1 / 30)
 
 
 @pytest.mark.parametrize("controllers", [("rpf", "lloyd"), ("lloyd", "rpf")])
-def test_the_legend_explains_centroids_in_any_order_of_panes(
-    tmp_path: Path, controllers: tuple[str, str]
-) -> None:
-    assert "cell centroid" in list_legend_texts(tmp_path, *controllers)
+def test_chips_explain_centroids_in_any_order_of_panes(tmp_path: Path, controllers: tuple[str, str]) -> None:
+    with open_window(tmp_path, *controllers) as window:
+        assert "Cell centroid" in list_texts(window)
 
 
-def test_the_legend_explains_each_symbol_once(tmp_path: Path) -> None:
-    texts = list_legend_texts(tmp_path, "rpf", "lloyd", "atlas")
-    assert {"cell centroid", "goal"} < set(texts)
+def test_chips_explain_each_symbol_once(tmp_path: Path) -> None:
+    with open_window(tmp_path, "rpf", "lloyd", "atlas") as window:
+        texts = list_texts(window)
+    assert {"Cell centroid", "Goal"} < set(texts)
     assert len(texts) == len(set(texts))
+
+
+@pytest.mark.parametrize("controllers", [("rapf",), ("rapf", "lloyd")])
+def test_a_click_toggles_a_layer_and_nothing_moves(tmp_path: Path, controllers: tuple[str, ...]) -> None:
+    with open_window(tmp_path, *controllers) as window:
+        before = find_chips(window)
+        place = window.canvas.to_pixel((1.0, 1.0))
+        click(window, before["layer:starts"])
+        assert "starts" not in window.viewer.view.layers
+        assert find_chips(window) == before
+        assert window.canvas.to_pixel((1.0, 1.0)) == place
+        click(window, before["layer:starts"])
+        assert "starts" in window.viewer.view.layers
+
+
+def test_a_click_on_a_chip_does_not_act_on_the_map(tmp_path: Path) -> None:
+    with open_window(tmp_path) as window:
+        window.do("tool:robot")
+        robots = len(window.viewer.robot_numbers)
+        click(window, find_chips(window)["layer:cells"])
+        assert len(window.viewer.robot_numbers) == robots
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1920, 1080)])
+@pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
+def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], preset) -> None:
+    with open_window(tmp_path, size=size) as window:
+        window.do(f"preset:{preset.name}")
+        window.do("layers")
+        window.run_frame(1 / 30)
+        left, _, width, _ = window.layout.arena
+        boxes = [box for _, box in window.layer_bar.chips]
+        assert all(left <= box.left and box.right <= left + width for box in boxes)
+        assert all(first.right < second.left for first, second in itertools.pairwise(boxes))
+        assert all(box.right <= left + width for _, box in window.layer_bar.rows)
+        assert all(box.bottom <= size[1] for _, box in window.layer_bar.rows)
+
+
+def test_presets_and_the_menu_have_every_layer(tmp_path: Path) -> None:
+    names = {layer.name for layer in build_standard_layers()}
+    grouped = [name for group in LAYER_GROUPS.values() for name in group]
+    assert sorted(grouped) == sorted(names)
+    for preset in LAYER_PRESETS:
+        assert preset.layers <= names
+    with open_window(tmp_path) as window:
+        click(window, find_chips(window)["layers"])
+        rows = {chip.command: box for chip, box in window.layer_bar.rows}
+        assert {f"layer:{name}" for name in names} <= set(rows)
+        click(window, rows["layer:distances"])
+        assert "distances" in window.viewer.view.layers
+        click(window, rows["preset:why"])
+        assert window.viewer.view.layers == next(p.layers for p in LAYER_PRESETS if p.name == "why")
+        window.do("cancel")
+        assert not window.layer_bar.is_open
+
+
+def test_a_key_goes_through_the_presets(tmp_path: Path) -> None:
+    with open_window(tmp_path) as window:
+        for preset in (*LAYER_PRESETS, LAYER_PRESETS[0]):
+            window.do("preset:next")
+            assert window.viewer.view.layers == preset.layers
+
+
+def test_the_tool_tip_of_a_chip_says_what_a_click_does(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("robocov_app.toolkit.widgets.tool_tip.TIP_DELAY_S", 0.0)
+    tips = []
+    monkeypatch.setattr(
+        "robocov_app.viewer.canvas.layer_bar.draw_tool_tip",
+        lambda screen, text, *args, **kw: tips.append(text),
+    )
+    with open_window(tmp_path) as window:
+        pixel = find_chips(window)["layer:cells"].center
+        event = pygame.event.Event(pygame.MOUSEMOTION, pos=pixel, rel=(1, 1), buttons=(0, 0, 0), touch=False)
+        window.handle_event(event)
+        window.run_frame(1 / 30)
+    assert tips[-1] == "Hide: Voronoi cells (1)"

@@ -10,19 +10,19 @@ from robocov.arrays import Array
 from robocov.environment import Environment, Point
 from robocov_app.look.colors import mix
 from robocov_app.look.hues import choose_robot_hues
-from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.distance_map.colors import choose_color_limit
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.render.layers.layer import Layer
 from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.tools.viewport import REACH_PX, zoom_about
 from robocov_app.toolkit.window.layout import Layout, is_inside
-from robocov_app.viewer.canvas.shared_legend import SharedLegend
+from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX
 from robocov_app.viewer.canvas.tool_overlay import (
     FAILED_RADIUS_PX,
     draw_drag,
@@ -49,6 +49,7 @@ _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
 _ACTIVE_BAR_PX = 3  # height of the bar at the top of the active pane
 _FRAME_STRENGTH = 0.18  # fraction of the color of text in the frames of the panes
 _COLOR_LIMIT_MARGIN = 1.1  # so that the color scale does not have to change again soon
+_BAR_GAP_PX = 6.0  # between the layer bar and the map
 _COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while the largest distance is in this fraction of it
 
 
@@ -98,7 +99,7 @@ class ViewerCanvas:
         self._root: Node | None = None  # of the run that is shown
         self._camera: Camera | None = None  # None while the whole map is shown
         self._color_limit = 1.0  # end of the color scale of distances, m
-        self._legend = SharedLegend(theme)
+        self._layers = build_standard_layers()
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Build the painters of the panes for a layout of the window."""
@@ -107,7 +108,8 @@ class ViewerCanvas:
         environment = self._adopt_environment()
         self._painters = []
         for _, _, width, height in layout.panes:
-            layers = build_standard_layers()
+            # The layer bar of the window is the legend.
+            layers = [layer for layer in build_standard_layers() if layer.name != "legend"]
             if len(layout.panes) > 1:
                 # All panes show the same time, which is in the status line of the window.
                 layers = [layer for layer in build_pane_layers() if layer.name != "status"]
@@ -115,7 +117,6 @@ class ViewerCanvas:
             if self._camera is not None:
                 painter.camera = self._camera.with_view(painter.camera.view)
             self._painters.append(painter)
-        self._legend.theme = theme
 
     def fit(self) -> None:
         """Show the whole map."""
@@ -200,6 +201,9 @@ class ViewerCanvas:
             # The caption of a pane is always visible.
             fixed_layers = {"caption"} & {layer.name for layer in painter.layers}
             painter.visible = self.viewer.view.layers | fixed_layers
+            painter.top_strip = 0.0
+            if len(panes) == 1 and "legend" in self.viewer.view.layers:
+                painter.top_strip = BAR_HEIGHT_PX + _BAR_GAP_PX
             scene = self._build_scene(pane, painter)
             surface = screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
@@ -207,7 +211,6 @@ class ViewerCanvas:
             self._scenes.append(scene)
         if len(self._scenes) > 1:
             self._draw_frames(screen)
-            self._legend.draw(screen, self._list_legend_entries(), self.layout, self._get_layers())
 
     def _adopt_environment(self) -> Environment:
         """Pass the displayed map to the painters; show all of it if it is a different map or has grown.
@@ -336,18 +339,12 @@ class ViewerCanvas:
                 controller = self.viewer.session.timeline.panes[pane].controller
                 screen.fill(theme.get_controller_color(controller.name), bar)
 
-    def count_legend_rows(self) -> int:
-        """Return the number of rows of the shared legend; 0 for a single pane."""
-        if len(self._scenes) < 2:
-            return 0
-        return self._legend.count_rows(self._list_legend_entries(), self.layout, self._get_layers())
+    @property
+    def layers(self) -> list[Layer]:
+        """All layers that can be shown or hidden."""
+        return self._layers
 
-    def _get_layers(self) -> frozenset[str]:
-        return frozenset(self.viewer.view.layers)
-
-    def _list_legend_entries(self) -> list[LegendEntry]:
-        # A pane that was just added has no scene yet.
-        pairs = zip(self._painters, self._scenes, strict=False)
-        return merge_legends(
-            (painter.list_legend_entries(scene) for painter, scene in pairs), lambda entry: entry.key
-        )
+    @property
+    def scenes(self) -> list[Scene]:
+        """Scene of each pane that was drawn last."""
+        return self._scenes

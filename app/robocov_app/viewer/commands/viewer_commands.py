@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.commands.command import Argument, Command, CommandGroup
+from robocov_app.viewer.layer_presets import LAYER_PRESETS
 from robocov_app.viewer.panel.parameters import Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, format_speed
@@ -229,6 +230,11 @@ def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Comm
     for name in names:
         keys = [_LAYER_KEYS[name]] if name in _LAYER_KEYS else []
         group.add(f"layer:{name}", titles[name], partial(viewer.view.toggle_layer, name), *keys)
+    group.add("preset:next", "Next preset of layers", viewer.view.use_next_preset, "shift+l")
+    for number, preset in enumerate(LAYER_PRESETS, 1):
+        key = f"alt+shift+{number}"
+        title = f"{preset.title}: {preset.tip[0].lower()}{preset.tip[1:]}"
+        group.add(f"preset:{preset.name}", title, partial(viewer.view.use_preset, preset), key)
     return group.commands
 
 

@@ -29,6 +29,8 @@ class ViewerWindowActions(WindowActions):
         Opens the dialog that opens a session or a map.
     list_branches : callable
         Opens the dialog that lists and enters branches.
+    toggle_layer_menu : callable
+        Opens or closes the menu of all layers.
     toggle_lesson : callable
         Starts the lesson, leaves it, or returns to it.
     quit : callable
@@ -40,6 +42,7 @@ class ViewerWindowActions(WindowActions):
     save_run: Action
     open_file: Action
     list_branches: Action
+    toggle_layer_menu: Action
     toggle_lesson: Action
     quit: Action
 
@@ -70,6 +73,7 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     group.add("pan:up", "Pan up", pan_up, "ctrl+up", repeats=True)
     group.add("pan:down", "Pan down", pan_down, "ctrl+down", repeats=True)
     group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
+    group.add("layers", "Menu of layers and presets", actions.toggle_layer_menu, "l")
     group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
     group.add("fullscreen", "Full screen", actions.toggle_fullscreen, "f11")
     return group.commands

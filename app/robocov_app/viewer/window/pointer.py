@@ -10,6 +10,7 @@ from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.window.layout import is_inside
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
 from robocov_app.viewer.canvas.canvas import HoveredRobot, ViewerCanvas
+from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.scrubbing import TimeGesture
 from robocov_app.viewer.panel.panel import ViewerPanel
@@ -31,6 +32,8 @@ class ViewerPointer(Pointer):
         The chart and the time slider.
     panel : ViewerPanel
         The panel, which gets events first.
+    layer_bar : LayerBar
+        The chips over the canvas.
     leave_lesson : callable
         Lets the user take over from a lesson.
     """
@@ -41,6 +44,7 @@ class ViewerPointer(Pointer):
         canvas: ViewerCanvas,
         chart: Chart,
         panel: ViewerPanel,
+        layer_bar: LayerBar,
         leave_lesson: Callable[[], None],
     ) -> None:
         """Connect the mouse to the parts of the window."""
@@ -49,6 +53,7 @@ class ViewerPointer(Pointer):
         self._canvas = canvas
         self._chart = chart
         self._viewer_panel = panel
+        self._layer_bar = layer_bar
         self._leave_lesson = leave_lesson
         self._snapper = MapSnapper()
 
@@ -61,6 +66,10 @@ class ViewerPointer(Pointer):
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas
+        if self._layer_bar.is_over(self.pixel) and not self.is_busy:
+            canvas.hovered = None
+            cursor.show("hand")
+            return
         pane = canvas.find_pane(self.pixel) if inspection.cursor is not None else None
         number: int | None = None
         if pane is not None:
@@ -95,10 +104,11 @@ class ViewerPointer(Pointer):
         """React when the mouse leaves the panes."""
         self._viewer.inspection.cursor = None
         self._chart.hover = None
+        self._layer_bar.hover(None)
 
     def handle_wheel(self, event: pygame.event.Event) -> None:
         """Zoom the map, or change the size of the tool."""
-        if self._canvas.find_pane(self.pixel) is None:
+        if self._canvas.find_pane(self.pixel) is None or self._layer_bar.is_over(self.pixel):
             return
         factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
         if self._viewer.tool.uses_wheel:
@@ -108,6 +118,8 @@ class ViewerPointer(Pointer):
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
         """Start a gesture on the chart, with the tool, or for panning."""
+        if event.button == LEFT_BUTTON and self._layer_bar.press(event.pos):
+            return None
         if self._is_over_time():
             if event.button == LEFT_BUTTON:
                 return self._press_chart(event.pos)
@@ -209,6 +221,10 @@ class ViewerPointer(Pointer):
         inspection = viewer.inspection
         pane = self._canvas.find_pane(event.pos)
         inspection.cursor = None
+        self._layer_bar.hover(None if self.is_busy else event.pos)
+        if self._layer_bar.is_over(event.pos) and not self.is_busy:
+            self._chart.hover = None
+            return
         if pane is not None and not is_inside(self._canvas.layout.panel, event.pos):
             inspection.cursor = self._canvas.to_world(event.pos, pane)
             inspection.cursor_pane = pane

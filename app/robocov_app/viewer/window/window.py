@@ -17,6 +17,7 @@ from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.commands.window_commands import ViewerWindowActions, list_window_commands
@@ -64,6 +65,8 @@ class ViewerWindow(CommandWindow):
         State of the window, and actions on it.
     canvas : ViewerCanvas
         The panes.
+    layer_bar : LayerBar
+        The legend, which shows and hides layers.
     chart : Chart
         The chart and the time slider.
     panel : ViewerPanel
@@ -114,7 +117,10 @@ class ViewerWindow(CommandWindow):
         listed = [*list_viewer_commands(viewer, titles), *window_commands]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
-        self.pointer = ViewerPointer(viewer, self.canvas, self.chart, self.panel, self.lesson.leave)
+        self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
+        self.pointer = ViewerPointer(
+            viewer, self.canvas, self.chart, self.panel, self.layer_bar, self.lesson.leave
+        )
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
         self._inspector = RobotInspector(viewer, self.panel)
@@ -136,6 +142,7 @@ class ViewerWindow(CommandWindow):
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
+            toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
         )
@@ -167,6 +174,7 @@ class ViewerWindow(CommandWindow):
         """Close everything that may have caused an exception while drawing."""
         super().restore_view()
         self.lesson.end()
+        self.layer_bar.is_open = False
         self.canvas.fit()
 
     def close(self) -> None:
@@ -223,6 +231,7 @@ class ViewerWindow(CommandWindow):
             self._arranged,
             self.panel.ui.needs_redraw,
             self.lesson.visible_state,
+            self.layer_bar.visible_state,
         )
 
     def _pass_time(self, seconds: float) -> None:
@@ -239,30 +248,24 @@ class ViewerWindow(CommandWindow):
         self._runner.advance(seconds, slices)
 
     def _arrange(self) -> None:
-        """Lay out the window if its size, the number or shape of panes, or the legend has changed."""
+        """Lay out the window if its size, or the number or shape of panes has changed."""
         view = self.viewer.view
         session = self.viewer.session
         size = self.screen.get_size()
         panes = len(session.timeline.panes)
-        legend_rows = 1
-        # The number of legend rows is known only after the first layout, when there are scenes.
-        if panes > 1 and self._arranged is not None:
-            legend_rows = max(self.canvas.count_legend_rows(), 1)
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
         frame = (size, self.scale, view.has_panel, view.theme)
-        arranged = (frame, panes, round(aspect, 3), legend_rows)
+        arranged = (frame, panes, round(aspect, 3))
         before = self._arranged
         if arranged == before:
             return
         self._arranged = arranged
         self.theme = get_theme(view.theme)
-        self.layout = build_layout(
-            size, self.scale, panes, aspect, panel=view.has_panel, legend_rows=legend_rows
-        )
+        self.layout = build_layout(size, self.scale, panes, aspect, panel=view.has_panel)
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
-        # The panel depends neither on the panes nor on the legend.
+        # The panel does not depend on the panes.
         if before is None or frame != before[0]:
             self.panel.arrange(self.layout, self.theme)
 
@@ -277,6 +280,7 @@ class ViewerWindow(CommandWindow):
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
+        self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         self._draw_message(can_suggest=not has_lesson)
         self.draw_above_map()
         if self.video is not None:
@@ -314,6 +318,9 @@ class ViewerWindow(CommandWindow):
 
     def do(self, name: str) -> None:
         """Run the command with this name, unless the lesson or the help page handles it."""
+        if name == "cancel" and self.layer_bar.is_open:
+            self.layer_bar.toggle_menu()
+            return
         closes_help = name == "cancel" and self.is_help_open
         if not closes_help and self.lesson.handle_command(name):
             return

@@ -1,0 +1,353 @@
+"""The layer bar: chips over the canvas that explain the visible layers, and show or hide them at a click."""
+
+from collections.abc import Callable, Sequence
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.theme import LIGHT, Theme
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.layers.layer import Layer
+from robocov_app.render.scene import Scene
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.overlay import create_flat_canvas, draw_card
+from robocov_app.toolkit.tools.pointer import Pixel
+from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
+from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.viewer.canvas.layer_chips import (
+    CHIP_HEIGHT_PX,
+    Chip,
+    build_layer_entries,
+    draw_chip,
+    draw_menu_row,
+    measure_chip,
+)
+from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS, find_preset
+from robocov_app.viewer.view import ViewState
+
+BAR_HEIGHT_PX = 30.0
+"""Height of the strip above the map that the bar takes, at scale 1; it never depends on the layers."""
+MENU_COMMAND = "layers"
+"""Command that opens and closes the menu of all layers."""
+
+# Lengths in pixels at scale 1.
+_MARGIN_PX = 10.0
+_CHIP_GAP_PX = 5.0
+_MENU_COLUMN_PX = 192.0
+_MIN_MENU_COLUMN_PX = 158.0
+_MIN_COLUMN_WITH_KEYS_PX = 184.0
+_MENU_PADDING_PX = 10.0
+_MENU_ROW_PX = 21.0
+_MENU_HEADER_PX = 22.0
+_MENU_HEADER_TEXT_PX = 11.0
+_GROUP_GAP_PX = 6.0
+
+_DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
+"""Layers that everybody recognizes; their chips are left out first if there is not enough space."""
+
+
+class LayerBar:
+    """Draws the chips and the menu of layers, and turns clicks on them into commands.
+
+    Parameters
+    ----------
+    view : ViewState
+        Visible layers.
+    commands : CommandTable
+        Commands of the window, for tool tips and keys.
+    run_command : callable
+        Runs a command by its name.
+
+    Attributes
+    ----------
+    is_open : bool
+        Whether the menu with all layers is shown.
+    chips : list of (Chip, Rect)
+        Chips of the bar that were drawn last, with their boxes.
+    rows : list of (Chip, Rect)
+        Presets and layers of the open menu, with their boxes.
+    """
+
+    def __init__(self, view: ViewState, commands: CommandTable, run_command: Callable[[str], object]) -> None:
+        self.is_open = False
+        self.chips: list[tuple[Chip, Rect]] = []
+        self.rows: list[tuple[Chip, Rect]] = []
+        self._view = view
+        self._commands = commands
+        self._run_command = run_command
+        self._menu_box = Rect(0, 0, 0, 0)
+        self._hovered = ""
+        self._offered: set[str] = set()  # layers with a chip: visible now, or hidden since the last preset
+        self._preset: object = None
+        self._tool_tip = ToolTip()
+        self._theme = LIGHT
+        self._scale = 1.0
+
+    def toggle_menu(self) -> None:
+        """Open or close the menu of all layers."""
+        self.is_open = not self.is_open
+
+    # Events
+
+    def press(self, pixel: Pixel) -> bool:
+        """Handle a press of the left button; return whether it was on the bar or its menu.
+
+        A press elsewhere closes the menu, and still acts on the map.
+        """
+        self._tool_tip.restart()
+        chip = self._find_chip(pixel)
+        if chip is not None:
+            self._run_command(chip.command)
+            return True
+        if self.is_over(pixel):
+            return True
+        self.is_open = False
+        return False
+
+    def hover(self, pixel: Pixel | None) -> None:
+        """Record the position of the mouse; None if it has left the window."""
+        chip = None if pixel is None else self._find_chip(pixel)
+        self._hovered = "" if chip is None else _get_id(chip)
+        self._tool_tip.note_hovered(self._hovered)
+
+    def is_over(self, pixel: Pixel) -> bool:
+        """Return whether a pixel is on a chip or on the open menu."""
+        is_on_menu = self.is_open and self._menu_box.collidepoint(pixel)
+        return is_on_menu or self._find_chip(pixel) is not None
+
+    def _find_chip(self, pixel: Pixel) -> Chip | None:
+        rows = self.rows if self.is_open else []
+        if self.is_open and self._menu_box.collidepoint(pixel):
+            chips = rows
+        else:
+            chips = self.chips
+        for chip, box in chips:
+            if box.collidepoint(pixel):
+                return chip
+        return None
+
+    @property
+    def visible_state(self) -> object:
+        """Values that the frame depends on, besides the layers and the scenes."""
+        return self.is_open, self._hovered, bool(self._hovered) and self._tool_tip.is_due
+
+    # Drawing
+
+    def draw(
+        self, screen: Surface, layout: Layout, theme: Theme, layers: Sequence[Layer], scenes: Sequence[Scene]
+    ) -> None:
+        """Draw the bar at the top of the arena, and the open menu below it.
+
+        Parameters
+        ----------
+        screen : pygame.Surface
+        layout : Layout
+        theme : Theme
+        layers : sequence of Layer
+            All layers of the panes.
+        scenes : sequence of Scene
+            The drawn scene of each pane.
+        """
+        self._theme = theme
+        self._scale = layout.scale
+        canvas = create_flat_canvas(screen, theme, layout.scale)
+        self.chips = self._arrange_bar(canvas, layout.arena, layers, scenes)
+        for chip, box in self.chips:
+            draw_chip(canvas, chip, box, is_hovered=_get_id(chip) == self._hovered)
+        self.rows = []
+        if self.is_open:
+            self._draw_menu(canvas, layout.arena, layers, scenes)
+        self._draw_tool_tip(screen)
+
+    def _arrange_bar(
+        self, canvas: Canvas, arena: Box, layers: Sequence[Layer], scenes: Sequence[Scene]
+    ) -> list[tuple[Chip, Rect]]:
+        """Choose the chips that fit into the bar, and place them."""
+        menu = Chip("menu", MENU_COMMAND, label="Layers", is_on=self.is_open)
+        left, top, width, _ = arena
+        margin = round(_MARGIN_PX * canvas.scale)
+        gap = round(_CHIP_GAP_PX * canvas.scale)
+        height = round(CHIP_HEIGHT_PX * canvas.scale)
+        y = top + round(0.5 * (BAR_HEIGHT_PX - CHIP_HEIGHT_PX) * canvas.scale)
+        chips = []
+        presets: list[Chip] = []
+        if "legend" in self._view.layers:
+            chips = self._list_layer_chips(layers, scenes)
+            presets = self._list_preset_chips()
+        widths = {chip.command: measure_chip(canvas, chip) + gap for chip in [menu, *chips, *presets]}
+        space = width - 2 * margin - widths[menu.command] + gap
+        chips, presets = _select_fitting(chips, presets, widths, space)
+        placed = []
+        x = left + margin
+        for chip in [menu, *chips]:
+            placed.append((chip, Rect(x, y, widths[chip.command] - gap, height)))
+            x += widths[chip.command]
+        x = left + width - margin - sum(widths[chip.command] for chip in presets) + gap
+        for chip in presets:
+            placed.append((chip, Rect(x, y, widths[chip.command] - gap, height)))
+            x += widths[chip.command]
+        return placed
+
+    def _list_layer_chips(self, layers: Sequence[Layer], scenes: Sequence[Scene]) -> list[Chip]:
+        """Return a chip for each layer with a symbol that is visible, or was hidden since the last preset."""
+        visible = self._view.layers
+        preset = find_preset(visible)
+        if preset is not None and preset is not self._preset:
+            self._offered = set()
+        self._preset = preset
+        self._offered |= visible
+        by_name = {layer.name: layer for layer in layers}
+        chips = []
+        for name in [name for group in LAYER_GROUPS.values() for name in group]:
+            if name not in self._offered or name not in by_name:
+                continue
+            entries = build_layer_entries(by_name[name], scenes)
+            if entries:
+                chips.append(Chip("layer", f"layer:{name}", entries, is_on=name in visible))
+        return chips
+
+    def _list_preset_chips(self) -> list[Chip]:
+        current = find_preset(self._view.layers)
+        return [
+            Chip("preset", f"preset:{preset.name}", label=preset.title, is_on=preset is current)
+            for preset in LAYER_PRESETS
+        ]
+
+    def _draw_menu(
+        self, canvas: Canvas, arena: Box, layers: Sequence[Layer], scenes: Sequence[Scene]
+    ) -> None:
+        """Draw the menu: the presets, and all layers in groups."""
+        by_name = {layer.name: layer for layer in layers}
+        scale = canvas.scale
+        left, top, width, _ = arena
+        padding = round(_MENU_PADDING_PX * scale)
+        menu_width = width - 2 * padding - 2 * round(_MARGIN_PX * scale)
+        max_columns = max(int(menu_width / (_MIN_MENU_COLUMN_PX * scale)), 1)
+        groups = {
+            title: [by_name[name] for name in names if name in by_name]
+            for title, names in LAYER_GROUPS.items()
+        }
+        columns = _divide_into_columns(groups, max_columns)
+        column_width = int(min(menu_width / len(columns), _MENU_COLUMN_PX * scale))
+        heights = [sum(_measure_group(groups[title]) for title in column) for column in columns]
+        chip_row = (CHIP_HEIGHT_PX + 8.0) * scale
+        box = Rect(
+            left + round(_MARGIN_PX * scale),
+            top + round(BAR_HEIGHT_PX * scale),
+            len(columns) * column_width + 2 * padding,
+            round(chip_row + max(heights) * scale) + 2 * padding,
+        )
+        self._menu_box = box
+        draw_card(canvas.surface, box, canvas.theme, scale)
+        self._draw_presets(canvas, box.left + padding, box.top + padding)
+        for index, column in enumerate(columns):
+            x = box.left + padding + index * column_width
+            y = box.top + padding + chip_row
+            for title in column:
+                y = self._draw_group(canvas, Rect(x, round(y), column_width, 0), title, groups[title], scenes)
+
+    def _draw_presets(self, canvas: Canvas, x: int, y: int) -> None:
+        for chip in self._list_preset_chips():
+            chip_box = Rect(x, y, measure_chip(canvas, chip), round(CHIP_HEIGHT_PX * canvas.scale))
+            draw_chip(canvas, chip, chip_box, is_hovered=_get_id(chip) == self._hovered)
+            self.rows.append((chip, chip_box))
+            x = chip_box.right + round(_CHIP_GAP_PX * canvas.scale)
+
+    def _draw_group(
+        self,
+        canvas: Canvas,
+        column: Rect,
+        title: str,
+        layers: Sequence[Layer],
+        scenes: Sequence[Scene],
+    ) -> float:
+        """Draw a heading and the layers of a group below the top of a column; return the end, px."""
+        scale = canvas.scale
+        x = column.left
+        y = float(column.top)
+        has_keys = column.width >= _MIN_COLUMN_WITH_KEYS_PX * scale
+        row_height = _MENU_ROW_PX * scale
+        middle = y + 0.5 * _MENU_HEADER_PX * scale
+        heading_x = x + 5 * scale
+        canvas.draw_text(
+            title, (heading_x, middle), size=_MENU_HEADER_TEXT_PX, color=canvas.theme.faint, bold=True
+        )
+        y += _MENU_HEADER_PX * scale
+        for layer in layers:
+            is_on = layer.name in self._view.layers
+            entries = build_layer_entries(layer, scenes)
+            chip = Chip("row", f"layer:{layer.name}", entries, layer.title, is_on)
+            box = Rect(x, round(y), column.width - round(4 * scale), round(row_height))
+            key_text = self._commands[chip.command].key_text if has_keys else ""
+            is_hovered = _get_id(chip) == self._hovered
+            draw_menu_row(canvas, chip, box, title=layer.title, key_text=key_text, is_hovered=is_hovered)
+            self.rows.append((chip, box))
+            y += row_height
+        return y + _GROUP_GAP_PX * scale
+
+    def _draw_tool_tip(self, screen: Surface) -> None:
+        """Draw the tool tip of the chip under the mouse once it is due."""
+        if not self._hovered or not self._tool_tip.is_due or not pygame.display.get_init():
+            return
+        for chip, box in [*self.chips, *self.rows]:
+            if _get_id(chip) == self._hovered:
+                tip = _describe_chip(chip, self._commands[chip.command].tip)
+                draw_tool_tip(screen, tip, self._theme, self._scale, x=box.left, widget=box)
+                return
+
+
+def _get_id(chip: Chip) -> str:
+    return f"{chip.kind} {chip.command}"
+
+
+def _describe_chip(chip: Chip, tip: str) -> str:
+    """Return the tool tip of a chip: what a click does, with the key."""
+    if chip.kind in ("layer", "row"):
+        verb = "Hide" if chip.is_on else "Show"
+        return f"{verb}: {tip}"
+    return tip
+
+
+def _select_fitting(
+    chips: list[Chip], presets: list[Chip], widths: dict[str, int], space: int
+) -> tuple[list[Chip], list[Chip]]:
+    """Leave out chips until the others fit: known symbols first, then the presets, then the last ones.
+
+    Everything that is left out is also in the menu.
+    """
+
+    def fits(some_chips: list[Chip], some_presets: list[Chip]) -> bool:
+        return sum(widths[chip.command] for chip in [*some_chips, *some_presets]) <= space
+
+    remaining = list(chips)
+    if fits(remaining, presets):
+        return remaining, presets
+    for name in _DROPPED_FIRST:
+        remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
+        if fits(remaining, presets):
+            return remaining, presets
+    remaining = list(chips)
+    for name in _DROPPED_FIRST:
+        if fits(remaining, []):
+            return remaining, []
+        remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
+    while remaining and not fits(remaining, []):
+        remaining.pop()
+    return remaining, []
+
+
+def _divide_into_columns(groups: dict[str, list[Layer]], max_columns: int) -> list[list[str]]:
+    """Distribute groups over columns, in order, so that the columns have about the same height."""
+    count = min(max_columns, len(groups))
+    columns: list[list[str]] = [[] for _ in range(count)]
+    for title in groups:
+        shortest = min(
+            range(count), key=lambda column: sum(_measure_group(groups[name]) for name in columns[column])
+        )
+        columns[shortest].append(title)
+    return columns
+
+
+def _measure_group(layers: Sequence[Layer]) -> float:
+    """Return the height of a group in the menu, px at scale 1."""
+    return _MENU_HEADER_PX + _MENU_ROW_PX * len(layers) + _GROUP_GAP_PX
