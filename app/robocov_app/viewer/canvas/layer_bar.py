@@ -127,7 +127,7 @@ class LayerBar:
         return None
 
     @property
-    def visible_state(self) -> object:
+    def frame_key(self) -> object:
         """Values that the frame depends on, besides the layers and the scenes."""
         return self.is_open, self._hovered, bool(self._hovered) and self._tool_tip.is_due
 

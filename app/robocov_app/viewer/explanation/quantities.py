@@ -6,7 +6,8 @@ MIN_FORCE_N = 5e-4
 """Smaller forces are written as 0 N and are drawn without an arrow."""
 
 _MAX_NUMBER = 1e6
-# Limits at which rounding to a number of decimals would add a digit: 9.95 becomes 10, 0.995 becomes 1.0.
+# From these values on, a number is written with no, one or two decimals. They are not powers of ten, because
+# rounding would add a digit to a smaller number: 9.95 is written as 10, and 0.995 as 1.0.
 _NO_DECIMALS = 9.95
 _ONE_DECIMAL = 0.995
 _TWO_DECIMALS = 0.00995

@@ -78,7 +78,7 @@ class LessonGuide:
         return self.player is not None and self.shown is None
 
     @property
-    def visible_state(self) -> object:
+    def frame_key(self) -> object:
         """Everything that determines how the lesson is drawn."""
         player = self.player
         if player is None:

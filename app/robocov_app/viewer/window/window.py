@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pygame
 
@@ -40,6 +41,24 @@ from robocov_app.viewer.window.status import HINT, list_facts, suggest_actions
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 _LESSON_HINT = "F2 back to the lesson · Esc ends it"
+_ASPECT_DECIMALS = 3  # smaller changes of the shape of the map do not change the layout
+
+
+class _FrameSettings(NamedTuple):
+    """Settings on which all parts of the layout depend."""
+
+    size: tuple[int, int]
+    scale: float
+    has_panel: bool
+    theme: str
+
+
+class _LayoutKey(NamedTuple):
+    """Everything on which the layout depends, to detect changes."""
+
+    frame: _FrameSettings
+    pane_count: int
+    aspect: float
 
 
 class ViewerWindow(CommandWindow):
@@ -124,7 +143,7 @@ class ViewerWindow(CommandWindow):
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
         self._inspector = RobotInspector(viewer, self.panel)
-        self._arranged: tuple[object, ...] | None = None  # everything on which the current layout depends
+        self._layout_key: _LayoutKey | None = None  # of the current layout
         self._unrecorded_s = 0.0  # time since the last frame of the video
         self._arrange()
         self.draw()
@@ -228,10 +247,10 @@ class ViewerWindow(CommandWindow):
             self._cost_curves.answer_count,
             self._get_seek_progress(),
             viewer.costs.state,
-            self._arranged,
+            self._layout_key,
             self.panel.ui.needs_redraw,
-            self.lesson.visible_state,
-            self.layer_bar.visible_state,
+            self.lesson.frame_key,
+            self.layer_bar.frame_key,
         )
 
     def _pass_time(self, seconds: float) -> None:
@@ -253,20 +272,20 @@ class ViewerWindow(CommandWindow):
         session = self.viewer.session
         size = self.screen.get_size()
         panes = len(session.timeline.panes)
+        before = self._layout_key
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
-        frame = (size, self.scale, view.has_panel, view.theme)
-        arranged = (frame, panes, round(aspect, 3))
-        before = self._arranged
-        if arranged == before:
+        frame = _FrameSettings(size, self.scale, view.has_panel, view.theme)
+        key = _LayoutKey(frame, panes, round(aspect, _ASPECT_DECIMALS))
+        if key == before:
             return
-        self._arranged = arranged
+        self._layout_key = key
         self.theme = get_theme(view.theme)
         self.layout = build_layout(size, self.scale, panes, aspect, panel=view.has_panel)
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
         # The panel does not depend on the panes.
-        if before is None or frame != before[0]:
+        if before is None or frame != before.frame:
             self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
