@@ -324,7 +324,7 @@ class StartPage(BaseWindow):
             self.closed = True
         self._arrange()
 
-    def get_visible_state(self) -> object:
+    def build_frame_key(self) -> object:
         """Return everything on which the frame depends."""
         moment = self._preview_time
         if self.choice is not None:
