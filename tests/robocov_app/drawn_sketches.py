@@ -103,7 +103,7 @@ backgrounds = st.builds(
     pixels=st.tuples(st.integers(1, 4000), st.integers(1, 4000)),
     scale=st.floats(1e-4, 10.0),
     corner=anywhere,
-    turn=st.floats(-180.0, 180.0).map(lambda x: x + 0.0),
+    rotation_deg=st.floats(-180.0, 180.0).map(lambda x: x + 0.0),
     opacity=st.floats(0.0, 1.0).map(lambda x: x + 0.0),
     shown=st.booleans(),
 )

@@ -20,7 +20,7 @@ PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
 
 def find_pixel(background: Background, position):
     dx, dy = position[0] - background.corner[0], position[1] - background.corner[1]
-    cos, sin = compute_cos_sin(background.turn)
+    cos, sin = compute_cos_sin(background.rotation_deg)
     x, y = cos * dx + sin * dy, cos * dy - sin * dx
     return x / background.scale, background.pixels[1] - y / background.scale
 
@@ -36,7 +36,7 @@ def test_pixels_count_downwards_from_the_upper_left_corner():
     assert PLAN.to_world((0, 300)) == (1.0, 2.0)
     assert PLAN.to_world((400, 0)) == (21.0, 17.0)
     assert PLAN.corners == ((1.0, 2.0), (21.0, 2.0), (21.0, 17.0), (1.0, 17.0))
-    upright = replace(PLAN, turn=90.0)
+    upright = replace(PLAN, rotation_deg=90.0)
     assert upright.to_world((400, 300)) == pytest.approx((1.0, 22.0))
 
 
@@ -90,7 +90,7 @@ def test_scaling_gives_two_points_the_given_distance(background, offset, meters)
     scaled = scale_to_length(background, a, b, meters)
     assert math.dist(scaled.to_world(pixel_a), scaled.to_world(pixel_b)) == pytest.approx(meters)
     assert scaled.to_world(pixel_a) == pytest.approx(a, abs=1e-6)
-    assert scaled.turn == background.turn
+    assert scaled.rotation_deg == background.rotation_deg
 
 
 def test_impossible_scales_raise_a_map_error():
@@ -105,7 +105,7 @@ def test_impossible_scales_raise_a_map_error():
 
 
 @given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))
-def test_levelling_makes_two_points_level_or_upright(background, offset):
+def test_leveling_makes_two_points_horizontal_or_vertical(background, offset):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world(offset)
     level = level_background(background, a, b)
@@ -114,7 +114,7 @@ def test_levelling_makes_two_points_level_or_upright(background, offset):
     assert start == pytest.approx(a, abs=1e-6)
     assert min(abs(end[0] - a[0]), abs(end[1] - a[1])) < 1e-6
     assert math.dist(start, end) == pytest.approx(math.dist(a, b))
-    assert abs(math.remainder(level.turn - background.turn, 360.0)) <= 45.0 + 1e-6
-    assert -180.0 <= level.turn <= 180.0
+    assert abs(math.remainder(level.rotation_deg - background.rotation_deg, 360.0)) <= 45.0 + 1e-6
+    assert -180.0 <= level.rotation_deg <= 180.0
     with pytest.raises(MapError, match="farther apart"):
         level_background(background, a, a)

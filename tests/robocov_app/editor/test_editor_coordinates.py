@@ -85,7 +85,7 @@ def test_invalid_positions_raise_a_map_error(text):
 
 
 def test_relative_positions_require_a_previous_point():
-    with pytest.raises(MapError, match="no point before"):
+    with pytest.raises(MapError, match="a relative position needs a previous point"):
         parse_point("@1 0")
     assert parse_point("1 0") == (1.0, 0.0)
 

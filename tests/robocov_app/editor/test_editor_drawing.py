@@ -262,7 +262,7 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDri
     driver.drag_at((3, 3), (3.5, 3.5), (4, 3))
     driver.click_all((2, 2), (4, 2.4))
     driver.press_key("return")
-    assert driver.sketch.background.turn == pytest.approx(-11.3, abs=0.5)
+    assert driver.sketch.background.rotation_deg == pytest.approx(-11.3, abs=0.5)
     driver.press_key("ctrl+z")
     moved = driver.sketch.background.corner
     assert moved[0] - corner[0] == pytest.approx(1.0, abs=0.05)

@@ -93,7 +93,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: create.add_circle(s, (0, 0), 0.0), "needs a radius"),
         (lambda s: create.add_circle(s, (math.nan, 0), 1.0), "too far away"),
         (lambda s: create.add_circle(s, (1e8, 0), 1.0), "too far away"),
-        (lambda s: create.add_wall(s, [(1, 1), (1, 1)], 0.1), "two points that are apart"),
+        (lambda s: create.add_wall(s, [(1, 1), (1, 1)], 0.1), "two different points"),
         (lambda s: create.add_wall(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
         (lambda s: create.set_boundary(s, [(1, 1), (2, 1)]), "three corners"),
         (lambda s: create.add_disc_start(s, (1, 1), 0.0), "needs a radius"),
@@ -254,7 +254,7 @@ def test_vertices_are_moved_once_with_their_owner(sketch):
     assert change.sketch.get_item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
     assert change.sketch.get_item(1).shape.center == (7.0, 4.0)
     once = transform.move(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
-    assert once.sketch.get_item(0).shape == Affine(x0=1.0).apply(BOX)
+    assert once.sketch.get_item(0).shape == Affine(x0=1.0).transform(BOX)
     turned = transform.rotate(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
     assert turned.sketch.get_item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
@@ -263,7 +263,7 @@ def test_objects_are_duplicated_and_copied_to_a_grid(sketch):
     noted = properties.set_note(sketch, Selection.of(0), "oak").sketch
     change = transform.duplicate(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
-    assert copy.shape == Affine(x0=1.0, y0=0.5).apply(BOX)
+    assert copy.shape == Affine(x0=1.0, y0=0.5).transform(BOX)
     assert copy.note == "oak"
     assert change.sketch.get_start("corner 2") == DiscStart((2.0, 5.5), 0.8)
     assert change.selection == Selection.of(copy.key, "corner 2", "all 2")
@@ -351,7 +351,7 @@ def test_groups_locks_and_hidden_obstacles_are_saved(sketch):
     )
     assert parse_sketch(dump_sketch(unseen), "again") == unseen
     assert Sketch.from_environment(unseen.build_environment()) == unseen
-    shown = properties.release(unseen)
+    shown = properties.unlock_and_show_all(unseen)
     assert shown.sketch == change.sketch and shown.description == "3 obstacles unlocked and shown"
     apart = properties.ungroup(held.sketch, Selection.of(0, 1, 2))
     assert not any(item.group for item in apart.sketch.obstacles)
@@ -431,10 +431,10 @@ def test_cosine_and_sine_are_exact_at_quarter_turns(degrees):
 
 
 def test_affine_maps_have_a_common_factor():
-    assert Affine.turn(33.0, (1.0, 2.0)).factor == 1.0
-    assert Affine.stretch(2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
-    assert Affine.stretch(-2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
-    assert Affine.stretch(2.0, 1.0, (0.0, 0.0)).factor is None
+    assert Affine.rotation(33.0, (1.0, 2.0)).factor == 1.0
+    assert Affine.scaling(2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
+    assert Affine.scaling(-2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
+    assert Affine.scaling(2.0, 1.0, (0.0, 0.0)).factor is None
     assert Affine(1.0, 0.5, 0.0, 1.0).factor is None
 
 
@@ -457,7 +457,7 @@ def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     for was, now in zip(level.boundary, after.boundary, strict=True):
         assert (now[0] - ax + 2.0, now[1] - ay + 3.0) == pytest.approx(was, abs=1e-3)
     assert after.get_item(keys[1]).shape.path.points[1][1] == pytest.approx(ay + 1.0, abs=1e-3)
-    assert after.background.turn == pytest.approx(-7.0, abs=0.01)
+    assert after.background.rotation_deg == pytest.approx(-7.0, abs=0.01)
     turned, round_one = after.density.peaks
     assert np.linalg.eigvalsh(turned.covariance) == pytest.approx(np.linalg.eigvalsh(peaks[0].covariance))
     assert turned.covariance != peaks[0].covariance and round_one.sigma == 0.5
@@ -468,5 +468,5 @@ def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     assert upright.density.areas[0].vertices[0] == pytest.approx((1.0945, 0.8955), abs=2e-4)
     with pytest.raises(MapError, match="cannot be turned"):
         transform.level_map(replace(level, density=Raster(np.eye(3), (0, 0, 9, 9))), (0.0, 0.0), (3.0, 1.0))
-    with pytest.raises(MapError, match="apart"):
+    with pytest.raises(MapError, match="two different points"):
         transform.level_map(level, (1.0, 1.0), (1.0, 1.0))

@@ -96,7 +96,7 @@ def test_the_nearest_waypoint_and_leg_are_found() -> None:
 @pytest.mark.parametrize("points", [(), ((1.0, 1.0),), ((1.0, 1.0), (1.0, 1.0))])
 def test_a_path_that_leads_nowhere_is_harmless(points, tmp_path: Path) -> None:
     broken = replace(CART, path=ObstaclePath(points, 0.0))
-    assert not paths.leads_somewhere(broken.path)
+    assert not paths.is_moving(broken.path)
     assert paths.describe_path(broken.path) == "leads nowhere"
     paths.find_waypoint(broken.path, (0.0, 0.0), 1.0)
     assert paths.find_leg(broken.path, (9.0, 9.0), 0.1) is None
@@ -118,7 +118,7 @@ def test_transforms_apply_to_paths(shape) -> None:
     assert get_path(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
     turned = transform.rotate(sketch, one, 90.0, (2.0, 2.0)).sketch
     assert get_path(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
-    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).apply(replace(shape, path=ROUND))
+    stretched = Affine.scaling(2.0, 1.0, (2.0, 2.0)).transform(replace(shape, path=ROUND))
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
 

@@ -153,7 +153,7 @@ def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
     laid = Background(str(tmp_path / "red.png"), (100, 100), 0.1, opacity=1.0)
     for turn in (0.0, 90.0):
         corner = (0.0, 0.0) if turn == 0.0 else (10.0, 0.0)
-        sketch = replace(sheet(*SHAPES), background=replace(laid, turn=turn, corner=corner))
+        sketch = replace(sheet(*SHAPES), background=replace(laid, rotation_deg=turn, corner=corner))
         at = build_view(shown=frozenset({"picture"}))
         page = Sheet().draw(at, sketch)
         x, y = at.camera.to_pixels(np.array([1.0, 8.0]))

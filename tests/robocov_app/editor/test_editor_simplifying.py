@@ -79,7 +79,7 @@ def test_traced_plans_become_straight():
         (0.995, 3.02),
     )
     assert change.description == "1 outline straightened"
-    with pytest.raises(MapError, match="not so already"):
+    with pytest.raises(MapError, match="no edge to straighten"):
         straighten(change.sketch, Selection.of(key))
     # several edges in a row come to lie on one line, slanted ones stay
     wall = WallObstacle(((0.0, 0.0), (2.0, 0.04), (4.0, 0.0), (6.0, 2.0), (6.02, 5.0)), 0.1)

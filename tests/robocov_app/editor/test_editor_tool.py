@@ -68,10 +68,10 @@ def test_points_and_angles_are_exact_where_they_are_round() -> None:
     ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 0.0)]
     assert geometry.drop_repeated_points(ring) == ((0.0, 0.0), (1.0, 0.0))
     assert compute_cos_sin(-90.0) == (0.0, -1.0)
-    assert geometry.compute_levelling_angle((1.0, 1.0), (1.0, 3.0)) == 0.0
-    assert geometry.compute_levelling_angle((0.0, 0.0), (1.0, 1.0)) == -45.0
+    assert geometry.compute_leveling_angle((1.0, 1.0), (1.0, 3.0)) == 0.0
+    assert geometry.compute_leveling_angle((0.0, 0.0), (1.0, 1.0)) == -45.0
     assert constrain_angle((0.0, 0.0), (3.0, 0.1)) == (3.0, 0.0)
-    assert Affine.turn(90.0, about=(1.0, 0.0)).ring([(2.0, 0.0)]) == ((1.0, 1.0),)
+    assert Affine.rotation(90.0, about=(1.0, 0.0)).transform_points([(2.0, 0.0)]) == ((1.0, 1.0),)
 
 
 def test_a_plain_tool_does_nothing() -> None:

@@ -68,7 +68,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
     [
         (Sketch("n"), "there is no boundary: draw one around the free space", None, BOUNDARY),
         (hall(name=""), "the map has no name", None, None),
-        (hall(name="x" * 101), "the map has a name of 101 characters: at most 100 are possible", None, None),
+        (hall(name="x" * 101), "the map has a name of 101 characters: it must not exceed 100", None, None),
         (hall(boundary=()), "boundary: it has no corners: it needs three", None, BOUNDARY),
         (
             hall(boundary=((0.0, 0.0), (4.0, 0.0), (0.0, 0.0))),
@@ -90,13 +90,13 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             hall(boundary=((0.0, 0.0), (2e4, 0.0), (0.0, 5.0))),
-            "boundary: it is 20000 × 5 m large: at most 10 km are possible",
+            "boundary: it is 20000 × 5 m large: it must not exceed 10 km",
             (1e4, 2.5),
             BOUNDARY,
         ),
         (
             hall(boundary=((0.0, 0.0), (1e8, 0.0), (0.0, 5.0))),
-            "boundary: (1e+08, 0) is too far away: maps reach 10000 km from their origin",
+            "boundary: (1e+08, 0) is too far away: coordinates must be within 10000 km of the origin",
             (1e8, 0.0),
             BOUNDARY,
         ),
@@ -140,20 +140,20 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             hall(CircleObstacle((2.0, 3.0), 0.0, "")),
-            "circle 1: its radius is 0 m: at least 1 mm is possible",
+            "circle 1: its radius is 0 m: it must be at least 1 mm",
             (2.0, 3.0),
             0,
         ),
         (hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle 1: has no name", None, 0),
         (
             hall(WallObstacle(((2.0, 3.0),), 0.1)),
-            "wall 1: it has no length: it needs two points that are apart",
+            "wall 1: it has no length: it needs two different points",
             (2.0, 3.0),
             0,
         ),
         (
             hall(WallObstacle(((2.0, 3.0), (4.0, 3.0)), -1.0)),
-            "wall 1: its width is -1 m: at least 1 mm is possible",
+            "wall 1: its width is -1 m: it must be at least 1 mm",
             (2.0, 3.0),
             0,
         ),
@@ -223,7 +223,7 @@ def test_a_broken_object_does_not_hide_other_problems():
     message = [problem.message for problem in list_problems(sketch) if problem.is_error]
     assert message == [
         "polygon 1: its outline crosses or touches itself at (2, 2)",
-        "wall 3: it has no length: it needs two points that are apart",
+        "wall 3: it has no length: it needs two different points",
         "start “a”: position 1 at (6, 6) is inside circle 2",
         # of the bow tie's two halves, one place lies in one; the other is free
         "start “b”: position 1 at (1.5, 2) is inside polygon 1",

@@ -127,7 +127,7 @@ def test_center_and_rim_of_discs_are_vertices(sketch):
         (lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0)), 0.0), "length above 0"),
         (
             lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0)), 4.5),
-            "of an edge that is 4 m long",
+            "the cut needs 4.5 m of an edge, but the edge is 4 m long",
         ),
         (
             lambda s: vertices.bevel_corners(s, select_vertices(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),

@@ -53,7 +53,7 @@ class ReferenceImage:
         if self._picture is None or not background.shown or background.opacity <= 0.0:
             return
         factor = background.scale * camera.zoom * self._reduction
-        if background.turn % 360.0:
+        if background.rotation_deg % 360.0:
             drawn = self._rotate(self._picture, background, camera, factor)
         else:
             drawn = self._magnify(self._picture, background, camera, factor, clip)
@@ -86,7 +86,7 @@ class ReferenceImage:
         """Rotate and scale the picture; return it with its box in the window, or None if it is too large."""
         if factor * max(picture.get_size()) > MAX_SHOWN_PX:
             return None
-        rotated = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
+        rotated = pygame.transform.rotozoom(picture.convert_alpha(), background.rotation_deg, factor)
         corners = camera.to_pixels(np.array(background.corners))
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
         return rotated, rotated.get_rect(center=(round(x), round(y)))

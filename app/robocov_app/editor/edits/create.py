@@ -16,9 +16,9 @@ from robocov.mapfile.models import MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     build_rectangle,
-    check_point,
     drop_repeated_points,
     round_length,
+    round_map_point,
     round_point,
     round_ring,
 )
@@ -52,14 +52,16 @@ def add_rectangle(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 def add_circle(sketch: Sketch, center: Point, radius: float) -> Change:
     """Add a circle with a center and radius, m."""
-    return add_obstacle(sketch, env.CircleObstacle(check_point(center), _check_radius(radius, "a circle")))
+    return add_obstacle(
+        sketch, env.CircleObstacle(round_map_point(center), _round_radius(radius, "a circle"))
+    )
 
 
 def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
     """Add a wall along a line of points, with a width, m."""
-    line = drop_repeated_points(round_ring(points), closed=False)
+    line = drop_repeated_points(round_ring(points), is_closed=False)
     if len(line) < 2 or shapely.LineString(line).length < MIN_DRAWN_LENGTH_M:
-        raise MapError("a wall needs two points that are apart")
+        raise MapError("a wall needs two different points")
     is_possible = MIN_SIZE_M <= width <= MAX_SIZE_M
     require(is_possible, f"a wall's width is at least {1000 * MIN_SIZE_M:g} mm")
     return add_obstacle(sketch, env.WallObstacle(line, round_length(width)))
@@ -76,7 +78,7 @@ def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 def add_disc_start(sketch: Sketch, center: Point, radius: float) -> Change:
     """Add a disc-shaped start with a center and radius, m."""
-    return _add_start(sketch, env.DiscStart(check_point(center), _check_radius(radius, "a start")))
+    return _add_start(sketch, env.DiscStart(round_map_point(center), _round_radius(radius, "a start")))
 
 
 def add_points_start(sketch: Sketch, points: Sequence[Point]) -> Change:
@@ -167,7 +169,8 @@ def _build_outline(points: Sequence[Point], label: str) -> Ring:
     return ring
 
 
-def _check_radius(radius: float, label: str) -> float:
+def _round_radius(radius: float, label: str) -> float:
+    """Round a radius to tenths of a millimeter; raise MapError if it is out of range."""
     is_possible = MIN_DRAWN_LENGTH_M <= radius <= MAX_SIZE_M
     require(is_possible, f"{label} needs a radius: drag from its middle to its rim")
     return round_length(radius)
@@ -206,17 +209,17 @@ def project_on_wall(sketch: Sketch, key: int, point: Point) -> Point:
     return _interpolate(line, line.project(shapely.Point(point)))
 
 
-def check_door_width(width: float) -> float:
-    """Return the width of a door, m, unchanged; raise MapError if it is out of range."""
+def require_door_width(width: float) -> None:
+    """Raise MapError if the width of a door, m, is out of range."""
     is_possible = MIN_DRAWN_LENGTH_M <= width <= MAX_SIZE_M
     require(is_possible, f"a door's width is at least {100 * MIN_DRAWN_LENGTH_M:g} cm")
-    return width
 
 
 def open_door(sketch: Sketch, key: int, point: Point, width: float) -> Change:
     """Cut a door with a width, m, into a wall near a point."""
     line = _build_wall_line(sketch, key)
-    if check_door_width(width) > line.length - MIN_SIZE_M:
+    require_door_width(width)
+    if width > line.length - MIN_SIZE_M:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
     start, end = _compute_door_span(line, point, width)
     return _open_wall_between(sketch, key, start, end)
@@ -226,12 +229,12 @@ def open_wall(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     """Cut an opening into a wall between two points, m, which are projected on its center line."""
     line = _build_wall_line(sketch, key)
     start, end = sorted(line.project(shapely.Point(point)) for point in (a, b))
-    check_door_width(end - start)
+    require_door_width(end - start)
     return _open_wall_between(sketch, key, start, end)
 
 
 def _open_wall_between(sketch: Sketch, key: int, start: float, end: float) -> Change:
-    """Remove the part of a wall between two distances along its line, m; the rest keeps name and note."""
+    """Remove a wall between two distances along its line, m; the rest keeps name and note."""
     line = _build_wall_line(sketch, key)
     wall = sketch.get_item(key).shape
     assert isinstance(wall, env.WallObstacle)

@@ -13,9 +13,9 @@ from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
-    check_point,
     drop_repeated_points,
     round_length,
+    round_map_point,
     round_ring,
 )
 from robocov_app.editor.model.selection import Change, Selection
@@ -47,7 +47,7 @@ def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Chan
     """Add a hot spot with a center and standard deviation, m; a map without density gets a floor of 1."""
     if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
         raise _build_kind_error(sketch.density, ", hot spots are not")
-    peak = Gaussian(check_point(center), _check_weight(weight, MIN_PEAK_WEIGHT), _check_sigma(sigma))
+    peak = Gaussian(round_map_point(center), _round_weight(weight, MIN_PEAK_WEIGHT), _round_sigma(sigma))
     return _set_features(sketch, (*list_features(sketch), peak), "hot spot added")
 
 
@@ -84,14 +84,14 @@ def remove_feature(sketch: Sketch, number: int) -> Change:
 
 def move_feature(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
     """Move a feature by a displacement, m."""
-    moved = transform.Affine(x0=dx, y0=dy).apply(_get_feature(sketch, number))
+    moved = transform.Affine(x0=dx, y0=dy).transform(_get_feature(sketch, number))
     return _replace_feature(sketch, number, moved, "moved")
 
 
 def resize_peak(sketch: Sketch, number: int, sigma: float) -> Change:
     """Set the standard deviation of a hot spot, m; an elliptic one keeps its proportions."""
     peak = _get_feature(sketch, number)
-    rounded = _check_sigma(sigma)
+    rounded = _round_sigma(sigma)
     if not isinstance(peak, Gaussian):
         raise MapError("this hot spot no longer exists")
     if peak.covariance is None:
@@ -107,7 +107,7 @@ def move_corner(sketch: Sketch, number: int, corner: int, position: Point) -> Ch
     area = _get_feature(sketch, number)
     if not isinstance(area, WeightedArea) or corner >= len(area.vertices):
         raise MapError("this corner no longer exists")
-    vertices = (*area.vertices[:corner], check_point(position), *area.vertices[corner + 1 :])
+    vertices = (*area.vertices[:corner], round_map_point(position), *area.vertices[corner + 1 :])
     return _replace_feature(sketch, number, _check_area(replace(area, vertices=vertices)), "changed")
 
 
@@ -117,7 +117,7 @@ def set_weight(sketch: Sketch, number: int, weight: float) -> Change:
     minimum = 0.0
     if isinstance(feature, Gaussian):
         minimum = MIN_PEAK_WEIGHT
-    weight = _check_weight(weight, minimum)
+    weight = _round_weight(weight, minimum)
     return _replace_feature(sketch, number, replace(feature, weight=weight), f"weighs {weight:g}")
 
 
@@ -127,7 +127,7 @@ def set_floor(sketch: Sketch, floor: float) -> Change:
     minimum = MIN_PEAK_WEIGHT
     if features:
         minimum = 0.0
-    floor = _check_weight(floor, minimum)
+    floor = _round_weight(floor, minimum)
     return _set_features(sketch, features, f"the weight is at least {floor:g} everywhere", floor)
 
 
@@ -143,7 +143,7 @@ def parse_weight(text: str) -> float:
         weight = float(text)
     except ValueError:
         raise MapError(f"expected a weight above 0, got “{text}”") from None
-    return _check_weight(weight, MIN_PEAK_WEIGHT)
+    return _round_weight(weight, MIN_PEAK_WEIGHT)
 
 
 def describe_density(density: Density | None) -> str:
@@ -228,16 +228,16 @@ def _check_area(area: WeightedArea) -> WeightedArea:
         polygon = shapely.Polygon(area.vertices, area.holes)
     if not polygon.is_valid or polygon.area < create.MIN_DRAWN_LENGTH_M**2:
         raise MapError("an area needs three corners that enclose an area, and an outline without crossings")
-    return replace(area, weight=_check_weight(area.weight, 0.0))
+    return replace(area, weight=_round_weight(area.weight, 0.0))
 
 
-def _check_sigma(sigma: float) -> float:
+def _round_sigma(sigma: float) -> float:
     is_possible = create.MIN_DRAWN_LENGTH_M <= sigma <= MAX_SIZE_M
     require(is_possible, "a hot spot needs a size: drag from its middle outwards")
     return round_length(sigma)
 
 
-def _check_weight(weight: float, minimum: float) -> float:
+def _round_weight(weight: float, minimum: float) -> float:
     if not minimum <= weight <= MAX_WEIGHT:
         bound = "above" if minimum else "from"
         raise MapError(f"weight: expected a number {bound} 0, got {weight:g}")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -29,7 +29,7 @@ from robocov_app.editor.model.selection import (
     find_position,
     format_numbered_name,
 )
-from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.model.sketch import Item, Owner, Sketch
 from robocov_app.editor.model.validation import Problem, ProblemKind, find_problems
 
 BOUNDARY_MARGIN_M = 0.5  # between a new boundary and the objects that it encloses
@@ -39,15 +39,34 @@ FILL_MITRE_LIMIT = 2.0
 SPARE_M = 1e-3  # by which a widened gap exceeds the diameter of a robot
 START_DISTANCE_RADII = 2.01  # minimum distance between two robots at a start, in radii
 
-FindFix: TypeAlias = Callable[[Sketch, Any, float], Change]  # takes map, problem and robot radius, m
+
+class FixRequest(NamedTuple):
+    """A problem to solve.
+
+    Attributes
+    ----------
+    sketch : Sketch
+        The map.
+    problem : Problem
+        The problem.
+    radius : float
+        Radius of a robot, m.
+    """
+
+    sketch: Sketch
+    problem: Problem
+    radius: float
+
+
+FindFix: TypeAlias = Callable[[FixRequest], Change]
 
 
 class _GapSide(NamedTuple):
-    """An obstacle at one end of a gap, with that end and the opposite one."""
+    """An obstacle at one end of a gap, with the end at the obstacle and the opposite one."""
 
     item: Item
     end: Point
-    opposite: Point
+    opposite_end: Point
 
 
 @dataclass(frozen=True)
@@ -87,7 +106,7 @@ def find_fix(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
     if fix is None:
         return None
     with suppress(MapError):
-        return fix.find(sketch, problem, radius)
+        return fix.find(FixRequest(sketch, problem, radius))
     return None
 
 
@@ -96,12 +115,13 @@ def fill_unreachable(sketch: Sketch, radius: float) -> Change:
     _, free = find_problems(sketch, radius)
     swept, untouched = compute_reach(free, radius)
     require(swept, f"no robot of radius {radius:g} m fits anywhere")
-    unreachable = [*swept[1:], untouched, *list(free.geoms)[1:]]
+    unreachable: list[Geometry | None] = [*swept[1:], untouched, *list(free.geoms)[1:]]
     return _fill(sketch, _find_parts(free, swept[0], unreachable))
 
 
-def _draw_boundary(sketch: Sketch, problem: Any, radius: float) -> Change:
+def _draw_boundary(request: FixRequest) -> Change:
     """Draw a rectangular boundary around all objects, with a margin, or of a default size."""
+    sketch = request.sketch
     margin = BOUNDARY_MARGIN_M
     bounds = sketch.bounds
     if bounds is None:
@@ -115,23 +135,25 @@ def _draw_boundary(sketch: Sketch, problem: Any, radius: float) -> Change:
     return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
 
-def _fill_sealed_area(sketch: Sketch, problem: Any, radius: float) -> Change:
-    return _fill(sketch, problem.geometry)
+def _fill_sealed_area(request: FixRequest) -> Change:
+    return _fill(request.sketch, request.problem.geometry)
 
 
-def _fill_cut_off_area(sketch: Sketch, problem: Any, radius: float) -> Change:
-    _, free = find_problems(sketch, radius)
-    swept, _ = compute_reach(free, radius)
-    return _fill(sketch, _find_parts(free, swept[0], [problem.geometry]))
+def _fill_cut_off_area(request: FixRequest) -> Change:
+    _, free = find_problems(request.sketch, request.radius)
+    swept, _ = compute_reach(free, request.radius)
+    return _fill(request.sketch, _find_parts(free, swept[0], [request.problem.geometry]))
 
 
-def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
+def _widen_gap(request: FixRequest) -> Change:
     """Make a gap wide enough for a robot.
 
     Shorten a wall that ends at the gap; if there is none, move the smallest obstacle next to it.
     """
-    gap: LineString = problem.geometry
-    missing = 2.0 * radius + SPARE_M - gap.length
+    sketch = request.sketch
+    gap = request.problem.geometry
+    assert isinstance(gap, LineString)
+    missing = 2.0 * request.radius + SPARE_M - gap.length
     sides = _list_gap_sides(sketch, gap)
     for side in sides:
         shortened = _shorten_wall(side.item.shape, side.end, missing)
@@ -141,9 +163,9 @@ def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
             return Change(sketch.with_objects({key: shortened}), Selection.of(key), description)
     movable = _drop_obstacles_at_both_ends(sides)
     require(movable and gap.length > 0.0, "no obstacle next to the gap can be moved")
-    item, end, opposite = min(movable, key=lambda side: side.item.geometry.area)
-    dx = missing * (end[0] - opposite[0]) / gap.length
-    dy = missing * (end[1] - opposite[1]) / gap.length
+    item, end, opposite_end = min(movable, key=lambda side: side.item.geometry.area)
+    dx = missing * (end[0] - opposite_end[0]) / gap.length
+    dy = missing * (end[1] - opposite_end[1]) / gap.length
     change = transform.move(sketch, Selection.of(item.key), dx, dy)
     return replace(change, description=f"{format_numbered_name(sketch, item.key)} moved by {missing:.2g} m")
 
@@ -153,10 +175,10 @@ def _list_gap_sides(sketch: Sketch, gap: LineString) -> list[_GapSide]:
     first = gap.coords[0]
     last = gap.coords[-1]
     sides: list[_GapSide] = []
-    for end, opposite in ((first, last), (last, first)):
+    for end, opposite_end in ((first, last), (last, first)):
         indices = sketch.tree.query(shapely.Point(end), predicate="dwithin", distance=MAX_SAGITTA_M)
         items = [sketch.obstacles[k] for k in indices.tolist()]
-        sides += [_GapSide(item, end, opposite) for item in items if not item.locked]
+        sides += [_GapSide(item, end, opposite_end) for item in items if not item.locked]
     return sides
 
 
@@ -185,36 +207,47 @@ def _shorten_wall(wall: Obstacle, end: Point, length: float) -> WallObstacle | N
     return None
 
 
-def _repair_outline(sketch: Sketch, problem: Any, radius: float) -> Change:
-    return boolean.repair_outlines(sketch, Selection.of(problem.owner))
+def _get_owner(request: FixRequest) -> Owner:
+    """Return the object that has the problem."""
+    owner = request.problem.owner
+    assert owner is not None
+    return owner
 
 
-def _delete_object(sketch: Sketch, problem: Any, radius: float) -> Change:
-    return properties.delete(sketch, Selection.of(problem.owner))
+def _repair_outline(request: FixRequest) -> Change:
+    return boolean.repair_outlines(request.sketch, Selection.of(_get_owner(request)))
 
 
-def _merge_vertices(sketch: Sketch, problem: Any, radius: float) -> Change:
-    owner = problem.owner
+def _delete_object(request: FixRequest) -> Change:
+    return properties.delete(request.sketch, Selection.of(_get_owner(request)))
+
+
+def _merge_vertices(request: FixRequest) -> Change:
+    sketch = request.sketch
+    owner = _get_owner(request)
     rings = [
-        drop_repeated_points(points, closed=is_closed) for _, points, is_closed in sketch.list_rings(owner)
+        drop_repeated_points(points, is_closed=is_closed) for _, points, is_closed in sketch.list_rings(owner)
     ]
     description = f"{format_numbered_name(sketch, owner)}: vertices merged"
     return Change(sketch.with_rings(owner, rings), Selection.of(owner), description)
 
 
-def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
+def _move_start(request: FixRequest) -> Change:
     """Move a disc start, or one position of a start, to the nearest point with space for a robot.
 
     The last point of the problem's geometry is the position to move.
     """
-    name = problem.owner
+    sketch = request.sketch
+    radius = request.radius
+    name = _get_owner(request)
+    assert isinstance(name, str)
     start = sketch.get_start(name)
     _, free = find_problems(sketch, radius)
     space = free.buffer(-radius - SPARE_M)
     number = 0
     label = ""
     if isinstance(start, PointsStart):
-        x, y = shapely.get_coordinates(problem.geometry)[-1].tolist()
+        x, y = shapely.get_coordinates(request.problem.geometry)[-1].tolist()
         number = max(k for k, position in enumerate(start.positions) if position == (x, y))
         others = shapely.points(np.delete(np.array(start.positions), number, axis=0))
         space -= shapely.union_all(shapely.buffer(others, START_DISTANCE_RADII * radius + SPARE_M))
@@ -226,8 +259,9 @@ def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
     return Change(moved, Selection.of(name), f"start “{name}”{label} moved to where a robot fits")
 
 
-def _fill(sketch: Sketch, area: Geometry) -> Change:
+def _fill(sketch: Sketch, area: Geometry | None) -> Change:
     """Add obstacles that cover an area and slightly overlap the objects around it."""
+    assert area is not None
     grown = area.buffer(FILL_OVERLAP_M, join_style="mitre", mitre_limit=FILL_MITRE_LIMIT)
     polygons = extract_polygons(grown)
     require(polygons, "there is nothing to fill")
@@ -235,7 +269,7 @@ def _fill(sketch: Sketch, area: Geometry) -> Change:
     return Change(filled, Selection.of(*keys), "unreachable areas filled")
 
 
-def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry]) -> Geometry:
+def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry | None]) -> Geometry:
     """Return the parts of the free space outside its largest part that intersect any of the given areas."""
     parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
     inside = shapely.union_all(areas).buffer(-MAX_SAGITTA_M)

@@ -11,7 +11,7 @@ from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import check_point, compute_center, to_array
+from robocov_app.editor.model.geometry import compute_center, round_map_point, to_array
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.toolkit.tools.geometry import find_nearest_on_edges
@@ -25,7 +25,7 @@ def list_moving_obstacles(sketch: Sketch) -> tuple[int, ...]:
     return tuple(item.key for item in sketch.obstacles if item.shape.path is not None)
 
 
-def leads_somewhere(path: ObstaclePath) -> bool:
+def is_moving(path: ObstaclePath) -> bool:
     """Return whether a path results in motion; in an unfinished map, it may not."""
     return len(set(path.points)) > 1 and path.speed > 0.0
 
@@ -52,18 +52,18 @@ def add_waypoint(
     path = item.shape.path
     if path is None:
         require(not item.geometry.is_empty, "an obstacle that covers nothing cannot move")
-        ends = (check_point(compute_center(item.geometry.bounds)), check_point(point))
-        return _set_path(sketch, key, ObstaclePath(ends, _check_speed(speed), "back-and-forth"), "moves")
+        ends = (round_map_point(compute_center(item.geometry.bounds)), round_map_point(point))
+        return _set_path(sketch, key, ObstaclePath(ends, _round_speed(speed), "back-and-forth"), "moves")
     if index is None:
         index = len(path.points)
-    points = (*path.points[:index], check_point(point), *path.points[index:])
+    points = (*path.points[:index], round_map_point(point), *path.points[index:])
     return _set_path(sketch, key, replace(path, points=points), "waypoint added")
 
 
 def move_waypoint(sketch: Sketch, key: int, number: int, point: Point) -> Change:
     """Move a waypoint; moving the first one does not change the position of the obstacle at time zero."""
     path = _require_path(sketch, key, number)
-    points = (*path.points[:number], check_point(point), *path.points[number + 1 :])
+    points = (*path.points[:number], round_map_point(point), *path.points[number + 1 :])
     return _set_path(sketch, key, replace(path, points=points), "waypoint moved")
 
 
@@ -95,14 +95,14 @@ def toggle_repeat(sketch: Sketch, selection: Selection) -> Change:
 
 def set_speed(sketch: Sketch, selection: Selection, speed: float) -> Change:
     """Set the speed of the selected obstacles, m/s."""
-    speed = _check_speed(speed)
+    speed = _round_speed(speed)
     return _edit_paths(sketch, selection, lambda path: replace(path, speed=speed), f"{speed:g} m/s")
 
 
 def parse_speed(text: str) -> float:
     """Parse a speed that the user typed, m/s; raise MapError if it is invalid."""
     try:
-        return _check_speed(float(text.strip().removesuffix("m/s")))
+        return _round_speed(float(text.strip().removesuffix("m/s")))
     except ValueError:
         raise MapError(f"expected a speed in m/s, such as 0.5, got “{text}”") from None
 
@@ -140,7 +140,7 @@ def describe_path(path: ObstaclePath | None) -> str:
     """Describe a path in a few words, for example "0.5 m/s, loop of 6 m in 12 s"."""
     if path is None:
         return "stands still"
-    if not leads_somewhere(path):
+    if not is_moving(path):
         return "leads nowhere"
     kind = "there and back"
     if path.repeat == "loop":
@@ -175,7 +175,7 @@ def _set_path(sketch: Sketch, key: int, path: ObstaclePath, description: str) ->
     return Change(changed, Selection.of(key), f"{sketch.display_name(key)}: {description}")
 
 
-def _check_speed(speed: float) -> float:
+def _round_speed(speed: float) -> float:
     if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
         raise MapError(f"speed: expected {MIN_SPEED_M_S:g} to {MAX_SPEED_M_S:g} m/s, got {speed:g} m/s")
     return float(f"{speed:.6g}")

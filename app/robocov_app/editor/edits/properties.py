@@ -59,14 +59,14 @@ def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
     description = f"note on {obstacles}"
     if not note:
         description = f"note on {obstacles} removed"
-    return replace(_mark(sketch, selection, "", note=note), description=description)
+    return replace(_set_marks(sketch, selection, "", note=note), description=description)
 
 
 def group(sketch: Sketch, selection: Selection, name: str = "") -> Change:
     """Put the selected obstacles into a group with the given name, by default a new name."""
     require(len(selection.items) >= 2, "select two or more obstacles to group")
     name = create.clean_label(name) or _find_free_group(sketch)
-    return _mark(sketch, selection, f"grouped as “{name}”", group=name)
+    return _set_marks(sketch, selection, f"grouped as “{name}”", group=name)
 
 
 def _find_free_group(sketch: Sketch) -> str:
@@ -78,29 +78,29 @@ def ungroup(sketch: Sketch, selection: Selection) -> Change:
     """Take the selected obstacles out of their groups."""
     keys = [key for key in selection.items if sketch.get_item(key).group]
     require(keys, "select obstacles that are in a group")
-    return _mark(sketch, Selection.of(*keys), "ungrouped", group="")
+    return _set_marks(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
 def lock(sketch: Sketch, selection: Selection) -> Change:
     """Lock the selected obstacles, so that they cannot be selected with the mouse."""
-    change = _mark(sketch, selection, "locked", locked=True)
+    change = _set_marks(sketch, selection, "locked", locked=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
 
 def hide(sketch: Sketch, selection: Selection) -> Change:
     """Hide the selected obstacles in the editor; they stay part of the map."""
-    change = _mark(sketch, selection, "hidden", hidden=True)
+    change = _set_marks(sketch, selection, "hidden", hidden=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
 
-def release(sketch: Sketch) -> Change:
+def unlock_and_show_all(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected."""
     keys = [item.key for item in sketch.obstacles if not item.is_selectable]
     require(keys, "nothing is locked or hidden")
-    return _mark(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
+    return _set_marks(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
-def _mark(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
+def _set_marks(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
     """Set fields of the selected obstacles, given as keyword arguments."""
     require(selection.items, "select obstacles first")
     items = [replace(item, **marks) for item in selection.list_items(sketch)]
@@ -126,7 +126,7 @@ def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
     width = _check_size("width", width)
     walls: dict[Owner, Any] = {}
     for owner in selection.owners:
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, WallObstacle):
             walls[owner] = replace(shape, width=width)
     require(walls, "select walls first")
@@ -139,7 +139,7 @@ def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
     radius = _check_size("radius", radius)
     circles: dict[Owner, Any] = {}
     for owner in selection.owners:
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
             circles[owner] = replace(shape, radius=radius)
     require(circles, "select circles first, or starts that are discs")

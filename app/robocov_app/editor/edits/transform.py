@@ -58,17 +58,17 @@ class Affine:
     y0: float = 0.0
 
     @classmethod
-    def turn(cls, degrees: float, about: Point) -> Self:
+    def rotation(cls, degrees: float, about: Point) -> Self:
         """Return a counter-clockwise rotation about a point; multiples of 90° are exact."""
         cos, sin = compute_cos_sin(degrees)
-        return cls(cos, -sin, sin, cos)._fix(about)
+        return cls(cos, -sin, sin, cos)._with_fixed_point(about)
 
     @classmethod
-    def stretch(cls, factor_x: float, factor_y: float, about: Point) -> Self:
+    def scaling(cls, factor_x: float, factor_y: float, about: Point) -> Self:
         """Return a scaling by a factor along each axis about a point."""
-        return cls(factor_x, 0.0, 0.0, factor_y)._fix(about)
+        return cls(factor_x, 0.0, 0.0, factor_y)._with_fixed_point(about)
 
-    def _fix(self, point: Point) -> Self:
+    def _with_fixed_point(self, point: Point) -> Self:
         """Return the transformation with the same linear part that leaves a point in place."""
         x, y = point
         x0 = x - self.xx * x - self.xy * y
@@ -90,14 +90,14 @@ class Affine:
             return 1.0
         return factor_x
 
-    def ring(self, ring: Sequence[Point]) -> Ring:
+    def transform_points(self, points: Sequence[Point]) -> Ring:
         """Transform a sequence of points, m."""
-        x, y = geometry.to_array(ring).T
+        x, y = geometry.to_array(points).T
         new_x = self.xx * x + self.xy * y + self.x0
         new_y = self.yx * x + self.yy * y + self.y0
         return geometry.round_ring(np.column_stack([new_x, new_y]))
 
-    def apply(self, shape: Any) -> Any:
+    def transform(self, shape: Any) -> Any:
         """Transform an obstacle, a start, a path, or a density or part of it.
 
         Circles that are scaled unequally become polygons. Walls keep their width unless the scale is uniform.
@@ -118,21 +118,21 @@ class Affine:
                 changes[field.name] = _FIELD_MAPS[field.name](self, value)
         return replace(shape, **changes)
 
-    def _apply_to_rings(self, rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
-        return tuple(self.ring(ring) for ring in rings)
+    def _transform_rings(self, rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
+        return tuple(self.transform_points(ring) for ring in rings)
 
-    def _apply_to_point(self, point: Point) -> Point:
-        return self.ring([point])[0]
+    def _transform_point(self, point: Point) -> Point:
+        return self.transform_points([point])[0]
 
-    def _apply_to_parts(self, parts: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(self.apply(part) for part in parts)
+    def _transform_features(self, features: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(self.transform(feature) for feature in features)
 
-    def _apply_to_covariance(self, covariance: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _transform_covariance(self, covariance: Any) -> tuple[tuple[float, float], tuple[float, float]]:
         matrix = np.array([[self.xx, self.xy], [self.yx, self.yy]])
         (xx, xy), (_, yy) = (matrix @ np.array(covariance) @ matrix.T).tolist()
         return (xx, xy), (xy, yy)
 
-    def _apply_to_length(self, length: float) -> float:
+    def _transform_length(self, length: float) -> float:
         factor = self.factor
         if factor is None or factor == 1.0:
             return length
@@ -141,17 +141,17 @@ class Affine:
 
 # How to transform each field of obstacles, starts, paths and densities; other fields do not change.
 _FIELD_MAPS: dict[str, Callable[[Affine, Any], Any]] = {
-    "vertices": Affine.ring,
-    "points": Affine.ring,
-    "positions": Affine.ring,
-    "holes": Affine._apply_to_rings,
-    "center": Affine._apply_to_point,
-    "path": Affine.apply,
-    "peaks": Affine._apply_to_parts,
-    "areas": Affine._apply_to_parts,
-    "covariance": Affine._apply_to_covariance,
-    "width": Affine._apply_to_length,
-    "radius": Affine._apply_to_length,
+    "vertices": Affine.transform_points,
+    "points": Affine.transform_points,
+    "positions": Affine.transform_points,
+    "holes": Affine._transform_rings,
+    "center": Affine._transform_point,
+    "path": Affine.transform,
+    "peaks": Affine._transform_features,
+    "areas": Affine._transform_features,
+    "covariance": Affine._transform_covariance,
+    "width": Affine._transform_length,
+    "radius": Affine._transform_length,
 }
 
 
@@ -164,7 +164,7 @@ def rotate(sketch: Sketch, selection: Selection, degrees: float, about: Point | 
     """Rotate the selection counter-clockwise about a point, m, by default the center of its bounding box."""
     require(math.isfinite(degrees), "expected an angle in degrees")
     center = about or _compute_center(sketch, selection)
-    return _transform(sketch, selection, Affine.turn(degrees, center), "turned")
+    return _transform(sketch, selection, Affine.rotation(degrees, center), "turned")
 
 
 def scale(
@@ -178,7 +178,7 @@ def scale(
         if not MIN_SIZE_M / MAX_SIZE_M <= abs(factor) <= MAX_SIZE_M / MIN_SIZE_M:
             raise MapError("expected a factor that is not 0")
     center = about or _compute_center(sketch, selection)
-    return _transform(sketch, selection, Affine.stretch(factor_x, factor_y, center), "scaled")
+    return _transform(sketch, selection, Affine.scaling(factor_x, factor_y, center), "scaled")
 
 
 def resize(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
@@ -199,15 +199,28 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
     _check_size(width, present_width, "width")
     _check_size(height, present_height, "height")
     require(width is not None or height is not None, "expected a width or a height")
-    # 0 stands for a factor that is not given.
-    factor_x = (width or 0.0) / max(present_width, MIN_SIZE_M)
-    factor_y = (height or 0.0) / max(present_height, MIN_SIZE_M)
-    if width is None or height is None:
-        factor = factor_x or factor_y
-        return _transform(sketch, selection, Affine.stretch(factor, factor, (low_x, low_y)), "resized")
-    # Walls keep their width, so the box does not scale exactly by the factors, which are found by iteration.
+    if width is not None and height is not None:
+        return _scale_to_size(sketch, selection, width, height)
+    factor = 1.0
+    if width is not None:
+        factor = width / present_width
+    elif height is not None:
+        factor = height / present_height
+    return _transform(sketch, selection, Affine.scaling(factor, factor, (low_x, low_y)), "resized")
+
+
+def _scale_to_size(sketch: Sketch, selection: Selection, width: float, height: float) -> Change:
+    """Scale the selection so that its bounding box has a width and a height, m.
+
+    Walls keep their width, so the box does not scale exactly by the factors, which are found by iteration.
+    """
+    low_x, low_y, high_x, high_y = _require_bounds(sketch, selection)
+    present_width = high_x - low_x
+    present_height = high_y - low_y
+    factor_x = width / present_width
+    factor_y = height / present_height
     for _ in range(MAX_RESIZE_STEPS):
-        affine = Affine.stretch(factor_x or factor_y, factor_y or factor_x, (low_x, low_y))
+        affine = Affine.scaling(factor_x, factor_y, (low_x, low_y))
         change = _transform(sketch, selection, affine, "resized")
         box = _require_bounds(change.sketch, change.selection)
         missing_width = width - (box[2] - box[0])
@@ -248,7 +261,7 @@ def mirror(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """
     require(axis in ("x", "y"), "expected an axis x or y")
     factor_x = -1.0 if axis == "x" else 1.0
-    affine = Affine.stretch(factor_x, -factor_x, _compute_center(sketch, selection))
+    affine = Affine.scaling(factor_x, -factor_x, _compute_center(sketch, selection))
     return _transform(sketch, selection, affine, "mirrored")
 
 
@@ -328,39 +341,44 @@ def distribute(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """
     require(axis in ("x", "y"), "expected an axis x or y")
     # Indices of the minimum and maximum along the axis in a box.
-    low = "xy".index(axis)
-    high = low + 2
-    boxes = sorted(_list_boxes(sketch, selection).items(), key=lambda pair: (pair[1][low], pair[1][high]))
+    low_index = "xy".index(axis)
+    high_index = low_index + 2
+    boxes = sorted(
+        _list_boxes(sketch, selection).items(), key=lambda pair: (pair[1][low_index], pair[1][high_index])
+    )
     require(len(boxes) >= 3, "select three or more obstacles or starts to distribute")
-    start = boxes[0][1][low]
-    sizes = [box[high] - box[low] for _, box in boxes]
-    gap = (boxes[-1][1][high] - start - sum(sizes)) / (len(boxes) - 1)
+    start = boxes[0][1][low_index]
+    end = boxes[-1][1][high_index]
+    sizes = [box[high_index] - box[low_index] for _, box in boxes]
+    gap = (end - start - sum(sizes)) / (len(boxes) - 1)
     offsets: dict[Owner, float] = {}
+    position = start
     for (owner, box), size in zip(boxes, sizes, strict=True):
-        offsets[owner] = start - box[low]
-        start += size + gap
+        offsets[owner] = position - box[low_index]
+        position += size + gap
     distributed = _move_objects(sketch, offsets, along_x=axis == "x")
     return Change(distributed, selection, f"{Selection.of(*offsets).describe(sketch)} distributed")
 
 
 def level_map(sketch: Sketch, a: Point, b: Point) -> Change:
     """Rotate map, picture and density about point `a` so that the line to `b` is horizontal or vertical."""
-    require(math.dist(a, b) >= MIN_SIZE_M, "expected two points that are apart")
-    degrees = geometry.compute_levelling_angle(a, b)
-    affine = Affine.turn(degrees, a)
+    require(math.dist(a, b) >= MIN_SIZE_M, "expected two different points")
+    degrees = geometry.compute_leveling_angle(a, b)
+    affine = Affine.rotation(degrees, a)
     everything = Selection.of(*sketch.owners).restrict_to(sketch)
     background = sketch.background
     if background is not None:
         background = rotate_background(background, degrees, a)
-    turned = _apply_affine(sketch, everything, affine)
-    turned = replace(turned, background=background, density=_turn_density(sketch.density, affine))
-    return Change(turned, Selection(), f"map turned by {degrees:.2f}°")
+    rotated = _apply_affine(sketch, everything, affine)
+    density = _rotate_density(sketch.density, affine)
+    rotated = replace(rotated, background=background, density=density)
+    return Change(rotated, Selection(), f"map turned by {degrees:.2f}°")
 
 
-def _turn_density(density: Density | None, affine: Affine) -> Density | None:
+def _rotate_density(density: Density | None, affine: Affine) -> Density | None:
     if isinstance(density, Gaussians | WeightedPolygons):
-        turned: Density = affine.apply(density)
-        return turned
+        rotated: Density = affine.transform(density)
+        return rotated
     if density is not None and not density.is_uniform:
         kind = density.kind
         raise MapError(f"a density that is a {kind} cannot be turned: remove it first by “density none”")
@@ -371,7 +389,7 @@ def compute_box(sketch: Sketch, owner: Owner) -> Box | None:
     """Return the bounding box of an object, m; None if it is empty."""
     # The box of a circle is computed from its radius, not from the polygon that approximates it.
     is_obstacle = isinstance(owner, int) and owner != BOUNDARY
-    if is_obstacle and not isinstance(sketch.find_object(owner), CircleObstacle):
+    if is_obstacle and not isinstance(sketch.get_shape(owner), CircleObstacle):
         assert isinstance(owner, int)
         covered = sketch.get_item(owner).geometry
         if covered.is_empty:
@@ -440,8 +458,8 @@ def _compute_level(box: Box, side: Side) -> float:
 
 
 def _copy(sketch: Sketch, objects: Selection, affine: Affine) -> tuple[Sketch, Selection]:
-    shapes = [(affine.apply(item.shape), item.note) for item in objects.list_items(sketch)]
-    starts = [(name, affine.apply(start)) for name, start in sketch.starts if name in objects.starts]
+    shapes = [(affine.transform(item.shape), item.note) for item in objects.list_items(sketch)]
+    starts = [(name, affine.transform(start)) for name, start in sketch.starts if name in objects.starts]
     return add_objects(sketch, shapes, starts)
 
 
@@ -453,7 +471,7 @@ def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bo
             shift = Affine(y0=offset)
             if along_x:
                 shift = Affine(x0=offset)
-            moved[owner] = shift.apply(sketch.find_object(owner))
+            moved[owner] = shift.transform(sketch.get_shape(owner))
     return sketch.with_objects(moved)
 
 
@@ -467,11 +485,11 @@ def _transform(sketch: Sketch, selection: Selection, affine: Affine, verb: str) 
 def _apply_affine(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     """Transform the selected objects, and the selected vertices of other objects."""
     vertices = [vertex for vertex in selection.vertices if vertex.owner not in selection.owners]
-    positions = affine.ring([find_position(sketch, vertex) for vertex in vertices])
+    positions = affine.transform_points([find_position(sketch, vertex) for vertex in vertices])
     objects = selection.items | selection.starts
-    sketch = sketch.with_objects({owner: affine.apply(sketch.find_object(owner)) for owner in objects})
+    sketch = sketch.with_objects({owner: affine.transform(sketch.get_shape(owner)) for owner in objects})
     if selection.boundary and sketch.boundary is not None:
-        sketch = replace(sketch, boundary=affine.ring(sketch.boundary))
+        sketch = replace(sketch, boundary=affine.transform_points(sketch.boundary))
     if vertices:
         sketch = place_vertices(sketch, dict(zip(vertices, positions, strict=True)))
     return sketch

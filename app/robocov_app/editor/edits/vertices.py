@@ -5,6 +5,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -15,15 +16,15 @@ from scipy.sparse.csgraph import connected_components
 from shapely import LineString, Polygon
 
 from robocov import environment as env
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
-    check_point,
     drop_repeated_points,
     round_length,
+    round_map_point,
     round_ring,
     to_array,
 )
@@ -89,7 +90,7 @@ def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
         find_position(sketch, vertex)
         positions_by_owner[vertex.owner][vertex] = position
     for owner, moved in positions_by_owner.items():
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, env.CircleObstacle | env.DiscStart):
             sketch = sketch.with_objects({owner: _reshape_circle(shape, moved)})
             continue
@@ -105,7 +106,7 @@ def _reshape_circle(
 ) -> env.CircleObstacle | env.DiscStart:
     """Return a circle moved to the position of its center vertex if given, or else with its rim moved."""
     vertex = min(positions, key=lambda vertex: vertex.index)
-    position = check_point(positions[vertex])
+    position = round_map_point(positions[vertex])
     # Vertex 0 is the center; the others are on the rim.
     if vertex.index == 0:
         return replace(circle, center=position)
@@ -119,7 +120,7 @@ def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
     rings = [list(ring) for ring in sketch.list_vertex_rings(edge.owner)]
     edge_counts = {ring.number: ring.edge_count for ring in sketch.list_rings(edge.owner)}
     require(0 <= edge.index < edge_counts.get(edge.ring, 0), "this edge no longer exists")
-    rings[edge.ring].insert(edge.index + 1, check_point(edge.point))
+    rings[edge.ring].insert(edge.index + 1, round_map_point(edge.point))
     inserted = Vertex(edge.owner, edge.ring, edge.index + 1)
     return Change(
         sketch.with_rings(edge.owner, rings),
@@ -143,7 +144,7 @@ def delete_vertices(sketch: Sketch, selection: Selection) -> Change:
 
 def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[int, set[int]]) -> Sketch:
     """Delete vertices of one object, given by ring; delete the object if too few vertices remain."""
-    shape = sketch.find_object(owner)
+    shape = sketch.get_shape(owner)
     if isinstance(shape, env.DiscStart):
         raise MapError("the points of a disc cannot be deleted: delete the start itself")
     if isinstance(shape, env.CircleObstacle):
@@ -174,7 +175,7 @@ def _group_by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, di
 def fill_hole(sketch: Sketch, key: int, ring: int) -> Change:
     """Fill a hole of a polygon, given by the number of its ring."""
     rings = sketch.list_vertex_rings(key)
-    if not isinstance(sketch.find_object(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
+    if not isinstance(sketch.get_shape(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
         raise MapError("there is no such hole")
     filled = sketch.with_rings(key, rings[:ring] + rings[ring + 1 :])
     return Change(filled, Selection.of(key), f"hole of {sketch.display_name(key)} filled")
@@ -226,7 +227,7 @@ def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool)
             points.append(_build_arc(ring, index, cuts[index]))
         else:
             points.append(np.array([point]))
-    return drop_repeated_points(round_ring(np.concatenate(points)), closed=is_closed)
+    return drop_repeated_points(round_ring(np.concatenate(points)), is_closed=is_closed)
 
 
 def _compute_cuts(
@@ -252,8 +253,9 @@ def _compute_cuts(
                 required += cuts[neighbor].length
                 reason = " for the corners at both ends"
             if required > edge_length + _EDGE_TOLERANCE_M:
-                lengths = f"{round_length(required):g} m of an edge that is {round_length(edge_length):g} m"
-                raise MapError(f"that takes {lengths} long{reason}: expected less")
+                needed = f"{round_length(required):g} m of an edge{reason}"
+                available = f"{round_length(edge_length):g} m"
+                raise MapError(f"the cut needs {needed}, but the edge is {available} long")
     return cuts
 
 
@@ -294,7 +296,7 @@ def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     index = 0
     if vertex.index > 0:
         index = len(points)
-    extended = sketch.with_rings(vertex.owner, [(*points[:index], check_point(point), *points[index:])])
+    extended = sketch.with_rings(vertex.owner, [(*points[:index], round_map_point(point), *points[index:])])
     selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, index)}))
     return Change(extended, selection, f"{sketch.display_name(vertex.owner)} extended")
 
@@ -313,7 +315,7 @@ def split_wall(sketch: Sketch, vertex: Vertex) -> Change:
 def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
     """Return the wall of a vertex; raise MapError if the vertex no longer exists or is not part of a wall."""
     find_position(sketch, vertex)
-    wall = sketch.find_object(vertex.owner)
+    wall = sketch.get_shape(vertex.owner)
     if not isinstance(wall, env.WallObstacle):
         raise MapError("this is not a wall")
     return wall
@@ -338,13 +340,11 @@ def _join_lines(lines: list[Ring]) -> Ring:
     chain = lines[0]
     remaining = lines[1:]
     while remaining:
-        pairs: list[tuple[float, int, Ring, Ring, Ring]] = []
+        joints: list[tuple[Ring, Ring, Ring]] = []
         for line in remaining:
-            for head in (chain, chain[::-1]):
-                for tail in (line, line[::-1]):
-                    # The second number makes all entries different, so that min compares no rings.
-                    pairs.append((math.dist(head[-1], tail[0]), len(pairs), head, tail, line))
-        _, _, head, tail, line = min(pairs)
+            ends = product((chain, chain[::-1]), (line, line[::-1]))
+            joints.extend((head, tail, line) for head, tail in ends)
+        head, tail, line = min(joints, key=lambda joint: math.dist(joint[0][-1], joint[1][0]))
         if math.dist(head[-1], tail[0]) <= JOIN_DISTANCE_M:
             tail = tail[1:]
         chain = (*head, *tail)
@@ -380,7 +380,7 @@ def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN
         return tuple(_straighten_ring(ring, degrees, is_closed) for ring in rings)
 
     changed, replaced = _redraw(sketch, selection, redraw)
-    require(replaced, f"no edge is within {degrees:g} degrees of level or upright, and not so already")
+    require(replaced, f"no edge to straighten is within {degrees:g} degrees of the horizontal or vertical")
     description = f"{format_count(len(replaced), 'outline')} straightened"
     return Change(changed, selection.without_vertices(), description)
 
@@ -458,21 +458,44 @@ def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
         # The last vertex of a line has no edge.
         edges[-1] = np.nan
     max_slope = math.tan(math.radians(degrees))
-    extents = np.abs(edges)
-    moved = points.copy()
-    # The ends of consecutive horizontal edges get the same y, those of vertical edges the same x.
-    for axis in (1, 0):
-        is_straight = extents[:, axis] <= max_slope * extents[:, 1 - axis]
-        straight = np.flatnonzero(is_straight & (extents.max(axis=1) > 0.0))
-        if len(straight) < count:
-            connections = (np.ones(len(straight)), (straight, (straight + 1) % count))
-            graph = coo_array(connections, shape=(count, count))
-            _, runs = connected_components(graph, directed=False)
-            low = ndimage.minimum(points[:, axis], runs, runs)
-            high = ndimage.maximum(points[:, axis], runs, runs)
-            moved[:, axis] = (low + high) / 2
+    widths, heights = np.abs(edges).T
+    has_length = np.maximum(widths, heights) > 0.0
+    xs, ys = points.T
+    moved = np.column_stack(
+        [
+            _align_straight_edges(xs, (widths <= max_slope * heights) & has_length),
+            _align_straight_edges(ys, (heights <= max_slope * widths) & has_length),
+        ]
+    )
     if is_closed:
         has_corners = len({tuple(point) for point in moved.tolist()}) >= 3
         if not has_corners or Polygon(moved).area == 0.0:
             return ring
     return round_ring(moved)
+
+
+def _align_straight_edges(coordinates: Array, is_straight: BoolArray) -> Array:
+    """Give both ends of each straight edge, and thus those of consecutive ones, the same coordinate.
+
+    Parameters
+    ----------
+    coordinates : (k,) array, m
+        The y coordinates for horizontal edges, the x coordinates for vertical ones.
+    is_straight : (k,) array of bool
+        Whether the edge from each vertex to the next is to be straight.
+
+    Returns
+    -------
+    (k,) array, m
+        New coordinates; unchanged if all edges are straight.
+    """
+    count = len(coordinates)
+    straight = np.flatnonzero(is_straight)
+    if len(straight) == count:
+        return coordinates
+    connections = (np.ones(len(straight)), (straight, (straight + 1) % count))
+    graph = coo_array(connections, shape=(count, count))
+    _, components = connected_components(graph, directed=False)
+    low = ndimage.minimum(coordinates, components, components)
+    high = ndimage.maximum(coordinates, components, components)
+    return np.asarray((low + high) / 2)

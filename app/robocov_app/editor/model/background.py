@@ -17,13 +17,15 @@ from robocov.environment import Point
 from robocov.errors import MapError
 from robocov.mapfile.models import to_json_value
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import compute_levelling_angle
+from robocov_app.editor.model.geometry import compute_leveling_angle
 from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 MAX_PIXELS = 64_000_000
 DEFAULT_WIDTH_M = 20.0
 MIN_PIXEL_M = 1e-6
 MAX_PIXEL_M = 1e3
+_KEYS = {"rotation_deg": "turn"}
+"""JSON keys of attributes in map files that differ from the name of the attribute."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Background:
         Side of a pixel, m.
     corner : tuple of float
         Position of the lower left corner, m.
-    turn : float
+    rotation_deg : float
         Counter-clockwise rotation about that corner, degrees.
     opacity : float
         Opacity from 0 (invisible) to 1.
@@ -54,7 +56,7 @@ class Background:
     pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
     scale: Annotated[float, Field(gt=0.0)] = 0.01
     corner: tuple[float, float] = (0.0, 0.0)
-    turn: float = 0.0
+    rotation_deg: float = 0.0
     opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     shown: bool = True
 
@@ -62,7 +64,7 @@ class Background:
         """Return the position of a pixel on the map, m."""
         x = pixel[0] * self.scale
         y = (self.pixels[1] - pixel[1]) * self.scale
-        cos, sin = compute_cos_sin(self.turn)
+        cos, sin = compute_cos_sin(self.rotation_deg)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
 
     @property
@@ -83,16 +85,18 @@ class Background:
 
     def to_document(self) -> dict[str, Any]:
         """Return the JSON object that describes the picture in a map file."""
-        document = {name: to_json_value(value) for name, value in asdict(self).items()}
+        document = {_KEYS.get(name, name): to_json_value(value) for name, value in asdict(self).items()}
         return document | {"shown": self.shown}
 
     @classmethod
     def from_document(cls, document: Any) -> "Background | None":
         """Return the picture that a JSON value describes; None if the value is something else."""
-        if not isinstance(document, dict) or set(document) != {field.name for field in fields(cls)}:
+        keys = {field.name: _KEYS.get(field.name, field.name) for field in fields(cls)}
+        if not isinstance(document, dict) or set(document) != set(keys.values()):
             return None
+        values = {name: document[key] for name, key in keys.items()}
         try:
-            background = _ADAPTER.validate_json(json.dumps(document), strict=True)
+            background = _ADAPTER.validate_json(json.dumps(values), strict=True)
         except ValidationError:
             return None
         if math.prod(background.pixels) > MAX_PIXELS:
@@ -142,7 +146,7 @@ def scale_to_length(background: Background, a: Point, b: Point, length: float) -
 def level_background(background: Background, a: Point, b: Point) -> Background:
     """Rotate a picture about point `a` so that the line to `b` is horizontal or vertical."""
     _require_apart(background, a, b)
-    return rotate_background(background, compute_levelling_angle(a, b), a)
+    return rotate_background(background, compute_leveling_angle(a, b), a)
 
 
 def rotate_background(background: Background, degrees: float, about: Point) -> Background:
@@ -151,7 +155,9 @@ def rotate_background(background: Background, degrees: float, about: Point) -> B
     dx = background.corner[0] - about[0]
     dy = background.corner[1] - about[1]
     corner = (about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy)
-    return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
+    return replace(
+        background, corner=corner, rotation_deg=math.remainder(background.rotation_deg + degrees, 360.0)
+    )
 
 
 def _require_apart(background: Background, a: Point, b: Point) -> None:
@@ -162,7 +168,7 @@ def _require_apart(background: Background, a: Point, b: Point) -> None:
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 """Marks of an obstacle with their types. Empty and false values are not written to files."""
 
-_HOME = "editor"  # free key of the editor, unless another program uses it
+_PREFERRED_KEY = "editor"  # free key of the editor, unless another program uses it
 # Sections of the editor's key, each a list of entries with some of these marks.
 _SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OWN_KEYS = {*_SECTIONS, "background"}
@@ -191,13 +197,13 @@ class ReadMarks(NamedTuple):
 
 
 def write_marks(
-    extra: FreeKeys, marks: MarksByIndex, names: Names, background: Background | None
+    free_keys: FreeKeys, marks: MarksByIndex, names: Names, background: Background | None
 ) -> dict[str, Any]:
     """Return the free keys of a map, including the marks and the picture.
 
     Parameters
     ----------
-    extra : mapping
+    free_keys : mapping
         Free keys of other programs.
     marks : dict of int to dict
         Marks of obstacles, by obstacle index.
@@ -206,18 +212,18 @@ def write_marks(
     background : Background or None
         The picture under the map.
     """
-    own: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     for section, mark_names in _SECTIONS.items():
         for index in sorted(marks):
             values = {name: marks[index][name] for name in mark_names if name in marks[index]}
             if values:
-                own.setdefault(section, []).append({**_identify(index, names), **values})
+                content.setdefault(section, []).append({**_identify(index, names), **values})
     if background is not None:
-        own["background"] = background.to_document()
-    if not own:
-        return dict(extra)
-    home = next(key for key in _list_homes() if _is_free(extra.get(key, {})))
-    return {**extra, home: {**extra.get(home, {}), **own}}
+        content["background"] = background.to_document()
+    if not content:
+        return dict(free_keys)
+    key = next(key for key in _list_own_keys() if _is_free(free_keys.get(key, {})))
+    return {**free_keys, key: {**free_keys.get(key, {}), **content}}
 
 
 def _identify(index: int, names: Names) -> dict[str, Any]:
@@ -228,14 +234,14 @@ def _identify(index: int, names: Names) -> dict[str, Any]:
     return {"obstacle": index, "name": name}
 
 
-def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
+def read_marks(free_keys: FreeKeys, names: Names) -> ReadMarks:
     """Read the marks and the picture from the free keys of a map, given the names of its obstacles.
 
     A key whose content the editor could not have written is left to other programs.
     """
-    # At most len(extra) keys can be in use, so the search ends after one more.
-    for home in islice(_list_homes(), len(extra) + 1):
-        content = extra.get(home)
+    # At most len(free_keys) keys can be in use, so the search ends after one more.
+    for key in islice(_list_own_keys(), len(free_keys) + 1):
+        content = free_keys.get(key)
         if not isinstance(content, dict) or _is_free(content):
             continue
         background = Background.from_document(content.get("background"))
@@ -243,13 +249,13 @@ def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
         if has_broken_background or not _has_valid_sections(content):
             continue
         marks, rest = _assign_marks(content, names)
-        others = dict(extra)
+        others = dict(free_keys)
         if rest:
-            others[home] = rest
+            others[key] = rest
         else:
-            del others[home]
+            del others[key]
         return ReadMarks(marks, background, others)
-    return ReadMarks({}, None, dict(extra))
+    return ReadMarks({}, None, dict(free_keys))
 
 
 def _has_valid_sections(content: FreeKeys) -> bool:
@@ -283,10 +289,10 @@ def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[s
     return marks, rest
 
 
-def _list_homes() -> Iterator[str]:
+def _list_own_keys() -> Iterator[str]:
     """Yield the free keys that the editor may use, in order of preference."""
-    yield _HOME
-    yield from (f"{_HOME} {k}" for k in count(2))
+    yield _PREFERRED_KEY
+    yield from (f"{_PREFERRED_KEY} {k}" for k in count(2))
 
 
 def _is_free(content: object) -> bool:

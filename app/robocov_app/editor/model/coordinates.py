@@ -77,7 +77,7 @@ def parse_point(text: str, *, last: Point | None = None) -> Point:
     """
     typed = _clean(text)
     is_relative = typed[:1] in ("@", "+")
-    require(last or not is_relative, f"{quote(text)}: there is no point before that it could be relative to")
+    require(last or not is_relative, f"{quote(text)}: a relative position needs a previous point")
     length, angle_sign, angle = typed.removeprefix("@").strip().partition("<")
     if angle_sign:
         x, y = _convert_polar(_parse_length(length.strip()), _parse_angle(angle), text)
@@ -89,7 +89,9 @@ def parse_point(text: str, *, last: Point | None = None) -> Point:
         x += last[0]
         y += last[1]
     if max(abs(x), abs(y)) > MAX_COORDINATE_M:
-        raise MapError(f"{quote(text)}: maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin")
+        raise MapError(
+            f"{quote(text)}: coordinates must be within {MAX_COORDINATE_M / 1000:.0f} km of the origin"
+        )
     return _round_exactly(x), _round_exactly(y)
 
 

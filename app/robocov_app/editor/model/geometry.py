@@ -43,25 +43,25 @@ def round_ring(points: Sequence[Point] | Array) -> Ring:
     coordinates = to_array(points)
     # This comparison is also false for nan.
     is_within_reach = np.all(np.abs(coordinates) <= MAX_COORDINATE_M)
-    limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
+    limit = f"coordinates must be within {MAX_COORDINATE_M / 1000:.0f} km of the origin"
     require(is_within_reach, f"that is too far away: {limit}")
     return tuple([(x, y) for x, y in (np.round(coordinates, DECIMALS) + 0.0).tolist()])
 
 
-def check_point(point: Point) -> Point:
+def round_map_point(point: Point) -> Point:
     """Round a point to tenths of a millimeter; raise MapError if it is too far from the origin."""
     return round_ring([point])[0]
 
 
-def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
+def drop_repeated_points(ring: Iterable[Point], *, is_closed: bool = True) -> Ring:
     """Remove points that equal the previous one; in a closed ring, also a last one that equals the first."""
     points = [point for point, _ in groupby(ring)]
-    if closed and len(points) > 1 and points[0] == points[-1]:
+    if is_closed and len(points) > 1 and points[0] == points[-1]:
         points.pop()
     return tuple(points)
 
 
-def compute_levelling_angle(a: Point, b: Point) -> float:
+def compute_leveling_angle(a: Point, b: Point) -> float:
     """Return the smallest rotation that makes the line from `a` to `b` horizontal or vertical, degrees."""
     return 90.0 * round(compute_bearing(a, b) / 90.0) - compute_bearing(a, b)
 

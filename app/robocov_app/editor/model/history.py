@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 
+class State(NamedTuple):
+    """A map and the selection in it."""
+
+    sketch: Sketch
+    selection: Selection
+
+
 @dataclass
 class _Step:
-    """A step of the history: the states before and after a change, both with its description."""
+    """A step of the history: the states before and after a change."""
 
-    before: Change
-    after: Change
+    before: State
+    after: State
+    description: str
     drag: Hashable | None
 
 
@@ -64,7 +73,7 @@ class UndoHistory:
         bool
             Whether anything other than the selection has changed.
         """
-        before = Change(self.sketch, self.selection, change.description)
+        before = State(self.sketch, self.selection)
         continues_drag = drag is not None and bool(self._undoable) and self._undoable[-1].drag == drag
         merges = continues_drag and not self.starts_new_step
         self.starts_new_step = False
@@ -72,12 +81,13 @@ class UndoHistory:
         if change.sketch == self.sketch:
             return False
         if merges:
-            before = replace(self._undoable.pop().before, description=change.description)
+            before = self._undoable.pop().before
         self.sketch = change.sketch
         self._redoable = []
         # A drag that has returned to its start leaves no step.
         if change.sketch != before.sketch:
-            self._undoable.append(_Step(before, change, drag))
+            after = State(change.sketch, change.selection)
+            self._undoable.append(_Step(before, after, change.description, drag))
         return True
 
     def undo(self) -> Change | None:
@@ -92,7 +102,7 @@ class UndoHistory:
             return None
         step = self._undoable.pop()
         self._redoable.append(step)
-        return self._go_to(step.before)
+        return self._go_to(step.before, step.description)
 
     def redo(self) -> Change | None:
         """Redo the most recently undone change.
@@ -106,13 +116,13 @@ class UndoHistory:
             return None
         step = self._redoable.pop()
         self._undoable.append(step)
-        return self._go_to(step.after)
+        return self._go_to(step.after, step.description)
 
-    def _go_to(self, state: Change) -> Change:
+    def _go_to(self, state: State, description: str) -> Change:
         self.sketch = state.sketch
         self.selection = state.selection
         self.starts_new_step = True
-        return state
+        return Change(state.sketch, state.selection, description)
 
     def rewrite_all(self, change: Callable[[Sketch], Sketch]) -> None:
         """Replace the sketches of the current state and of all steps, without adding a step.
@@ -129,19 +139,19 @@ class UndoHistory:
         # Steps that share a sketch object still share one afterwards.
         changed_by_id = {id(sketch): change(sketch) for sketch in sketches}
         for step in steps:
-            step.before = replace(step.before, sketch=changed_by_id[id(step.before.sketch)])
-            step.after = replace(step.after, sketch=changed_by_id[id(step.after.sketch)])
+            step.before = step.before._replace(sketch=changed_by_id[id(step.before.sketch)])
+            step.after = step.after._replace(sketch=changed_by_id[id(step.after.sketch)])
         self.sketch = changed_by_id[id(self.sketch)]
 
     @property
     def undo_descriptions(self) -> tuple[str, ...]:
         """Descriptions of the changes that can be undone, the newest first."""
-        return tuple(step.after.description for step in reversed(self._undoable))
+        return tuple(step.description for step in reversed(self._undoable))
 
     @property
     def redo_descriptions(self) -> tuple[str, ...]:
         """Descriptions of the changes that can be redone, the next first."""
-        return tuple(step.after.description for step in reversed(self._redoable))
+        return tuple(step.description for step in reversed(self._redoable))
 
     def build_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state together with all steps."""

@@ -190,7 +190,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
         middle = _compute_middle(gap)
         message = f"the gap at {format_position(*middle)} is {gap.width:.3g} m wide: {reason}"
         mark = int(tree.nearest(shapely.Point(middle)))
-        problem = Problem(message, LineString(gap.between), None, False, "narrow")
+        problem = Problem(message, LineString(gap.between), is_error=False, kind="narrow")
         # Gaps are sorted by width, so the first one of a mark is the narrowest.
         problem_by_mark.setdefault(mark, problem)
     problems = list(problem_by_mark.values())
@@ -198,7 +198,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
     if not others:
         return problems
     geometry = shapely.union_all([problem.geometry for problem in others])
-    return [*problems[:_MAX_GAPS], Problem(f"{len(others)} more gaps are {reason}", geometry, None, False)]
+    return [*problems[:_MAX_GAPS], Problem(f"{len(others)} more gaps are {reason}", geometry, is_error=False)]
 
 
 def _build_reach_warnings(
@@ -206,7 +206,7 @@ def _build_reach_warnings(
 ) -> list[Problem]:
     """Warn if robots fit nowhere, or if they cannot reach all parts of the free space from the largest."""
     if not free.is_empty and not swept:
-        return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
+        return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, is_error=False)]
     # Parts without any connection are reported as sealed rooms, so each of them may have one swept part.
     min_area = np.pi * radius**2
     if len(swept) <= sum(part.area >= min_area for part in free.geoms):
@@ -216,7 +216,7 @@ def _build_reach_warnings(
         f"robots of radius {radius:g} m cannot pass between {len(swept)} parts of the free space: "
         f"{sealed_area:.3g} m² are cut off from the largest"
     )
-    return [Problem(message, cut_off, None, False, "cut off")]
+    return [Problem(message, cut_off, is_error=False, kind="cut off")]
 
 
 def _list_polygons(geometry: shapely.Geometry) -> list[Polygon]:

@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import shapely
 
@@ -29,6 +29,14 @@ _STEP = re.compile(r"\[(\d+)\]|\.(\w+)|\[\"([^\"]*)\"\]")
 _NOUNS = {"vertices": "corner", "points": "point", "positions": "position", "holes": "hole", "areas": "area"}
 
 
+class _PathStep(NamedTuple):
+    """A step of a JSON path: a number, an attribute or a key; the other two are empty."""
+
+    number: str
+    attribute: str
+    key: str
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """An error or a warning about a map.
@@ -36,8 +44,7 @@ class Problem:
     Attributes
     ----------
     message : str
-        Message for the user. If it begins with a colon or a blank, the name of the object must be put before
-        it.
+        Message for the user.
     geometry : shapely.Geometry or None
         Location of the problem on the map, m; None if it has no location.
     owner : Owner or None
@@ -72,30 +79,32 @@ def translate_message(message: str, sketch: Sketch) -> str:
 def _translate_path(match: re.Match[str], sketch: Sketch) -> str:
     """Translate a matched path such as "obstacles[2].points[1]" to a name such as "wall 3, point 2"."""
     section = match[1]
-    words = [section]
-    noun = "corner"
-    # Index, attribute and key of each step; two of the three are empty.
-    steps: list[tuple[str, str, str]] = _STEP.findall(match[2])
+    steps = [_PathStep(*step) for step in _STEP.findall(match[2])]
     if section == "obstacles":
-        index = steps[0][0]
-        if not index or int(index) >= len(sketch.obstacles):
+        number = steps[0].number
+        if not number or int(number) >= len(sketch.obstacles):
             return match[0]
-        steps.pop(0)
-        words = [format_numbered_name(sketch, sketch.obstacles[int(index)].key)]
-    elif section == "starts":
-        words = [f"start “{''.join(steps.pop(0))}”"]
-    for number, name, key in steps:
-        if not number:
-            noun = _NOUNS.get(name or key, name or key)
+        obstacle = format_numbered_name(sketch, sketch.obstacles[int(number)].key)
+        return ", ".join([obstacle, *_describe_steps(steps[1:])])
+    if section == "starts":
+        name = "".join(steps[0])
+        return ", ".join([f"start “{name}”", *_describe_steps(steps[1:])])
+    return ", ".join([section, *_describe_steps(steps)])
+
+
+def _describe_steps(steps: list[_PathStep]) -> list[str]:
+    """Describe the steps below an object, for example [0] after .holes as "hole 1"."""
+    words: list[str] = []
+    noun = "corner"
+    for step in steps:
+        if not step.number:
+            name = step.attribute or step.key
+            noun = _NOUNS.get(name, name)
             words.append(noun)
         elif noun:
-            numbered = f"{noun} {int(number) + 1}"
-            if words[-1] == noun:
+            if words and words[-1] == noun:
                 words.pop()
-            words.append(numbered)
-            # A hole is followed by the number of its corner.
-            is_hole = noun == "hole"
-            noun = ""
-            if is_hole:
-                noun = "corner"
-    return ", ".join(words)
+            words.append(f"{noun} {int(step.number) + 1}")
+            # A hole is followed by the number of its corner; nothing else is numbered twice.
+            noun = "corner" if noun == "hole" else ""
+    return words

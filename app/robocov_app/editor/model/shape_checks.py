@@ -15,6 +15,7 @@ from robocov.environment import Obstacle, Point, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.problem import Problem, format_position
+from robocov_app.editor.model.selection import format_numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 MAX_TEXT_CHARACTERS = 10_000
@@ -31,20 +32,21 @@ def check_shapes(sketch: Sketch) -> Iterator[Problem]:
         yield Problem(f"the description is longer than {MAX_TEXT_CHARACTERS} characters", None)
     if sketch.boundary is None:
         message = "there is no boundary: draw one around the free space"
-        yield Problem(message, None, BOUNDARY, kind="no boundary")
+        yield Problem(message, None, owner=BOUNDARY, kind="no boundary")
     for owner in sketch.owners:
         if isinstance(owner, str):
             for text in _check_label(owner):
-                yield Problem(f"a start {text}", None, owner)
+                yield Problem(f"a start {text}", None, owner=owner)
         for problem in _check_object(sketch, owner):
-            yield replace(problem, owner=owner, message=f": {problem.message}")
+            name = format_numbered_name(sketch, owner)
+            yield replace(problem, owner=owner, message=f"{name}: {problem.message}")
 
 
 def _check_label(name: str) -> Iterator[str]:
     if not name:
         yield "has no name"
     elif len(name) > MAX_LABEL_CHARACTERS:
-        yield f"has a name of {len(name)} characters: at most {MAX_LABEL_CHARACTERS} are possible"
+        yield f"has a name of {len(name)} characters: it must not exceed {MAX_LABEL_CHARACTERS}"
     elif _CONTROL_CHARACTER.search(name):
         yield "has a name with line breaks or other control characters"
 
@@ -55,7 +57,7 @@ def _check_object(sketch: Sketch, owner: Owner) -> Iterator[Problem]:
         if sketch.boundary is not None:
             yield from _check_ring(sketch.boundary, "it")
         return
-    shape = sketch.find_object(owner)
+    shape = sketch.get_shape(owner)
     if isinstance(shape, Obstacle) and shape.name is not None:
         for text in _check_label(shape.name):
             yield Problem(text, None)
@@ -81,9 +83,9 @@ def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
     if len(points):
         extent = np.ptp(points, axis=0).max()
     if len(points) < 2 or extent < MIN_SIZE_M:
-        yield Problem("it has no length: it needs two points that are apart", _build_line(points))
+        yield Problem("it has no length: it needs two different points", _build_line(points))
     elif extent > MAX_SIZE_M:
-        message = f"it is {extent:.5g} m long: at most {MAX_SIZE_M / 1000:g} km are possible"
+        message = f"it is {extent:.5g} m long: it must not exceed {MAX_SIZE_M / 1000:g} km"
         yield Problem(message, _build_line(points))
 
 
@@ -140,7 +142,7 @@ def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
     polygon = Polygon(points)
     if extent.max() > MAX_SIZE_M:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        message = f"{label} is {size} large: at most {MAX_SIZE_M / 1000:g} km are possible"
+        message = f"{label} is {size} large: it must not exceed {MAX_SIZE_M / 1000:g} km"
         yield Problem(message, _build_line(points))
     elif _is_flat(polygon, extent):
         yield Problem(f"{label} encloses nothing: its corners lie on one line", _build_line(points))
@@ -190,13 +192,13 @@ def _check_size(label: str, size: float, points: Ring) -> Iterator[Problem]:
     """Yield an error if a width or radius, m, is out of range, located at the first of the given points."""
     if MIN_SIZE_M <= size <= MAX_SIZE_M:
         return
-    limit = f"at most {MAX_SIZE_M / 1000:g} km"
+    limit = f"must not exceed {MAX_SIZE_M / 1000:g} km"
     if size < MIN_SIZE_M:
-        limit = f"at least {1000 * MIN_SIZE_M:g} mm"
+        limit = f"must be at least {1000 * MIN_SIZE_M:g} mm"
     point = None
     if points:
         point = shapely.Point(points[0])
-    yield Problem(f"its {label} is {size:.5g} m: {limit} is possible", point)
+    yield Problem(f"its {label} is {size:.5g} m: it {limit}", point)
 
 
 def _check_distance(points: Ring) -> Iterator[Problem]:
@@ -204,7 +206,7 @@ def _check_distance(points: Ring) -> Iterator[Problem]:
     for x, y in points:
         # This comparison is also false for nan.
         if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
-            limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
+            limit = f"coordinates must be within {MAX_COORDINATE_M / 1000:.0f} km of the origin"
             yield Problem(f"{format_position(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 

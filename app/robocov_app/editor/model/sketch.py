@@ -18,7 +18,12 @@ from robocov_app.editor.model.background import MARKS, Background, read_marks, w
 from robocov_app.editor.model.geometry import Box, to_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
-_SHARED = ("name", "description", "schema", "density")  # fields that sketches and environments have in common
+_COMMON_FIELDS = (
+    "name",
+    "description",
+    "schema",
+    "density",
+)  # fields that sketches and environments have in common
 BOUNDARY: Final = -1  # key of the boundary, which no obstacle has
 Owner: TypeAlias = int | str
 """Identifies an object with vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
@@ -139,7 +144,7 @@ class Sketch:
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
-            **{name: getattr(environment, name) for name in _SHARED},
+            **{name: getattr(environment, name) for name in _COMMON_FIELDS},
         )
 
     def build_environment(self, where: str = "map") -> env.Environment:
@@ -158,7 +163,7 @@ class Sketch:
             obstacles=tuple(shapes),
             starts=dict(self.starts),
             extra=write_marks(self.extra, marks, [shape.name for shape in shapes], self.background),
-            **{name: getattr(self, name) for name in _SHARED},
+            **{name: getattr(self, name) for name in _COMMON_FIELDS},
         )
 
     def get_item(self, key: int) -> Item:
@@ -169,7 +174,7 @@ class Sketch:
         """Return a start by its name."""
         return dict(self.starts)[name]
 
-    def find_object(self, owner: Owner) -> Obstacle | StartSpec | None:
+    def get_shape(self, owner: Owner) -> Obstacle | StartSpec | None:
         """Return the shape of an obstacle, or a start; None for the boundary and missing objects."""
         if isinstance(owner, str):
             return dict(self.starts).get(owner)
@@ -200,7 +205,7 @@ class Sketch:
             if self.boundary is None:
                 return ()
             return (self.boundary,)
-        shape = self.find_object(owner)
+        shape = self.get_shape(owner)
         if isinstance(shape, env.PolygonObstacle):
             return (shape.vertices, *shape.holes)
         if isinstance(shape, env.WallObstacle):
@@ -217,7 +222,7 @@ class Sketch:
 
     def list_rings(self, owner: Owner) -> tuple[VertexRing, ...]:
         """Return the rings of an object with edges between its vertices; circles and starts have none."""
-        shape = self.find_object(owner)
+        shape = self.get_shape(owner)
         if isinstance(owner, str) or isinstance(shape, env.CircleObstacle):
             return ()
         is_closed = not isinstance(shape, env.WallObstacle)
@@ -229,7 +234,7 @@ class Sketch:
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
             return replace(self, boundary=line)
-        shape = self.find_object(owner)
+        shape = self.get_shape(owner)
         if isinstance(shape, env.PolygonObstacle):
             return self.with_objects({owner: replace(shape, vertices=line, holes=tuple(holes))})
         if isinstance(shape, env.WallObstacle):

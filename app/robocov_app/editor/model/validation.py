@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +10,7 @@ from shapely import MultiPoint, MultiPolygon, Polygon
 
 from robocov import environment as env
 from robocov.defaults import DEFAULT_RADIUS_M
-from robocov.environment import Point, Ring, StartSpec
+from robocov.environment import Point, Ring
 from robocov.errors import MapError, StartError, format_count, summarize_names
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov.mapfile.rules import check_rules
@@ -56,20 +55,11 @@ def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], M
         free = environment.free
         errors = _check_map_rules(sketch, environment)
     warnings = _list_warnings(sketch, free, radius, _list_owners(errors))
-    problems = [_add_name(problem, sketch) for problem in (*errors, *warnings)]
-    return tuple(problems), free
+    return (*errors, *warnings), free
 
 
 def _list_owners(problems: list[Problem]) -> set[Owner | None]:
     return {problem.owner for problem in problems}
-
-
-def _add_name(problem: Problem, sketch: Sketch) -> Problem:
-    """Put the name of the object before a message that begins with a colon or a blank."""
-    if problem.owner is None or problem.message[0] not in ": ":
-        return problem
-    name = format_numbered_name(sketch, problem.owner)
-    return replace(problem, message=name + problem.message)
 
 
 def _check_map_rules(sketch: Sketch, environment: env.Environment) -> list[Problem]:
@@ -106,13 +96,13 @@ def _check_free_space(sketch: Sketch, free: MultiPolygon, skipped: set[Owner | N
     if free.is_empty:
         if BOUNDARY not in skipped:
             hull = shapely.convex_hull(MultiPoint(sketch.boundary))
-            yield Problem("no free space is left inside the boundary", hull, BOUNDARY)
+            yield Problem("no free space is left inside the boundary", hull, owner=BOUNDARY)
         return
     for name, start in sketch.starts:
         if isinstance(start, env.PointsStart):
             yield from _check_positions(sketch, name, start, free)
         elif name not in skipped:
-            yield from _check_space(name, start, free, DEFAULT_RADIUS_M, is_error=True)
+            yield from _check_space(sketch, name, free, DEFAULT_RADIUS_M, is_error=True)
 
 
 def _check_positions(
@@ -126,27 +116,34 @@ def _check_positions(
         if len(covering):
             topmost = sketch.obstacles[int(covering.max())]
             where = f"inside {format_numbered_name(sketch, topmost.key)}"
-        message = f"{_describe_position(start, number)} is {where}"
-        yield Problem(message, points[number], name, kind="spot")
+        message = f"{_describe_position(sketch, name, number)} is {where}"
+        yield Problem(message, points[number], owner=name, kind="spot")
 
 
-def _describe_position(start: env.PointsStart, number: int) -> str:
-    return f": position {number + 1} at {format_position(*start.positions[number])}"
+def _describe_position(sketch: Sketch, name: str, number: int) -> str:
+    """Describe a position of a start, for example "start “left”: position 2 at (1.5, 2)"."""
+    start = sketch.get_start(name)
+    assert isinstance(start, env.PointsStart)
+    position = format_position(*start.positions[number])
+    return f"{format_numbered_name(sketch, name)}: position {number + 1} at {position}"
 
 
 def _check_space(
-    name: str, start: StartSpec, free: MultiPolygon, radius: float, *, is_error: bool
+    sketch: Sketch, name: str, free: MultiPolygon, radius: float, *, is_error: bool
 ) -> Iterator[Problem]:
     """Yield a problem if no robot with a radius, m, fits at a start."""
+    start = sketch.get_start(name)
+    label = format_numbered_name(sketch, name)
     try:
         env.Start(name, start, free).sample(1, radius=radius)
     except StartError:
         reason = f"has no room for a robot of radius {radius:g} m"
         if isinstance(start, env.DiscStart):
             disc = shapely.Point(start.center).buffer(start.radius)
-            yield Problem(f": its disc {reason}", disc, name, is_error, "no room")
+            message = f"{label}: its disc {reason}"
+            yield Problem(message, disc, owner=name, is_error=is_error, kind="no room")
         else:
-            yield Problem(f": the free space {reason}", None, name, is_error)
+            yield Problem(f"{label}: the free space {reason}", None, owner=name, is_error=is_error)
 
 
 def _list_warnings(
@@ -165,9 +162,9 @@ def _list_warnings(
         if name in skipped:
             continue
         if isinstance(start, env.PointsStart):
-            yield from _warn_of_tight_positions(name, start, free, radius)
+            yield from _warn_of_tight_positions(sketch, name, free, radius)
         elif radius > DEFAULT_RADIUS_M:
-            yield from _check_space(name, start, free, radius, is_error=False)
+            yield from _check_space(sketch, name, free, radius, is_error=False)
 
 
 def _warn_of_outside_obstacles(sketch: Sketch) -> Iterator[Problem]:
@@ -178,7 +175,8 @@ def _warn_of_outside_obstacles(sketch: Sketch) -> Iterator[Problem]:
     is_outside = ~shapely.intersects(inside, shapes) | shapely.touches(inside, shapes)
     for index in np.flatnonzero(is_outside & ~shapely.is_empty(shapes)).tolist():
         key = sketch.obstacles[index].key
-        yield Problem(" lies outside the boundary", shapes[index], key, False, "outside")
+        message = f"{format_numbered_name(sketch, key)} lies outside the boundary"
+        yield Problem(message, shapes[index], owner=key, is_error=False, kind="outside")
 
 
 def _warn_of_duplicates(sketch: Sketch) -> Iterator[Problem]:
@@ -187,7 +185,8 @@ def _warn_of_duplicates(sketch: Sketch) -> Iterator[Problem]:
         fields = tuple(value for name, value in vars(item.shape).items() if name not in ("name", "polygon"))
         form = (type(item.shape), *fields)
         if form in seen and not item.geometry.is_empty:
-            yield Problem(" duplicates another obstacle", item.geometry, item.key, False, "twice")
+            message = f"{format_numbered_name(sketch, item.key)} duplicates another obstacle"
+            yield Problem(message, item.geometry, owner=item.key, is_error=False, kind="twice")
         seen.add(form)
 
 
@@ -196,8 +195,10 @@ def _warn_of_repeated_vertices(sketch: Sketch) -> Iterator[Problem]:
         for _, ring, is_closed in sketch.list_rings(owner):
             repeated = _find_repeated_vertices(ring, is_closed)
             if repeated and len(set(ring)) >= 3:
-                message = f": two vertices have the same position, {format_position(*repeated[0])}"
-                yield Problem(message, MultiPoint(repeated), owner, False, "double")
+                name = format_numbered_name(sketch, owner)
+                position = format_position(*repeated[0])
+                message = f"{name}: two vertices have the same position, {position}"
+                yield Problem(message, MultiPoint(repeated), owner=owner, is_error=False, kind="double")
 
 
 def _find_repeated_vertices(ring: Ring, is_closed: bool) -> list[Point]:
@@ -213,28 +214,32 @@ def _find_repeated_vertices(ring: Ring, is_closed: bool) -> list[Point]:
 def _warn_of_blocked_paths(sketch: Sketch, skipped: set[Owner | None]) -> Iterator[Problem]:
     """Warn about moving obstacles whose path crosses obstacles at rest or the boundary."""
     checked = [item for item in sketch.obstacles if item.key not in skipped and not item.geometry.is_empty]
-    standing = {item.key: item.geometry for item in checked if item.shape.path is None}
-    inside = None
+    static_geometries = {item.key: item.geometry for item in checked if item.shape.path is None}
+    boundary_area = None
     if BOUNDARY not in skipped:
-        inside = Polygon(sketch.boundary)
+        boundary_area = Polygon(sketch.boundary)
     for item in checked:
         if item.shape.path is not None:
-            yield from _check_path(sketch, item, standing, inside)
+            yield from _check_path(sketch, item, static_geometries, boundary_area)
 
 
 def _check_path(
-    sketch: Sketch, item: Item, standing: dict[int, shapely.Geometry], inside: Polygon | None
+    sketch: Sketch,
+    item: Item,
+    static_geometries: dict[int, shapely.Geometry],
+    boundary_area: Polygon | None,
 ) -> Iterator[Problem]:
     """Warn if a moving obstacle passes through any of the obstacles at rest, or leaves the boundary."""
     assert item.shape.path is not None
     swept = env.compute_swept_area(item.shape.polygon, item.shape.path)
-    overlaps, beyond = env.find_overlaps(swept, standing, inside)
+    overlaps, area_outside = env.find_overlaps(swept, static_geometries, boundary_area)
     names = [format_numbered_name(sketch, key) for key in overlaps]
-    if beyond is not None:
+    if area_outside is not None:
         names.append("the boundary")
     if names:
-        area = shapely.union_all([*overlaps.values(), beyond])
-        yield Problem(f" moves through {summarize_names(names)}", area, item.key, False)
+        area = shapely.union_all([*overlaps.values(), area_outside])
+        message = f"{format_numbered_name(sketch, item.key)} moves through {summarize_names(names)}"
+        yield Problem(message, area, owner=item.key, is_error=False)
 
 
 def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
@@ -246,29 +251,32 @@ def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem
     for room in rooms:
         position = format_position(*room.representative_point().coords[0])
         message = f"the room of {room.area:.3g} m² around {position} is sealed: it has no entrance"
-        yield Problem(message, room, None, False, "sealed")
+        yield Problem(message, room, is_error=False, kind="sealed")
     if pockets:
         area = sum(pocket.area for pocket in pockets)
         verb = "are" if len(pockets) > 1 else "is"
         count = format_count(len(pockets), "sealed pocket")
         message = f"{count} {verb} smaller than a robot, {area:.2g} m² in total"
-        yield Problem(message, MultiPolygon(pockets), None, False, "sealed")
+        yield Problem(message, MultiPolygon(pockets), is_error=False, kind="sealed")
 
 
 def _warn_of_tight_positions(
-    name: str, start: env.PointsStart, free: MultiPolygon, radius: float
+    sketch: Sketch, name: str, free: MultiPolygon, radius: float
 ) -> Iterator[Problem]:
     """Warn about positions of a start that are too close to a wall or to each other."""
+    start = sketch.get_start(name)
+    assert isinstance(start, env.PointsStart)
     points = shapely.points(to_array(start.positions))
     gaps = shapely.distance(points, free.boundary)
     for number in np.flatnonzero(gaps < radius).tolist():
-        position = _describe_position(start, number)
+        position = _describe_position(sketch, name, number)
         message = f"{position} is {gaps[number]:.3g} m from a wall: robots need {radius:g} m"
-        yield Problem(message, points[number], name, False, "spot")
+        yield Problem(message, points[number], owner=name, is_error=False, kind="spot")
     pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=2 * radius).T
     for i, j in sorted((i, j) for i, j in pairs.tolist() if i < j):
         gap = math.dist(start.positions[i], start.positions[j])
         if gap < 2 * radius:
-            position = _describe_position(start, i)
+            position = _describe_position(sketch, name, i)
             message = f"{position} and position {j + 1} are {gap:.3g} m apart: robots need {2 * radius:g} m"
-            yield Problem(message, MultiPoint([points[i], points[j]]), name, False, "spot")
+            pair = MultiPoint([points[i], points[j]])
+            yield Problem(message, pair, owner=name, is_error=False, kind="spot")

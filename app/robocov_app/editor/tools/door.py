@@ -66,7 +66,9 @@ class DoorTool(EditorTool):
 
     def enter_text(self, context: EditorContext, text: str) -> None:
         """Set the width of doors."""
-        self.width = create.check_door_width(parse_length(text))
+        width = parse_length(text)
+        create.require_door_width(width)
+        self.width = width
         context.show_message(f"doors are {format_length(self.width)} wide")
 
     def build_overlay(self, context: EditorContext) -> EditorToolOverlay:

@@ -33,7 +33,7 @@ class _TargetCollector:
 
     def add(self, sketch: Sketch, owner: Owner) -> None:
         """Add the points and edges of an object."""
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
             self.centers.append(shape.center)
             self.rim_points += sketch.list_vertex_rings(owner)[0][1:]

@@ -278,7 +278,7 @@ def find_common_length(editor: Editor, attribute: str) -> float | None:
     sketch, selection = editor.displayed
     lengths: set[float] = set()
     for owner in selection.owners:
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, _SHAPES_WITH[attribute]):
             lengths.add(getattr(shape, attribute))
     if len(lengths) != 1:

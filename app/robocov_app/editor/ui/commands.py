@@ -198,7 +198,7 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     """Return the commands to rotate, mirror, align, distribute, restack, group, lock and hide objects."""
 
     def release_all() -> None:
-        editor.apply(properties.release(editor.sketch))
+        editor.apply(properties.unlock_and_show_all(editor.sketch))
 
     group = EditorCommandGroup("Arrange", editor)
     turn = transform.rotate
@@ -206,7 +206,7 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     group.add_edit("rotate:right", "Turn by 90° to the right", turn, "e", value=-90.0, repeats=True)
     group.add(
         "level",
-        "Level: turn the map so that the measured line is level or upright",
+        "Level: rotate the map so that the measured line is horizontal or vertical",
         partial(actions.level, editor),
     )
     group.add_edit("mirror:x", "Mirror left and right", transform.mirror, "shift+h", value="x")

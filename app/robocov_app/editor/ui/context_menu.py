@@ -90,7 +90,7 @@ def _list_vertex_groups(editor: Editor) -> list[list[str]]:
     if len(selection.vertices) == 1:
         align = []
         (vertex,) = selection.vertices
-        shape = editor.sketch.find_object(vertex.owner)
+        shape = editor.sketch.get_shape(vertex.owner)
         if isinstance(shape, WallObstacle):
             if vertex.index in (0, len(shape.points) - 1):
                 edit.append("extend")

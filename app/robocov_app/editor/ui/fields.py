@@ -70,7 +70,7 @@ def _compute_frame(editor: Editor) -> _Frame:
         x, y = find_position(sketch, vertex)
     elif not selection.vertices and len(selection.owners) == 1:
         (owner,) = selection.owners
-        shape = sketch.find_object(owner)
+        shape = sketch.get_shape(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
             x, y = shape.center
     return _Frame(x, y, width, height)
@@ -173,13 +173,13 @@ def _write_picture_scale(editor: Editor, text: str) -> None:
     editor.apply(properties.set_background(editor.sketch, replace(picture, scale=scale)))
 
 
-def _read_picture_turn(editor: Editor) -> str:
-    return format_number(_require_picture(editor).turn)
+def _read_picture_rotation(editor: Editor) -> str:
+    return format_number(_require_picture(editor).rotation_deg)
 
 
-def _write_picture_turn(editor: Editor, text: str) -> None:
+def _write_picture_rotation(editor: Editor, text: str) -> None:
     degrees = parse_angle(text)
-    picture = replace(_require_picture(editor), turn=degrees)
+    picture = replace(_require_picture(editor), rotation_deg=degrees)
     editor.apply(properties.set_background(editor.sketch, picture))
 
 
@@ -225,6 +225,6 @@ FIELDS: dict[str, PanelField] = {
     "width": _build_length_field("width", "width", "Thickness of the wall"),
     "size:radius": _build_length_field("radius", "circle", "Its radius"),
     "picture:scale": PanelField(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
-    "picture:turn": PanelField(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),
+    "picture:turn": PanelField(_read_picture_rotation, _write_picture_rotation, "Counter-clockwise"),
 }
 """The fields of the panel by name."""

@@ -492,7 +492,7 @@ def find_object_kind(editor: Editor) -> str:
     if selection.boundary:
         return "boundary"
     for name in selection.starts:
-        return "disc" if isinstance(sketch.find_object(name), DiscStart) else "start"
+        return "disc" if isinstance(sketch.get_shape(name), DiscStart) else "start"
     for key in selection.items & sketch.index_by_key.keys():
         return KINDS[type(sketch.get_item(key).shape)]
     return "nothing"
