@@ -156,25 +156,3 @@ def choose_trail_color(theme: Theme, hue: int) -> Color:
         fraction += 0.04
         color = mix(theme.robots[hue], theme.ink, fraction)
     return color
-
-
-def choose_curve_colors(controllers: list[str], theme: Theme) -> list[Color]:
-    """Choose a color for each curve: the color of its controller, or another one if that is taken.
-
-    Parameters
-    ----------
-    controllers : list of str
-        Name of the controller of each curve; may contain duplicates.
-    theme : Theme
-
-    Returns
-    -------
-    list of Color
-        All different as long as there are enough colors.
-    """
-    chosen: list[Color] = []
-    for controller in controllers:
-        candidates = [theme.get_controller_color(controller), *theme.others]
-        free = [color for color in candidates if color not in chosen]
-        chosen.append(free[0] if free else candidates[0])
-    return chosen

@@ -6,7 +6,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from robocov.arrays import Array
+from robocov_app.render.camera import Camera
 
+MAX_MARKED_ROBOTS = 100
+"""If more robots are in view, their numbers, starts and centroids would only be clutter."""
 _MAX_POINTS_WITHOUT_TREE = 120
 """With at most this many points, comparing all pairs is faster than building a tree."""
 _MAX_SAMPLED_POINTS = 250
@@ -81,6 +84,28 @@ def fit_mark_size(points: Array, low: float, high: float) -> float:
         return high
     distances = compute_nearest_distances(points, 1 + len(points) // _MAX_SAMPLED_POINTS)
     return float(np.clip(np.median(distances), low, high))
+
+
+def is_crowd(positions: Array, camera: Camera) -> bool:
+    """Return whether more robots are in view than can be marked one by one.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+        Positions of all robots.
+    camera : Camera
+        Zooming in reduces the number of robots in view.
+
+    Returns
+    -------
+    bool
+    """
+    if len(positions) <= MAX_MARKED_ROBOTS:
+        return False
+    low_x, low_y, high_x, high_y = camera.compute_visible_bounds()
+    x, y = positions.T
+    is_visible = (low_x <= x) & (x <= high_x) & (low_y <= y) & (y <= high_y)
+    return bool(np.count_nonzero(is_visible) > MAX_MARKED_ROBOTS)
 
 
 def choose_width_factor(n_lines: int) -> float:

@@ -7,6 +7,7 @@ from scipy.spatial import Delaunay
 
 from robocov.errors import ParameterError
 from robocov_app.look.colors import choose_text_color, compute_contrast, mix
+from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.hues import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues, choose_trail_color
 from robocov_app.look.theme import THEMES, get_theme
 
@@ -93,6 +94,13 @@ class TestReadability:
         assert theme.final[2] == max(theme.final)
         assert theme.trajectory[0] == max(theme.trajectory)
         assert theme.get_controller_color("somebody's own") == theme.others[0]
+
+
+def test_controllers_differ_in_dashes_and_markers_too():
+    names = ["rapf", "rpf", "lloyd", "first", "second", "third", "fourth", "fifth"]
+    styles = choose_controller_styles(names).values()
+    assert len({str(style.dashes) for style in styles}) == len(names)
+    assert len({style.mark for style in styles}) == len(names)
 
 
 def test_unknown_theme_is_named_with_the_nearest():

@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov_app.look import legend
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, PlacedSprites, Sprite
-from robocov_app.render.crowding import fit_mark_size, round_to_half
+from robocov_app.render.crowding import MAX_MARKED_ROBOTS, fit_mark_size, is_crowd, round_to_half
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.scene import Scene, are_centroids
@@ -30,9 +30,11 @@ class StartsLayer:
         self._rings = LatestValue[PlacedSprites]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the starts of a scene."""
+        """Draw the starts of a scene, unless there is a crowd of robots."""
         starts = scene.starts
         assert starts is not None
+        if scene.snapshot is not None and is_crowd(scene.snapshot.positions, canvas.camera):
+            return
 
         def place_rings() -> PlacedSprites:
             centers = canvas.camera.to_pixels(starts)
@@ -52,13 +54,18 @@ def _draw_start_symbol(canvas: Canvas, x: float, y: float) -> None:
     canvas.draw_sprite(_build_start_ring(canvas, _START_SYMBOL_RADIUS_PX * canvas.scale), (x, y))
 
 
-build_starts_legend = build_legend(legend.START, _draw_start_symbol)
+build_starts_legend = build_legend(
+    legend.START, _draw_start_symbol, lambda scene: len(scene.team) <= MAX_MARKED_ROBOTS
+)
 
 
 def draw_centroids(canvas: Canvas, scene: Scene) -> None:
-    """Draw a plus sign at each centroid, or an x at each goal, except where the robot has arrived."""
+    """Draw a plus sign at each centroid, or an x at each goal, except where the robot has arrived.
+
+    In a crowd of robots nothing is drawn.
+    """
     name, targets = _choose_targets(scene)
-    if not name:
+    if not name or is_crowd(scene.now.positions, canvas.camera):
         return
     centers = canvas.camera.to_pixels(targets)
     distances = np.hypot(*(centers - canvas.camera.to_pixels(scene.now.positions)).T)
@@ -72,7 +79,7 @@ def draw_centroids(canvas: Canvas, scene: Scene) -> None:
 def build_centroids_legend(scene: Scene) -> list[LegendEntry]:
     """Build the legend of centroids or goals, whichever are drawn."""
     name, _ = _choose_targets(scene)
-    if not name:
+    if not name or len(scene.team) > MAX_MARKED_ROBOTS:
         return []
     return [LegendEntry(name, _build_cross_glyph(name))]
 

@@ -11,7 +11,7 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry, Sprite
-from robocov_app.render.crowding import fit_radii, round_to_half
+from robocov_app.render.crowding import fit_radii, is_crowd, round_to_half
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.scene import Scene
 
@@ -85,7 +85,9 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
 
 
 def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArray:
-    """Return the number on the disc of each robot; 0 if the digits would be too small to read."""
+    """Return the number on the disc of each robot; 0 in a crowd, or if it would be too small to read."""
+    if is_crowd(scene.now.positions, canvas.camera):
+        return np.zeros(len(inner_radii), dtype=int)
     numbers = np.array([scene.get_number(row) for row in range(len(inner_radii))], dtype=int)
     n_digits = 1 + np.digitize(numbers, [10, 100, 1000])
     sizes = sprites.choose_number_size(inner_radii, n_digits)

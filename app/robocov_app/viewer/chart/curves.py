@@ -7,9 +7,10 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.look.colors import Color, mix
-from robocov_app.look.hues import choose_curve_colors
+from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas
+from robocov_app.render.dashes import cut_into_dashes
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import ChartScale
 from robocov_app.viewer.session.pane import Pane
@@ -23,6 +24,7 @@ MIN_THINNED_POINTS = 400
 """Curves with at least this many points are thinned."""
 _MAX_POINTS_PER_PX = 1.5
 _CURVE_WIDTH_PX = 1.8
+_DASH_STRETCH = 1.4  # dashes are longer than in figures, because the curves are short
 _GHOST_STRENGTH = 0.45
 _SEGMENTS_PER_DASH = 4
 """Number of curve segments per dash; the last of them is the gap."""
@@ -48,15 +50,18 @@ class GhostLine(NamedTuple):
 
 
 def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
-    """Draw the curve of each pane."""
+    """Draw the curve of each pane, with the color and the dashes of its controller."""
     panes = frame.timeline.panes
-    colors = map_curve_colors(panes, frame.theme)
+    styles = map_curve_styles(panes)
+    width = canvas.scale_width(_CURVE_WIDTH_PX)
     for pane in panes:
         curve = pane.curves[frame.quantity.name]
         points = thin_points(scale.to_points(curve.times, curve.values))
         if len(points) > 1:
-            segments = np.hstack([points[:-1], points[1:]])
-            canvas.draw_segments(segments, colors[pane.number], canvas.scale_width(_CURVE_WIDTH_PX))
+            style = styles[pane.number]
+            dashes = [_DASH_STRETCH * width * length for length in style.list_dash_lengths()]
+            segments = cut_into_dashes(points, dashes)
+            canvas.draw_segments(segments, style.get_color(frame.theme), width)
 
 
 def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[GhostLine]:
@@ -122,9 +127,14 @@ def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) 
 
 def map_curve_colors(panes: Sequence[Pane], theme: Theme) -> dict[int, Color]:
     """Return the curve color of each pane, by the number of the pane."""
+    return {number: style.get_color(theme) for number, style in map_curve_styles(panes).items()}
+
+
+def map_curve_styles(panes: Sequence[Pane]) -> dict[int, CurveStyle]:
+    """Return the curve style of each pane, by the number of the pane; no two styles are the same."""
     controllers = {pane.number: pane.controller.name for pane in panes}
-    colors = choose_curve_colors(list(controllers.values()), theme)
-    return dict(zip(controllers, colors, strict=True))
+    styles = choose_curve_styles(list(controllers.values()))
+    return dict(zip(controllers, styles, strict=True))
 
 
 def thin_points(points: Array) -> Array:
