@@ -8,8 +8,9 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pygame
 import pytest
-from driven_window import open_viewer
+from driven_window import Driver, open_viewer
 from sample_sessions import advance_session, start_session
 
 from robocov.errors import InputError, MapError
@@ -120,10 +121,82 @@ def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
         driver.press_key("right")
         assert driver.viewer.selected_robot == 1
         driver.press_key("right")
+        assert driver.window.lesson.player.state == "closing"
+        driver.press_key("right")
         driver.run_frames(1)
         assert driver.window.lesson.player is None
         assert driver.viewer.selected_robot is None
         assert driver.viewer.message.startswith("the lesson has ended")
+
+
+def click_area(driver: Driver, action: str, argument: int | None = None) -> None:
+    """Click the area of the page that calls a method of the lesson."""
+    driver.window.draw()
+    for box, call in driver.window.lesson.click_areas:
+        function = getattr(call, "func", call)
+        arguments = getattr(call, "args", ())
+        if function.__name__ == action and (argument is None or arguments == (argument,)):
+            driver.click(*box.center)
+            return
+    raise AssertionError(f"no area for {action} {argument}")
+
+
+def test_back_and_next_are_buttons_and_the_cross_ends_the_lesson(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        click_area(driver, "skip", 1)
+        assert lesson.number == 1
+        click_area(driver, "skip", -1)
+        assert lesson.number == 0
+        click_area(driver, "end")
+        driver.run_frames(1)
+        assert driver.window.lesson.player is None
+
+
+def test_answers_keep_their_marks_until_the_next_chapter(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path, task=None))
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        lesson.skip(1)
+        assert [answer.mark for answer in lesson.marked_answers] == ["", ""]
+        click_area(driver, "reply", 1)
+        assert [answer.mark for answer in lesson.marked_answers] == ["chosen", ""], "not revealed yet"
+        assert lesson.comments == []
+        driver.run_frames(30)
+        assert lesson.state == "ended"
+        assert [answer.mark for answer in lesson.marked_answers] == ["wrong", "right"]
+        assert lesson.comments == ["So it is."]
+
+
+def test_the_closing_page_says_what_was_found_out(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        lesson.skip(1)
+        driver.press_key("2")
+        lesson.skip(1)
+        assert lesson.state == "closing"
+        assert lesson.score == (1, 1)
+        assert lesson.findings == ["What now? Much."]
+        assert not driver.session.playback.is_playing
+        lesson.advance(1000.0)
+        assert lesson.state == "closing", "it stays until the user closes it"
+        click_area(driver, "skip", -1)
+        assert (lesson.number, lesson.state) == (1, "asking")
+        lesson.skip(1)
+        click_area(driver, "skip", 1)
+        driver.run_frames(1)
+        assert driver.window.lesson.player is None
+    assert LESSON is not None
+    assert LESSON.found
+    assert LESSON.next_steps
 
 
 def test_a_lesson_can_be_paused_left_and_resumed(tmp_path: Path) -> None:
@@ -183,8 +256,11 @@ def test_every_chapter_fits_on_its_page(tmp_path: Path, size: tuple[int, int]) -
         for _ in LESSON.chapters:
             driver.settle()
             boxes = [box for box, _ in driver.window.lesson.click_areas]
-            assert all(above.bottom <= below.top + 1 for above, below in itertools.pairwise(boxes))
-            assert boxes[-1].bottom <= size[1] - 46
+            panel = pygame.Rect(driver.window.layout.panel)
+            assert all(panel.contains(box) for box in boxes)
+            for first, second in itertools.combinations(boxes, 2):
+                overlap = first.clip(second)
+                assert min(overlap.size) <= 1
             driver.press_key("right")
 
 

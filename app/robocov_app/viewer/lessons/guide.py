@@ -83,7 +83,7 @@ class LessonGuide:
         player = self.player
         if player is None:
             return None
-        return player.state, player.number, player.progress
+        return player.state, player.number, player.progress, player.answer
 
     def start(self, path: Path = FIRST_LESSON) -> None:
         """Start a lesson.

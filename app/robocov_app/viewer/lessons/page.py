@@ -11,9 +11,16 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.fonts import render_text, shorten_to_width
-from robocov_app.toolkit.overlay import create_flat_canvas, draw_card, wrap_text
+from robocov_app.toolkit.overlay import (
+    create_flat_canvas,
+    draw_card,
+    draw_rounded_box,
+    get_accent_ink,
+    get_field_color,
+    wrap_text,
+)
 from robocov_app.toolkit.window.layout import Layout
-from robocov_app.viewer.lessons.player import LessonPlayer, LessonState
+from robocov_app.viewer.lessons.player import AnswerMark, LessonPlayer, LessonState, MarkedAnswer
 
 
 class ClickArea(NamedTuple):
@@ -38,13 +45,31 @@ _CAPTION_WIDTH_PX = 800
 _CAPTION_LINE_PX = 20
 _PAGE_MARGIN_PX = 20
 _PAGE_TITLE_PX = 18
-_PAGE_TEXT_PX = 14
-_PAGE_LINE_PX = 21
-_ANSWER_INDENT_PX = 12
+_ANSWER_INDENT_PX = 30
+_MARK_X_PX = 10
 _CHAPTER_TEXT_PX = 12
 _CHAPTER_ROW_PX = 23
 _MIN_CHAPTER_ROW_PX = 15
-_PAGE_HINT = "← → chapters · Space · F2 just play · Esc ends"
+_DOTS_ROW_PX = 24
+_END_BUTTON_PX = 28
+_BUTTON_HEIGHT_PX = 34
+_BUTTON_GAP_PX = 10
+_BUTTON_TEXT_PX = 14
+_BUTTONS_ABOVE_BOTTOM_PX = 74
+_PROGRESS_ABOVE_BOTTOM_PX = 88
+_TEXT_SIZES_PX = (14.0, 13.0, 12.0)
+"""Sizes of the text, of which the first is used at which the page fits."""
+_LINE_HEIGHT = 1.5
+"""Distance of lines in text sizes."""
+_PAGE_HINT = "Space holds · F2 just play · Esc ends"
+_CLOSING_TITLE = "What you found out"
+_NEXT_TITLE = "Try next"
+_DEFAULT_NEXT_STEPS = (
+    "Press Esc, then draw a wall in a doorway (W).",
+    "Let a robot fail (D), and watch its neighbors.",
+    "Compare two controllers on a map of your own (K).",
+)
+_MARK_SIGNS = {AnswerMark.NONE: "", AnswerMark.CHOSEN: "●", AnswerMark.RIGHT: "✓", AnswerMark.WRONG: "✗"}
 
 
 def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer) -> None:
@@ -54,13 +79,14 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     text_size = round(_CAPTION_TEXT_PX * scale)
     title_size = round(_CAPTION_TITLE_PX * scale)
     card_width = min(width - 40 * scale, _CAPTION_WIDTH_PX * scale)
-    text = " ".join([lesson.chapter.text, *lesson.lines])
+    is_closing = lesson.state is LessonState.CLOSING
+    text = " ".join(lesson.findings if is_closing else [lesson.chapter.text, *lesson.lines])
     lines = wrap_text(text, text_size, card_width - 44 * scale)
     box = pygame.Rect(0, 0, round(card_width), round((44 + _CAPTION_LINE_PX * len(lines)) * scale))
     box.midbottom = (round(left + width / 2), round(top + height - 44 * scale))
     draw_card(screen, box, theme, scale)
     x = box.left + round(22 * scale)
-    title = f"{lesson.number + 1}  {lesson.chapter.title}"
+    title = _CLOSING_TITLE if is_closing else f"{lesson.number + 1}  {lesson.chapter.title}"
     screen.blit(render_text(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
     for k, line in enumerate(lines):
         y = box.top + round((35 + _CAPTION_LINE_PX * k) * scale)
@@ -76,16 +102,20 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
 def draw_lesson_page(
     screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer
 ) -> list[ClickArea]:
-    """Draw a lesson in place of the panel.
+    """Draw a lesson in place of the panel, with the largest text at which it fits.
 
     Returns
     -------
     list of ClickArea
-        Areas of the answers and chapters that can be clicked.
+        Areas of the answers, chapters and buttons that can be clicked.
     """
-    screen.fill(theme.panel, layout.panel)
     page = _LessonPage(screen, layout, theme, lesson)
-    page.draw()
+    for text_px in _TEXT_SIZES_PX:
+        screen.fill(theme.panel, layout.panel)
+        page = _LessonPage(screen, layout, theme, lesson, text_px=text_px)
+        page.draw()
+        if page.fits:
+            break
     return page.areas
 
 
@@ -97,39 +127,94 @@ class _LessonPage:
     layout: Layout
     theme: Theme
     lesson: LessonPlayer
+    text_px: float = _TEXT_SIZES_PX[0]
     areas: list[ClickArea] = field(default_factory=list)
     y: float = 0.0
+    fits: bool = True
 
     def __post_init__(self) -> None:
-        left, top, width, _ = self.layout.panel
+        left, top, width, height = self.layout.panel
         self.scale = self.layout.scale
         self.x = left + _PAGE_MARGIN_PX * self.scale
         self.width = width - 2 * _PAGE_MARGIN_PX * self.scale
         self.y = top + 18 * self.scale
+        self.bottom = top + height
 
     def draw(self) -> None:
-        """Draw the heading, the text, the question or task, the list of chapters and the progress bar."""
+        """Draw the chapter or the closing page, the list of chapters, the buttons and the progress bar."""
         lesson = self.lesson
-        scale = self.scale
-        self._write("LESSON", 11, self.theme.faint, bold=True)
-        self.y += 30 * scale
-        title_size = round(_PAGE_TITLE_PX * scale)
-        for line in wrap_text(lesson.chapter.title, title_size, self.width, True):
-            self._write(line, _PAGE_TITLE_PX, self.theme.final, bold=True)
-            self.y += 25 * scale
-        self.y += 6 * scale
-        self._write_paragraph(lesson.chapter.text, self.theme.ink)
-        self.y += 8 * scale
-        for k, line in enumerate(lesson.lines):
-            # While the lesson asks, the first line is the question, and the others are the answers.
-            if lesson.state is LessonState.ASKING and k > 0:
-                self._draw_answer(k, line)
-            else:
-                self._write_paragraph(line, self.theme.final)
-            if lesson.state is LessonState.ASKING:
-                self.y += 11 * scale
+        is_closing = lesson.state is LessonState.CLOSING
+        count = len(lesson.lesson.chapters)
+        heading = "LESSON" if is_closing else f"LESSON · {lesson.number + 1} OF {count}"
+        self._write(heading, 11, self.theme.faint, bold=True)
+        heading_y = self.y
+        self.y += 30 * self.scale
+        if is_closing:
+            self._draw_closing()
+        else:
+            self._draw_chapter_text()
         self._draw_chapters()
         self._draw_progress()
+        self._draw_buttons()
+        self.y = self.bottom - 26 * self.scale
+        hint_px = 11
+        hint = shorten_to_width(_PAGE_HINT, round(hint_px * self.scale), self.width)
+        self._write(hint, hint_px, self.theme.faint)
+        self._draw_end_button(heading_y)
+
+    def _draw_end_button(self, top: float) -> None:
+        """Draw a cross in the upper right corner, which ends the lesson."""
+        size = round(_END_BUTTON_PX * self.scale)
+        box = pygame.Rect(round(self.x + self.width) - size, round(top - 7 * self.scale), size, size)
+        image = render_text("×", round(_PAGE_TITLE_PX * self.scale), self.theme.faint)
+        self.screen.blit(image, image.get_rect(center=box.center))
+        self.areas.append(ClickArea(box, self.lesson.end))
+
+    def _draw_chapter_text(self) -> None:
+        """Draw the title and text of the chapter, its question with the answers, and comments."""
+        lesson = self.lesson
+        self._write_title(lesson.chapter.title)
+        self._write_paragraph(lesson.chapter.text, self.theme.ink)
+        self.y += 8 * self.scale
+        question = lesson.chapter.question
+        if question is not None:
+            self._write_paragraph(question.text, self.theme.accent)
+            self.y += 9 * self.scale
+            for number, answer in enumerate(lesson.marked_answers, 1):
+                self._draw_answer(number, answer)
+        for comment in lesson.comments:
+            self._write_paragraph(comment, self.theme.ink)
+            self.y += 4 * self.scale
+
+    def _draw_closing(self) -> None:
+        """Draw what was found out, the score of the user's predictions, and what to try next."""
+        lesson = self.lesson
+        self._write_title(_CLOSING_TITLE)
+        right_count, answer_count = lesson.score
+        if answer_count:
+            text = f"{right_count} of {answer_count} predictions were right."
+            self._write_paragraph(text, self.theme.accent)
+            self.y += 6 * self.scale
+        for finding in lesson.findings:
+            self._draw_item("✓", finding)
+        self.y += 8 * self.scale
+        self._write_title(_NEXT_TITLE)
+        for step in lesson.lesson.next_steps or _DEFAULT_NEXT_STEPS:
+            self._draw_item("→", step)
+
+    def _draw_item(self, sign: str, text: str) -> None:
+        """Write a paragraph with a sign at its left."""
+        self._write(sign, self.text_px, self.theme.start, bold=True)
+        indent = 20
+        self._write_paragraph(text, self.theme.ink, indent=indent, right_indent=0)
+        self.y += 4 * self.scale
+
+    def _write_title(self, title: str) -> None:
+        size = round(_PAGE_TITLE_PX * self.scale)
+        for line in wrap_text(title, size, self.width, True):
+            self._write(line, _PAGE_TITLE_PX, self.theme.accent, bold=True)
+            self.y += 25 * self.scale
+        self.y += 6 * self.scale
 
     def _write(
         self, text: str, size: float, color: Color, *, indent: float = 0.0, bold: bool = False
@@ -137,47 +222,85 @@ class _LessonPage:
         picture = render_text(text, round(size * self.scale), color, bold)
         self.screen.blit(picture, (round(self.x + indent * self.scale), round(self.y)))
 
-    def _write_paragraph(self, text: str, color: Color, *, indent: float = 0.0) -> None:
-        """Write wrapped text, indented on both sides by a length at scale 1, px, and move below it."""
-        width = self.width - 2 * indent * self.scale
-        for line in wrap_text(text, round(_PAGE_TEXT_PX * self.scale), width):
-            self._write(line, _PAGE_TEXT_PX, color, indent=indent)
-            self.y += _PAGE_LINE_PX * self.scale
+    def _write_paragraph(
+        self, text: str, color: Color, *, indent: float = 0.0, right_indent: float | None = None
+    ) -> None:
+        """Write wrapped text, indented on both sides by lengths at scale 1, px, and move below it."""
+        if right_indent is None:
+            right_indent = indent
+        width = self.width - (indent + right_indent) * self.scale
+        for line in wrap_text(text, round(self.text_px * self.scale), width):
+            self._write(line, self.text_px, color, indent=indent)
+            self.y += _LINE_HEIGHT * self.text_px * self.scale
 
-    def _draw_answer(self, number: int, text: str) -> None:
-        """Draw an answer in a frame that can be clicked; `number` counts from 1."""
+    def _draw_answer(self, number: int, answer: MarkedAnswer) -> None:
+        """Draw an answer in a frame: a button until the user has answered, then with its mark."""
         top = self.y
         scale = self.scale
-        self._write_paragraph(text, self.theme.final, indent=_ANSWER_INDENT_PX)
-        height = round(self.y - top + 8 * scale)
+        theme = self.theme
+        colors = {
+            AnswerMark.RIGHT: theme.start,
+            AnswerMark.WRONG: theme.error,
+            AnswerMark.CHOSEN: theme.accent,
+        }
+        is_open = self.lesson.state is LessonState.ASKING
+        edge = colors.get(answer.mark, theme.accent if is_open else mix(theme.panel, theme.ink, 0.25))
+        ink = theme.ink if is_open or answer.mark is not AnswerMark.NONE else theme.faint
+        lines = wrap_text(answer.text, round(self.text_px * scale), self.width - 42 * scale)
+        height = round((_LINE_HEIGHT * self.text_px * len(lines) + 8) * scale)
         box = pygame.Rect(round(self.x), round(top - 5 * scale), round(self.width), height)
-        pygame.draw.rect(self.screen, self.theme.final, box, 1, border_radius=round(5 * scale))
-        self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
+        width = max(round(scale * (1 if answer.mark is AnswerMark.NONE else 2)), 1)
+        draw_rounded_box(self.screen, box, theme.background, edge=edge, radius=round(5 * scale), width=width)
+        sign = _MARK_SIGNS[answer.mark] or str(number)
+        self._write(sign, self.text_px, edge, indent=_MARK_X_PX, bold=True)
+        self._write_paragraph(answer.text, ink, indent=_ANSWER_INDENT_PX, right_indent=12)
+        self.y = box.bottom + 11 * scale
+        if is_open:
+            self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
 
     def _draw_chapters(self) -> None:
-        """Draw the list of chapters at the bottom, above the progress bar, if there is enough space."""
-        _, top, _, height = self.layout.panel
+        """Draw the list of chapters above the progress bar; in a small window, a row of dots."""
         scale = self.scale
         count = len(self.lesson.lesson.chapters)
         self.y += 6 * scale
-        bottom = top + height - 62 * scale
-        row = min(_CHAPTER_ROW_PX * scale, max((bottom - self.y) / count, _MIN_CHAPTER_ROW_PX * scale))
-        self.y = max(self.y, bottom - row * count)
+        bottom = self.bottom - (_PROGRESS_ABOVE_BOTTOM_PX + 10) * scale
+        free_height = bottom - self.y
+        self.fits = free_height >= _DOTS_ROW_PX * scale
+        if free_height < _MIN_CHAPTER_ROW_PX * scale * count:
+            self._draw_dots(bottom - _DOTS_ROW_PX * scale)
+            return
+        row = min(_CHAPTER_ROW_PX * scale, free_height / count)
+        self.y = bottom - row * count
         for number in range(count):
             self._draw_chapter(number, row)
             self.y += row
+
+    def _draw_dots(self, top: float) -> None:
+        """Draw one dot for each chapter in a row that can be clicked."""
+        count = len(self.lesson.lesson.chapters)
+        spacing = self.width / count
+        for number in range(count):
+            box = pygame.Rect(
+                round(self.x + number * spacing), round(top), round(spacing), round(_DOTS_ROW_PX * self.scale)
+            )
+            radius = 4.5 if number == self.lesson.number else 3.0
+            self._draw_dot(number, box.center, radius)
+            self.areas.append(ClickArea(box, partial(self.lesson.go_to, number)))
+
+    def _draw_dot(self, number: int, center: tuple[float, float], radius: float) -> None:
+        """Draw the dot of a chapter, filled if it was reached."""
+        theme = self.theme
+        fill = theme.accent if number <= self.lesson.number else mix(theme.panel, theme.ink, 0.25)
+        canvas = create_flat_canvas(self.screen, theme, self.scale)
+        canvas.draw_sprite(partial(sprites.render_dot, radius * self.scale, fill), center)
 
     def _draw_chapter(self, number: int, row: float) -> None:
         """Draw the title of a chapter, in a row of the given height, px, that can be clicked."""
         theme = self.theme
         scale = self.scale
         lesson = self.lesson
-        is_current = number == lesson.number
-        fill = theme.final if number <= lesson.number else mix(theme.panel, theme.ink, 0.25)
-        canvas = create_flat_canvas(self.screen, theme, scale)
-        canvas.draw_sprite(
-            partial(sprites.render_dot, 3.5 * scale, fill), (self.x + 4 * scale, self.y + 8 * scale)
-        )
+        is_current = number == lesson.number and lesson.state is not LessonState.CLOSING
+        self._draw_dot(number, (self.x + 4 * scale, self.y + 8 * scale), 3.5)
         size = round(_CHAPTER_TEXT_PX * scale)
         title = shorten_to_width(
             lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current
@@ -185,18 +308,47 @@ class _LessonPage:
         color = theme.ink if is_current else theme.faint
         self._write(title, _CHAPTER_TEXT_PX, color, indent=16, bold=is_current)
         box = pygame.Rect(round(self.x), round(self.y - 3 * scale), round(self.width), round(row))
-        self.areas.append(ClickArea(box, partial(lesson.skip, number - lesson.number)))
+        self.areas.append(ClickArea(box, partial(lesson.go_to, number)))
 
     def _draw_progress(self) -> None:
-        """Draw the progress bar and the hint at the bottom of the page."""
-        _, top, _, height = self.layout.panel
+        """Draw the progress bar above the buttons."""
         theme = self.theme
         scale = self.scale
-        bottom = top + height
-        bar_top = round(bottom - 46 * scale)
+        bar_top = round(self.bottom - _PROGRESS_ABOVE_BOTTOM_PX * scale)
         bar = pygame.Rect(round(self.x), bar_top, round(self.width), max(3, round(3 * scale)))
         pygame.draw.rect(self.screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
         bar.width = max(round(bar.width * self.lesson.progress), bar.height)
-        pygame.draw.rect(self.screen, theme.final, bar, border_radius=bar.height)
-        self.y = bottom - 32 * scale
-        self._write(_PAGE_HINT, 11, theme.faint)
+        pygame.draw.rect(self.screen, theme.accent, bar, border_radius=bar.height)
+
+    def _draw_buttons(self) -> None:
+        """Draw the buttons to the previous and the next chapter."""
+        lesson = self.lesson
+        scale = self.scale
+        is_closing = lesson.state is LessonState.CLOSING
+        is_last = lesson.number == len(lesson.lesson.chapters) - 1
+        next_label = "Next →"
+        if is_closing:
+            next_label = "Close lesson"
+        elif is_last:
+            next_label = "Finish"
+        top = round(self.bottom - _BUTTONS_ABOVE_BOTTOM_PX * scale)
+        width = round((self.width - _BUTTON_GAP_PX * scale) / 2)
+        height = round(_BUTTON_HEIGHT_PX * scale)
+        back = pygame.Rect(round(self.x), top, width, height)
+        forward = pygame.Rect(round(self.x + self.width) - width, top, width, height)
+        if lesson.number > 0 or is_closing:
+            self._draw_button("← Back", back, is_primary=False)
+            self.areas.append(ClickArea(back, partial(lesson.skip, -1)))
+        has_ended = lesson.state in (LessonState.ENDED, LessonState.CLOSING)
+        self._draw_button(next_label, forward, is_primary=has_ended)
+        self.areas.append(ClickArea(forward, partial(lesson.skip, 1)))
+
+    def _draw_button(self, label: str, box: pygame.Rect, *, is_primary: bool) -> None:
+        """Draw a button; a primary one is filled with the accent color."""
+        theme = self.theme
+        fill = theme.accent if is_primary else get_field_color(theme)
+        edge = theme.accent if is_primary else mix(theme.panel, theme.ink, 0.28)
+        ink = get_accent_ink(theme) if is_primary else theme.ink
+        draw_rounded_box(self.screen, box, fill, edge=edge, radius=round(6 * self.scale))
+        image = render_text(label, round(_BUTTON_TEXT_PX * self.scale), ink, is_primary)
+        self.screen.blit(image, image.get_rect(center=box.center))

@@ -48,7 +48,31 @@ class LessonState(StrEnum):
     ASKING = "asking"  # waits for an answer before the chapter plays
     TASK = "task"  # waits until the user has done a task
     ENDED = "ended"
+    CLOSING = "closing"  # the closing page, after the last chapter
     LEFT = "left"  # the user has taken over
+
+
+class AnswerMark(StrEnum):
+    """Mark of an answer to the question of a chapter."""
+
+    NONE = ""
+    CHOSEN = "chosen"  # by the user, as long as the chapter plays
+    RIGHT = "right"
+    WRONG = "wrong"  # chosen by the user
+
+
+@dataclass(frozen=True)
+class MarkedAnswer:
+    """An answer to the question of a chapter, with its mark.
+
+    Attributes
+    ----------
+    text : str
+    mark : AnswerMark
+    """
+
+    text: str
+    mark: AnswerMark
 
 
 def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
@@ -137,6 +161,8 @@ class LessonPlayer:
         State of the current chapter.
     answer : int or None
         Number of the user's answer, from 1.
+    first_answers : dict of int to int
+        The user's first answer to the question of each chapter, by the index of the chapter.
     is_done : bool
         Whether the lesson has ended.
     is_held : bool
@@ -160,6 +186,7 @@ class LessonPlayer:
         self.state = LessonState.PLAYING
         self.number = 0
         self.answer: int | None = None
+        self.first_answers: dict[int, int] = {}
         self.is_done = False
         self.is_held = False
         self._viewer = viewer
@@ -190,6 +217,58 @@ class LessonPlayer:
         if self.chapter.task is not None:
             lines += self._list_task_lines(self.chapter.task)
         return [line for line in lines if line]
+
+    @property
+    def marked_answers(self) -> list[MarkedAnswer]:
+        """The answers to the question of the chapter; marked once the user has answered."""
+        question = self.chapter.question
+        if question is None:
+            return []
+        marked: list[MarkedAnswer] = []
+        for number, text in enumerate(question.answers, 1):
+            mark = self._mark_answer(number, question.right)
+            marked.append(MarkedAnswer(text, mark))
+        return marked
+
+    def _mark_answer(self, number: int, right: int) -> AnswerMark:
+        is_chosen = number == self.answer
+        if self.answer is None:
+            return AnswerMark.NONE
+        if self.state not in (LessonState.ENDED, LessonState.TASK):
+            return AnswerMark.CHOSEN if is_chosen else AnswerMark.NONE
+        if number == right:
+            return AnswerMark.RIGHT
+        return AnswerMark.WRONG if is_chosen else AnswerMark.NONE
+
+    @property
+    def comments(self) -> list[str]:
+        """Texts below the answers: their explanation, and the task of the chapter."""
+        comments: list[str] = []
+        question = self.chapter.question
+        is_answered = question is not None and self.answer is not None
+        if question is not None and is_answered and self.state in (LessonState.ENDED, LessonState.TASK):
+            comments.append(question.why)
+        if self.chapter.task is not None:
+            comments += self._list_task_lines(self.chapter.task)
+        return [comment for comment in comments if comment]
+
+    @property
+    def findings(self) -> list[str]:
+        """What the lesson has shown: as its author says, or else the answers to its questions."""
+        if self.lesson.found:
+            return list(self.lesson.found)
+        questions = [chapter.question for chapter in self.lesson.chapters if chapter.question is not None]
+        return [f"{question.text} {question.answers[question.right - 1]}." for question in questions]
+
+    @property
+    def score(self) -> tuple[int, int]:
+        """Number of questions whose first answer was right, and number of answered questions."""
+        right_count = 0
+        for index, answer in self.first_answers.items():
+            question = self.lesson.chapters[index].question
+            if question is not None and answer == question.right:
+                right_count += 1
+        return right_count, len(self.first_answers)
 
     def _list_question_lines(self, question: QuestionModel) -> list[str]:
         if self.state is LessonState.ASKING:
@@ -224,7 +303,7 @@ class LessonPlayer:
     def progress(self) -> float:
         """Fraction of the lesson that has been played, 0 to 1."""
         fraction = 0.5
-        if self.state is LessonState.ENDED:
+        if self.state in (LessonState.ENDED, LessonState.CLOSING):
             fraction = 1.0
         elif self.chapter.until.step:
             fraction = min(self.session.timeline.step / self.chapter.until.step, 1.0)
@@ -240,6 +319,7 @@ class LessonPlayer:
             LessonState.PLAYING: self._advance_playing,
             LessonState.TASK: self._advance_task,
             LessonState.ENDED: self._advance_end,
+            LessonState.CLOSING: _do_nothing,
         }
         advance_state[self.state]()
 
@@ -277,16 +357,33 @@ class LessonPlayer:
             return
         if 1 <= answer <= len(question.answers):
             self.answer = answer
+            self.first_answers.setdefault(self.number, answer)
             self._enter_state(LessonState.PLAYING)
             self.session.playback.is_playing = True
 
     def skip(self, chapters: int) -> None:
-        """Go to the chapter that is `chapters` later, or earlier if negative; after the last one, end."""
-        number = self.number + chapters
-        if number >= len(self.lesson.chapters):
+        """Go to the chapter that is `chapters` later, or earlier if negative.
+
+        The closing page follows the last chapter, unless nobody is there to read it; then the lesson ends.
+        """
+        last = len(self.lesson.chapters) - 1
+        if self.state is LessonState.CLOSING:
+            # The closing page stands after the last chapter.
+            number = last + 1 + chapters
+        else:
+            number = self.number + chapters
+        if number <= last:
+            self._start_chapter(max(number, 0))
+        elif self.state is LessonState.CLOSING or self.is_unattended:
             self.end()
         else:
-            self._start_chapter(max(number, 0))
+            self.number = last
+            self.session.playback.is_playing = False
+            self._enter_state(LessonState.CLOSING)
+
+    def go_to(self, number: int) -> None:
+        """Start a chapter, by its index."""
+        self._start_chapter(number)
 
     def leave(self, *, during_task: bool = False) -> None:
         """Let the user take over; during a task only if `during_task`."""
@@ -347,6 +444,10 @@ class LessonPlayer:
             self._enter_state(LessonState.PLAYING)
         else:
             self._enter_state(LessonState.ASKING)
+
+
+def _do_nothing() -> None:
+    pass
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:

@@ -25,6 +25,7 @@ MIN_CHAPTER_SPEED = 0.1
 MAX_CHAPTER_SPEED = 16
 MAX_ANSWERS = 4
 MAX_CHAPTERS = 100
+MAX_CLOSING_LINES = 6
 MAX_CHAPTER_TITLE_CHARS = 60
 MAX_LESSON_TITLE_CHARS = 100
 
@@ -143,6 +144,12 @@ class LessonModel(_Model):
 
     title: Annotated[str, Field(min_length=1, max_length=MAX_LESSON_TITLE_CHARS)]
     chapters: Annotated[list[ChapterModel], Field(min_length=1, max_length=MAX_CHAPTERS)]
+    found: Annotated[list[Text], Field(max_length=MAX_CLOSING_LINES)] = Field(
+        default=[], description="What the lesson has shown, on its closing page"
+    )
+    next_steps: Annotated[list[Text], Field(max_length=MAX_CLOSING_LINES)] = Field(
+        default=[], description="What to try after the lesson, on its closing page"
+    )
 
 
 def _note_maps(maps: list[BundledMapModel | dict[str, Any]], info: Any) -> list[Any]:
