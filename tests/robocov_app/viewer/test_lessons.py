@@ -334,6 +334,7 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
             {"text": "Which?", "answers": ["A", "B"], "right": 3},
             r"\.question\.right: expected the number of an answer, 1 to 2, got 3",
         ),
+        (("title",), "", r"\.title: expected at least 1 character, got \"\""),
         (("show",), ["goal"], r"chapters\[0\]\.show: unknown layer 'goal': did you mean 'goals'"),
     ],
 )

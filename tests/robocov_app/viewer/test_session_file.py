@@ -107,7 +107,8 @@ def test_a_bundled_map_that_has_changed_is_rejected(tmp_path: Path) -> None:
     save(start_session(RAPF, environment=load_map("rooms")), path)
     digest = json.loads(path.read_text())["maps"][0]["digest"]
     path.write_text(path.read_text().replace(digest, "0"))
-    with pytest.raises(MapError, match=r'maps\[0\]\.digest: expected the digest of the present map, got "0"'):
+    message = rf'maps\[0\]\.digest: expected "{digest}", got "0": the bundled map \'rooms\' has changed'
+    with pytest.raises(MapError, match=message):
         load_session(path)
 
 

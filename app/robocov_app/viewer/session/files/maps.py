@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 from pydantic_core import PydanticCustomError
 
 from robocov.environment import Environment
-from robocov.errors import MapError, Mistake, quote_json
+from robocov.errors import MapError, Mistake, quote, quote_json
 from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
 from robocov_app.viewer.session.files.models import BundledMapModel
 
@@ -94,9 +94,12 @@ class FileContext:
             path = ("maps", number, "bundled")
             refuse_value(self.where, path, content.bundled, "the name of a bundled map")
         environment = load_map(content.bundled)
-        if _compute_digest(to_json(environment)) != content.digest:
-            path = ("maps", number, "digest")
-            refuse_value(self.where, path, content.digest, "the digest of the present map")
+        digest = _compute_digest(to_json(environment))
+        if digest != content.digest:
+            expected = quote_json(digest)
+            reason = f"the bundled map {quote(content.bundled)} has changed since the session was saved"
+            message = f"expected {expected}, got {quote_json(content.digest)}: {reason}"
+            raise MapError.from_mistakes(self.where, [Mistake.at_path(("maps", number, "digest"), message)])
         return environment
 
 

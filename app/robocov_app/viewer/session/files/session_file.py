@@ -38,7 +38,7 @@ _REWRITES = (
     (r"^Input should be ", ""),
     (r"a valid integer", "an integer"),
     (r"a valid ", "a "),
-    (r".* should have (.*?)( after validation)?, not \d+", r"\1"),
+    (r".* should have (.*?)( after validation)?(, not \d+)?$", r"\1"),
 )
 # In the location of a validation error, pydantic inserts the kind that it has chosen after `KEY, index` for
 # each KEY of these.
