@@ -3,7 +3,7 @@
     RobocovError
     ├── InputError            an input cannot be used (exit status 2)
     │   ├── MapError          a map file, with line, column and JSON path of the mistake
-    │   ├── StartError        a start without room for the team
+    │   ├── StartError        a start without space for the team
     │   └── ParameterError    a gain, a limit, the name of a controller
     ├── ControllerEndedError  a user's controller ended Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
@@ -60,7 +60,7 @@ class InputError(RobocovError):
     See Also
     --------
     MapError : A map cannot be used.
-    StartError : A start has no room for the team.
+    StartError : A start has no space for the team.
     ParameterError : A parameter is out of range or unknown.
 
     Examples
@@ -201,7 +201,7 @@ class MapError(InputError):
 
 
 class StartError(InputError):
-    """A start has no room for the team, or lies inside an obstacle.
+    """A start has no space for the team, or lies inside an obstacle.
 
     See Also
     --------
@@ -215,7 +215,7 @@ class StartError(InputError):
     ...     room.start().sample(50)
     ... except rc.StartError as error:
     ...     print(str(error).split(",")[0])
-    start 'uniform': room for about 20 robots of radius 0.1 m
+    start 'uniform': space for about 20 robots of radius 0.1 m
     """
 
 

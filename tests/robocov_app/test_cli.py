@@ -168,7 +168,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --radius nan", "--radius: expected a number from 0.001 to 1000, got nan m"),
         ("run square --lattice 2 --robots 1 --radius 0.2 --start nowhere", "unknown start 'nowhere'"),
         ("cost rooms --positions x.json --sites .", ".: expected a file, got a folder"),
-        ("run rooms --radius 4", "no room for a robot of radius 4 m"),
+        ("run rooms --radius 4", "no space for a robot of radius 4 m"),
         ("run rooms --lattice 1", "--lattice: expected a number from 2 to 2048, got 1"),
         ("run rooms --size big", "--size: expected WIDTHxHEIGHT"),
         ("run rooms --size 10x10", "--size: expected a number from 320 to 7680 pixels wide, got 10"),

@@ -165,7 +165,7 @@ class Start:
             return self._take_given_positions(n, radius, self.spec.positions)
         area = self.compute_center_area(radius)
         if area.is_empty:
-            raise self._build_error(f"no room for a robot of radius {radius:g} m. Try a wider start.")
+            raise self._build_error(f"no space for a robot of radius {radius:g} m. Try a wider start.")
         points = _sample_apart(np.random.default_rng([seed, n]), area, n, compute_start_spacing(radius))
         if len(points) < n:
             raise self._build_error(self._describe_lack_of_space(n, radius))
@@ -227,9 +227,9 @@ class Start:
         suggestions = ["fewer or smaller robots"]
         if not isinstance(self.spec, UniformStart):
             capacity_everywhere = Start("uniform", UniformStart(), self.free).estimate_capacity(radius)
-            suggestions.append(f"start 'uniform' (room for about {capacity_everywhere})")
+            suggestions.append(f"start 'uniform' (space for about {capacity_everywhere})")
         return (
-            f"room for about {capacity} robots of radius {radius:g} m, but {n} were requested. "
+            f"space for about {capacity} robots of radius {radius:g} m, but {n} were requested. "
             f"Try {', '.join(suggestions)} or another map."
         )
 

@@ -187,7 +187,7 @@ def _find_position_mistakes(environment: Environment, name: str, start: PointsSt
 def _find_room_mistakes(
     environment: Environment, name: str, start: DiscStart | UniformStart
 ) -> Iterator[Mistake]:
-    """Yield a mistake if the disc or free space has no room for a robot of the default size."""
+    """Yield a mistake if the disc or free space has no space for a robot of the default size."""
     if _fits_at_disc_center(environment, start):
         return
     try:
@@ -197,7 +197,7 @@ def _find_room_mistakes(
         if isinstance(start, DiscStart):
             x, y = start.center
             area = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
-        message = f"{area} has no room for a robot of radius {DEFAULT_RADIUS_M:g} m"
+        message = f"{area} has no space for a robot of radius {DEFAULT_RADIUS_M:g} m"
         yield Mistake.at_path(("starts", name), message)
 
 

@@ -19,7 +19,7 @@ SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 class Frontier(NamedTuple):
-    """The unknown cells next to free cells with room for a robot."""
+    """The unknown cells next to free cells with space for a robot."""
 
     rows: IntArray
     """(b,) Row in the window."""
@@ -127,7 +127,7 @@ class MapWindow:
 
     @cached_property
     def frontier(self) -> Frontier:
-        """The unknown cells next to free cells with room for a robot."""
+        """The unknown cells next to free cells with space for a robot."""
         # With a margin of one cell, shifted views contain the neighbor of each cell in one direction.
         height, width = self.is_free.shape
         is_usable = np.pad(self.is_free & ~self.is_tight, 1)

@@ -228,7 +228,7 @@ class Simulation:
         ParameterError
             If forces are not finite or not of shape (n, 2), or the controller fails.
         StartError
-            If there is no room for a robot that joins.
+            If there is no space for a robot that joins.
         """
         robot_count = len(self.team)
         if external_forces is not None:

@@ -109,7 +109,7 @@ class ChangingWorld:
         Raises
         ------
         StartError
-            If there is no room for a robot that joins.
+            If there is no space for a robot that joins.
         """
         self._move_working_robots(forces, dt, external_forces, time)
         self._change_team(time + dt)
@@ -163,7 +163,7 @@ class ChangingWorld:
         except StartError:
             raise StartError(
                 f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], "
-                f"but there is no room for it in map {self._environment.name!r}"
+                f"but there is no space for it in map {self._environment.name!r}"
             ) from None
 
     def _build_world(self) -> None:

@@ -54,7 +54,7 @@ def relocate_robots(environment: Environment, positions: Array, team: Team) -> A
         np.add.at(positions, first, -step)
         np.add.at(positions, second, step)
     raise StartError(
-        f"robots {first[0] + 1} and {second[0] + 1} have no room next to each other "
+        f"robots {first[0] + 1} and {second[0] + 1} have no space next to each other "
         f"in map {environment.name!r}"
     )
 
@@ -129,7 +129,7 @@ def find_free_position(
         discs = shapely.buffer(shapely.points(others), circumradii, quad_segs=_QUADRANT_SEGMENTS)
         area = area.difference(shapely.union_all(discs))
     if area.is_empty:
-        raise StartError("there is no room for a robot there")
+        raise StartError("there is no space for a robot there")
     x, y = find_nearest_inside(area, np.array([point], dtype=float))[0].tolist()
     return x, y
 

@@ -60,7 +60,7 @@ def test_a_tight_start_is_filled_by_a_lattice() -> None:
     distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
     assert distances.min() >= 0.2
     with pytest.raises(
-        StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were requested"
+        StartError, match=r"start 'tight': space for about \d+ robots of radius 0.1 m, but 200 were requested"
     ):
         start.sample(200, seed=0)
 
@@ -98,7 +98,7 @@ def test_given_positions_are_used_in_order() -> None:
 
 
 def test_a_start_without_space_is_reported() -> None:
-    with pytest.raises(StartError, match=r"start 'slit': no room for a robot of radius 0.1 m"):
+    with pytest.raises(StartError, match=r"start 'slit': no space for a robot of radius 0.1 m"):
         Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)
 
 
@@ -109,11 +109,11 @@ def test_the_capacity_of_a_start_does_not_depend_on_the_request(disc: DiscStart)
     assert Start("tight", disc, SQUARE).estimate_capacity(0.1) == capacity
     messages = set()
     for n, seed in ((capacity + 10, 0), (capacity + 10, 1), (2 * capacity, 0), (5000, 3)):
-        with pytest.raises(StartError, match=f"room for about {capacity} robots") as caught:
+        with pytest.raises(StartError, match=f"space for about {capacity} robots") as caught:
             start.sample(n, seed, 0.1)
         messages.add(str(caught.value).replace(f"but {n} were", ""))
     assert len(messages) == 1
-    assert "Try fewer or smaller robots, start 'uniform' (room for about" in messages.pop()
+    assert "Try fewer or smaller robots, start 'uniform' (space for about" in messages.pop()
     for seed in range(4):
         assert start.sample(capacity, seed, 0.1).shape == (capacity, 2)
 

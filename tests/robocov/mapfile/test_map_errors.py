@@ -169,7 +169,7 @@ GEOMETRIC = [
     ),
     (
         edit("starts", "west side", {"kind": "disc", "center": [3.5, 3.5], "radius": 0.2}),
-        'starts["west side"]: the disc of radius 0.2 m at [3.5, 3.5] has no room',
+        'starts["west side"]: the disc of radius 0.2 m at [3.5, 3.5] has no space',
     ),
     (
         edit("starts", "given", "positions", 1, [7, 2]),
@@ -397,7 +397,7 @@ def assert_loads_or_raises(load: Any) -> None:
             for phrase in (
                 "expected",
                 "no free space",
-                "has no room",
+                "has no space",
                 "duplicate",
                 "not JSON",
                 "not UTF-8",

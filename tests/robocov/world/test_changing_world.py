@@ -82,7 +82,7 @@ def test_a_robot_joins_next_to_one_that_occupies_its_position() -> None:
 def test_errors_name_a_robot_without_room_to_join() -> None:
     cell = Environment("cell", ((0, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)))
     starts = np.array([[0.15, 0.15], [0.15, 0.15]])
-    with pytest.raises(StartError, match=r"robot 2 joins at 0.1\d* s at .*, but there is no room"):
+    with pytest.raises(StartError, match=r"robot 2 joins at 0.1\d* s at .*, but there is no space"):
         Simulation(cell, Rapf(), starts, conditions=Conditions(joins=((2, 0.1),))).run(0.2)
 
 

@@ -79,7 +79,7 @@ def test_errors_name_a_robot_without_room():
     team = replace(Team.homogeneous(2), radius=np.array([0.1, 5.0]))
     with pytest.raises(StartError, match=r"robot 2 of radius 5 m fits nowhere in map 'empty'"):
         relocate_robots(EMPTY, np.ones((2, 2)), team)
-    with pytest.raises(StartError, match="have no room next to each other"):
+    with pytest.raises(StartError, match="have no space next to each other"):
         relocate_robots(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
 
 

@@ -28,7 +28,7 @@ def test_a_report_has_every_figure(hall: Environment) -> None:
         "obstacles": "0, with 4 vertices (boundary included)",
         "components": "1 (100 m²)",
         "narrowest gap": "none",
-        "start corner": "disc, room for about 23",
+        "start corner": "disc, space for about 23 robots",
     }
 
 
@@ -43,8 +43,8 @@ def test_changed_values_are_printed_with_the_previous_ones(hall: Environment) ->
     assert after["narrowest gap"].startswith("0.100 m, between [") and after["narrowest gap"].endswith(
         ", was none"
     )
-    assert after["start all"] == "disc, room for about 23, was none"
-    assert after["start corner"] == "none, was disc, room for about 23"
+    assert after["start all"] == "disc, space for about 23 robots, was none"
+    assert after["start corner"] == "none, was disc, space for about 23 robots"
     assert after["warning"].endswith("cannot pass (new)")
     assert after["name"] == "hall"
 

@@ -90,7 +90,7 @@ def test_failures_are_reported_each_time_with_an_exit_status(
         assert said[0] == count or again
         assert said[1] == "8 of 16 runs failed:"
         assert said[2].startswith("  room-rapf-900-corner-0-")
-        assert ": start 'corner': room for about 45 robots" in said[2]
+        assert ": start 'corner': space for about 45 robots" in said[2]
         assert said[3].startswith("--retry-failed runs them again")
     assert main([*words, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
@@ -114,7 +114,7 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
 
     study.write_text(STUDY.replace("robots = 3", "robots = 900"))
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
-    assert "failed: start 'corner': room for about" in capsys.readouterr().out
+    assert "failed: start 'corner': space for about" in capsys.readouterr().out
 
 
 def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -76,7 +76,7 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
         driver.editor.robots = 50
         driver.press_key("f5")
-        assert driver.window.trial is None and "room for about" in driver.message
+        assert driver.window.trial is None and "space for about" in driver.message
 
 
 def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def test_the_team_has_the_positions_of_a_run() -> None:
 
 
 def test_a_team_that_does_not_fit_has_a_message() -> None:
-    assert "room for about" in sample_team(build_request(load_sketch("rooms"), 900)).message
+    assert "space for about" in sample_team(build_request(load_sketch("rooms"), 900)).message
     crossed = sheet(PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))))
     team = sample_team(build_request(crossed, 3))
     assert team.positions == ()

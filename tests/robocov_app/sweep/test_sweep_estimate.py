@@ -61,4 +61,4 @@ def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
 
 def test_the_error_of_a_failed_run_is_reported(tmp_path: Path) -> None:
     estimate = estimate_sweep(build_small_study(robots=(500,)), tmp_path, workers=1)
-    assert estimate.error is not None and "room for about" in estimate.error
+    assert estimate.error is not None and "space for about" in estimate.error

@@ -125,7 +125,7 @@ def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -
 
 def test_a_start_without_room_is_an_outcome() -> None:
     outcome = perform(first(build_small_study(robots=(500,))))
-    assert outcome.error is not None and outcome.error.startswith("start 'corner': room for about")
+    assert outcome.error is not None and outcome.error.startswith("start 'corner': space for about")
 
 
 def test_costs_of_the_last_maps_are_remembered() -> None:

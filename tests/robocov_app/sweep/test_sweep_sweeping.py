@@ -240,7 +240,7 @@ def test_failures_are_recorded_and_repeated_on_request(tmp_path: Path, executor:
     out = tmp_path / "out"
     assert sweep(study, out, quiet=True) == Totals(2, 6, 0, False)
     rows_by_controller = {(row["robots"], row["controller"]): row for row in read_rows(out)}
-    assert rows_by_controller["400", "rapf"]["error"].startswith("start 'corner': room for about")
+    assert rows_by_controller["400", "rapf"]["error"].startswith("start 'corner': space for about")
     assert rows_by_controller["2", name]["error"].startswith(
         "controller 'Mine': ValueError: not well (mine.py, line "
     )

@@ -79,7 +79,7 @@ def test_a_free_position_is_kept():
 def test_a_full_map_has_no_free_position():
     assert find_free_position(CELL, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
     for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, NO_ROBOTS)):
-        with pytest.raises(StartError, match="no room for a robot there"):
+        with pytest.raises(StartError, match="no space for a robot there"):
             find_free_position(CELL, radius, others, (0.25, 0.25))
 
 
@@ -314,7 +314,7 @@ def test_the_last_working_robot_cannot_be_removed():
 def test_a_robot_is_not_added_to_a_full_map():
     session = start_session(robots=1, environment=CELL, given_starts=np.array([[0.225, 0.225]]))
     before = describe_state(session)
-    with pytest.raises(StartError, match="no room"):
+    with pytest.raises(StartError, match="no space"):
         session.add_robot((0.1, 0.1))
     assert describe_state(session) == before
 

@@ -202,7 +202,7 @@ def test_the_command_starts_more_robots_than_fit_uniformly(capsys: pytest.Captur
     session = demo.build_session(options)
     assert len(session.displayed.numbers) == 200
     assert "no space for 200 robots at start 'market': they start uniformly" in capsys.readouterr().err
-    with pytest.raises(StartError, match="room for about"):
+    with pytest.raises(StartError, match="space for about"):
         demo.build_session(replace(options, start="market"))
 
 

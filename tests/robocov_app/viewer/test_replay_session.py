@@ -348,7 +348,7 @@ def test_records_that_cannot_be_compared_are_rejected(record: Record, build_othe
 
 
 def test_too_many_records_are_rejected(record: Record) -> None:
-    with pytest.raises(InputError, match="saved: 5 runs, but the window has room for 4"):
+    with pytest.raises(InputError, match="saved: 5 runs, but the window has space for 4"):
         replay(*[record] * 5)
 
 

@@ -180,7 +180,7 @@ class TestSessionScenario:
             SessionScenario(HALL, (RAPF,) * count)
 
     def test_a_team_needs_space_and_a_start_that_exists(self):
-        with pytest.raises(StartError, match="room for about"):
+        with pytest.raises(StartError, match="space for about"):
             _ = SessionScenario(HALL, robots=500).starts
         with pytest.raises(StartError, match="did you mean 'corner'"):
             _ = SessionScenario(HALL, start="cornre").starts

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from robocov.errors import InputError, MapError, format_path
+from robocov.errors import InputError, MapError, format_count, format_path
 from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.commands.options import JsonOption
@@ -241,7 +241,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         low, high = report.density_range
         rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
     for start in report.starts:
-        rows[f"start {start.name}"] = f"{start.kind}, room for about {start.capacity}"
+        rows[f"start {start.name}"] = f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"
     return rows
 
 

@@ -137,7 +137,7 @@ def _check_space(
     try:
         env.Start(name, start, free).sample(1, radius=radius)
     except StartError:
-        reason = f"has no room for a robot of radius {radius:g} m"
+        reason = f"has no space for a robot of radius {radius:g} m"
         if isinstance(start, env.DiscStart):
             disc = shapely.Point(start.center).buffer(start.radius)
             message = f"{label}: its disc {reason}"

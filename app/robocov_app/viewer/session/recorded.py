@@ -105,7 +105,7 @@ def _detect_period(record: Record) -> Record:
 def _check_runs(saved: Sequence[SavedRun]) -> None:
     """Raise an InputError unless the window can display the runs side by side."""
     if not 1 <= len(saved) <= MAX_PANES:
-        reason = f"{len(saved)} runs, but the window has room for {MAX_PANES}; --frames and --video show all"
+        reason = f"{len(saved)} runs, but the window has space for {MAX_PANES}; --frames and --video show all"
         raise InputError(f"{saved[0].folder.parent}: {reason}")
     first = _describe_run(saved[0].record)
     for run in saved:
