@@ -190,7 +190,7 @@ class RandomUser:
                 box = panel.ui.open_list.rect
             return rng.randint(box.left, box.right), rng.randint(box.top, box.bottom)
         layout = window.layout
-        boxes = [*layout.panes, layout.track, layout.chart, layout.panel, layout.panel]
+        boxes = [*layout.panes, layout.time_slider, layout.chart, layout.panel, layout.panel]
         if target > 0.7 and window._arranged and window.canvas._scenes:
             session = self.driver.session
             pane = rng.randrange(min(len(session.timeline.panes), len(layout.panes)))

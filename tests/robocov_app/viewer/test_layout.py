@@ -39,7 +39,7 @@ def compute_overlap(first: Box, second: Box) -> int:
 
 @given(draw_layouts())
 def test_boxes_fill_the_window_without_overlapping(layout: Layout) -> None:
-    boxes = [layout.arena, layout.panel, layout.chart, layout.track, layout.status]
+    boxes = [layout.arena, layout.panel, layout.chart, layout.time_slider, layout.status]
     width, height = layout.size
     for left, top, box_width, box_height in boxes:
         assert left >= 0
@@ -73,7 +73,7 @@ def test_texts_fit_at_the_scale_of_the_layout(layout: Layout) -> None:
     assert width / layout.scale >= min_size[0]
     assert height / layout.scale >= min_size[1]
     assert layout.panel.width in (0, round(320 * layout.scale))
-    assert layout.status.height == layout.track.height == round(26 * layout.scale)
+    assert layout.status.height == layout.time_slider.height == round(26 * layout.scale)
 
 
 @given(WIDTHS, HEIGHTS, SCALES)
@@ -98,7 +98,7 @@ def test_windows_that_are_too_small_have_a_small_scale(size: tuple[int, int]) ->
 @given(draw_layouts(), st.integers(0, 3839), st.integers(0, 2159))
 def test_every_pixel_is_in_one_box(layout: Layout, x: int, y: int) -> None:
     pixel = (x % layout.size[0], y % layout.size[1])
-    boxes = (layout.arena, layout.panel, layout.chart, layout.track, layout.status)
+    boxes = (layout.arena, layout.panel, layout.chart, layout.time_slider, layout.status)
     assert sum(is_inside(box, pixel) for box in boxes) == 1
 
 

@@ -24,7 +24,7 @@ def play_steps(driver: Driver, steps: int) -> Driver:
 
 def find_time(driver: Driver, time: float) -> tuple[float, float]:
     """Return the pixel of a time, s, on the time line."""
-    _, top, _, height = driver.window.layout.track
+    _, top, _, height = driver.window.layout.time_slider
     return driver.window.chart.to_column(time), top + height / 2
 
 

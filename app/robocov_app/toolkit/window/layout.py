@@ -1,4 +1,4 @@
-"""Layout of a window: boxes of arena, panel, chart, timeline and status line."""
+"""Layout of a window: boxes of arena, panel, chart, time slider and status line."""
 
 from math import ceil, floor
 from typing import NamedTuple
@@ -8,10 +8,13 @@ from robocov_app.render.panel_grid import choose_column_count
 # Lengths in pixels at scale 1.
 PANEL_WIDTH_PX = 320
 CHART_HEIGHT_PX = 150
-TIMELINE_HEIGHT_PX = 26
+TIME_SLIDER_HEIGHT_PX = 26
 STATUS_HEIGHT_PX = 26
 PANE_GAP_PX = 2
 LEGEND_ROW_PX = 22
+_LEGEND_MARGIN_PX = 6
+_PANE_MARGINS_PX = (31, 68)
+"""Width and height of a pane in addition to those of its map."""
 MIN_SIZE_PX = (900, 600)
 """Minimum width and height of a window in which everything fits at scale 1."""
 MIN_PORTRAIT_SIZE_PX = (460, 600)
@@ -49,8 +52,8 @@ class Layout(NamedTuple):
     size : (width, height), px
     scale : float
         The requested scale, or the largest one at which everything fits into the window.
-    arena, chart, track, status : Box
-        `track` is the timeline below the chart.
+    arena, chart, time_slider, status : Box
+        The time slider is below the chart.
     panel : Box
         Its width is 0 while the panel is hidden.
     panes : tuple of Box
@@ -64,7 +67,7 @@ class Layout(NamedTuple):
     arena: Box
     panel: Box
     chart: Box
-    track: Box
+    time_slider: Box
     status: Box
     panes: tuple[Box, ...]
     legend: Box
@@ -101,7 +104,7 @@ def build_layout(
     legend_rows : int
         Number of rows of the shared legend.
     plot : bool
-        Whether chart and timeline are shown.
+        Whether chart and time slider are shown.
 
     Returns
     -------
@@ -109,26 +112,26 @@ def build_layout(
     """
     width, height = size
     scale = min(scale, find_max_scale(size))
-    panel_width = timeline_height = chart_height = legend_height = 0
+    panel_width = slider_height = chart_height = legend_height = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
     # In small windows, the chart takes at most a third of the height.
     if plot:
-        timeline_height = round(TIMELINE_HEIGHT_PX * scale)
+        slider_height = round(TIME_SLIDER_HEIGHT_PX * scale)
         chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
     if panes > 1:
-        legend_height = round((6 + LEGEND_ROW_PX * legend_rows) * scale)
+        legend_height = round((_LEGEND_MARGIN_PX + LEGEND_ROW_PX * legend_rows) * scale)
     left_width = width - panel_width
     status_height = round(STATUS_HEIGHT_PX * scale)
-    arena_height = max(height - status_height - timeline_height - chart_height, 1)
+    arena_height = max(height - status_height - slider_height - chart_height, 1)
     return Layout(
         size=size,
         scale=scale,
         arena=Box(0, 0, left_width, arena_height),
         panel=Box(left_width, 0, panel_width, height),
         chart=Box(0, arena_height, left_width, chart_height),
-        track=Box(0, arena_height + chart_height, left_width, timeline_height),
-        status=Box(0, arena_height + chart_height + timeline_height, left_width, status_height),
+        time_slider=Box(0, arena_height + chart_height, left_width, slider_height),
+        status=Box(0, arena_height + chart_height + slider_height, left_width, status_height),
         panes=_arrange_panes(panes, aspect, scale, left_width, arena_height, legend_height),
         legend=Box(0, 0, left_width, legend_height),
     )
@@ -139,7 +142,10 @@ def _arrange_panes(
 ) -> tuple[Box, ...]:
     """Return the boxes of the panes, arranged in a grid below the legend."""
     free_size = width, max(arena_height - legend_height, 1)
-    columns = choose_column_count(count, aspect, free_size, row_margin=68 * scale, column_margin=31 * scale)
+    margin_width, margin_height = _PANE_MARGINS_PX
+    columns = choose_column_count(
+        count, aspect, free_size, row_margin=margin_height * scale, column_margin=margin_width * scale
+    )
     rows = ceil(count / columns)
     pane_width = (width - PANE_GAP_PX * (columns - 1)) // columns
     pane_height = (arena_height - legend_height - PANE_GAP_PX * (rows - 1)) // rows

@@ -152,7 +152,7 @@ class Chart:
     def _draw_page(self, frame: ChartFrame) -> pygame.Surface:
         """Draw the page: axes, events, curves, and the empty time slider."""
         layout = frame.layout
-        page = pygame.Surface((layout.chart.width, layout.chart.height + layout.track.height), 0, 32)
+        page = pygame.Surface((layout.chart.width, layout.chart.height + layout.time_slider.height), 0, 32)
         self._page = page
         self._page_time = self.viewer.now
         curves = [curve.values for curve in frame.list_curves()]

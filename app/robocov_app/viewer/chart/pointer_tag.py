@@ -43,7 +43,7 @@ def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int
 
 def _is_over_axis(frame: ChartFrame, pixel: tuple[int, int]) -> bool:
     """Return whether a pixel of the window is over the curves or the time slider."""
-    is_in_box = is_inside(frame.layout.chart, pixel) or is_inside(frame.layout.track, pixel)
+    is_in_box = is_inside(frame.layout.chart, pixel) or is_inside(frame.layout.time_slider, pixel)
     times = frame.times
     return is_in_box and times.left <= pixel[0] <= times.right
 

@@ -35,8 +35,8 @@ def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> No
     """
     theme = frame.theme
     top = frame.layout.chart.height
-    middle = top + 0.5 * frame.layout.track.height
-    canvas.surface.fill(theme.panel, pygame.Rect(0, top, *frame.layout.track.size))
+    middle = top + 0.5 * frame.layout.time_slider.height
+    canvas.surface.fill(theme.panel, pygame.Rect(0, top, *frame.layout.time_slider.size))
     thickness = _get_thickness(frame)
     bar = pygame.Rect(
         round(times.left), round(middle - thickness / 2), round(times.right - times.left), thickness
@@ -58,7 +58,7 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
         canvas.draw_text("live", (left, middle), color=theme.start, bold=True, size=size)
         return
     text = "live · past thinned"
-    if left + canvas.measure_text(text, size=size) > frame.layout.track.width:
+    if left + canvas.measure_text(text, size=size) > frame.layout.time_slider.width:
         text = "thinned"
     canvas.draw_text(text, (left, middle), color=theme.start, size=size)
 
@@ -69,7 +69,7 @@ def draw_slider_state(screen: pygame.Surface, frame: ChartFrame) -> None:
     times = frame.times
     timeline = frame.timeline
     canvas = create_flat_canvas(screen, theme, frame.scale)
-    middle = frame.layout.track.top + 0.5 * frame.layout.track.height
+    middle = frame.layout.time_slider.top + 0.5 * frame.layout.time_slider.height
     column = times.to_column(frame.session.displayed.time)
     end_column = times.to_column(timeline.end_time)
     # Gray up to the simulated time; if the past is displayed, colored up to the displayed time.
@@ -95,7 +95,7 @@ def draw_slider_state(screen: pygame.Surface, frame: ChartFrame) -> None:
 def _fill_bar(screen: pygame.Surface, frame: ChartFrame, end: float, color: Color) -> None:
     """Fill the bar of the time slider from its start to column `end` of the window."""
     thickness = _get_thickness(frame)
-    middle = frame.layout.track.top + 0.5 * frame.layout.track.height
+    middle = frame.layout.time_slider.top + 0.5 * frame.layout.time_slider.height
     left = round(frame.times.to_column(0.0))
     width = max(round(end) - left, thickness)
     bar = pygame.Rect(left, round(middle - thickness / 2), width, thickness)

@@ -58,6 +58,12 @@ _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
 _NUMBER_PX = (50, 34)  # the value and its unit
 _UNLIMITED_PX = (87,)  # the word "unlimited" instead of value and unit
+_ROW_PX = 24
+_HIGH_ROW_PX = 28
+_MAP_PX = (172, 0)  # menus of the map and of its starts
+# Label and number of robots, minus, plus, a gap, label and value of the seed, next seed.
+_ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
+_SPEED_PX = (46, 0, 42)  # label, slider and value
 # Column widths of the rows with controllers: each controller has a button that removes its pane, and a gap.
 _SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
 _TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
@@ -154,15 +160,14 @@ class ViewerPanel(CommandPanel):
         labels = shorten_names(files.list_maps())
         maps = {label: name for name, label in labels.items()}
         ui.header("ENVIRONMENT")
-        ui.row(172, 0, height=28, below=5)
+        ui.row(*_MAP_PX, height=_HIGH_ROW_PX, below=5)
         label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name))
         if label is not None:
             viewer.attempt(partial(files.open_map, maps[label]))
         start = ui.dropdown("start", viewer.playback.list_starts(), scenario.start_name)
         if start is not None:
             viewer.attempt(partial(viewer.playback.restart, start=start))
-        # Columns: label, number of robots, minus, plus, gap, label, seed, next seed.
-        ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
+        ui.row(*_ROBOTS_AND_SEED_PX, gap=3.5, below=8)
         ui.label("Robots")
         robots = ui.text_field("robots", str(len(viewer.robot_numbers)))
         if robots is not None:
@@ -186,9 +191,10 @@ class ViewerPanel(CommandPanel):
         count = len(choices)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
         if count == 1:
-            ui.row(*_SINGLE_CONTROLLER_PX, height=28, gap=6, below=4)
+            ui.row(*_SINGLE_CONTROLLER_PX, height=_HIGH_ROW_PX, gap=6, below=4)
         else:
-            ui.row(*(_TWO_CONTROLLERS_PX if count == 2 else _CONTROLLER_PAIR_PX), height=28, gap=2, below=4)
+            columns = _TWO_CONTROLLERS_PX if count == 2 else _CONTROLLER_PAIR_PX
+            ui.row(*columns, height=_HIGH_ROW_PX, gap=2, below=4)
         for k, choice in enumerate(choices):
             label = ui.dropdown(f"controller:{k}", list(names), labels[choice.name])
             if label is not None:
@@ -209,7 +215,7 @@ class ViewerPanel(CommandPanel):
         """Show the buttons for playback, and the speed."""
         session = self.viewer.session
         ui.header("RUN")
-        ui.row(0, 0, 0, 0, height=28, below=5)
+        ui.row(0, 0, 0, 0, height=_HIGH_ROW_PX, below=5)
         self.show_button(
             ui,
             "Pause" if session.playback.is_playing else "Play",
@@ -219,12 +225,13 @@ class ViewerPanel(CommandPanel):
         self.show_button(ui, "Step", "step")
         self.show_button(ui, "Settle", "settle", selected=session.playback.stop_when_settled)
         self.show_button(ui, "Restart", "restart")
-        ui.row(46, 0, 42, height=22)
+        ui.row(*_SPEED_PX, height=22)
         ui.label("Speed")
         index = float(find_speed_index(session.playback.clock.speed))
-        chosen = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0)
-        if chosen is not None:
-            self.viewer.attempt(partial(self.viewer.playback.set_speed, SPEEDS[round(chosen)]))
+        speed_index = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0)
+        if speed_index is not None:
+            speed = SPEEDS[round(speed_index)]
+            self.viewer.attempt(partial(self.viewer.playback.set_speed, speed))
         ui.label(format_speed(session.playback.clock.speed), key="speed")
 
     def _show_parameters(self, ui: Ui) -> None:
@@ -258,7 +265,7 @@ class ViewerPanel(CommandPanel):
         columns: tuple[int, ...] = _NUMBER_PX
         if parameter.is_unlimited:
             columns = _UNLIMITED_PX
-        ui.row(_LABEL_PX, 0, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.row(_LABEL_PX, 0, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=f"{parameter.meaning} ({unit})" if unit else parameter.meaning)
         position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
         if position is not None:
@@ -279,7 +286,7 @@ class ViewerPanel(CommandPanel):
         width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
         fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
-        ui.row(_LABEL_PX, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.row(_LABEL_PX, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=parameter.meaning)
         if fits:
             for choice in choices:
@@ -288,9 +295,9 @@ class ViewerPanel(CommandPanel):
                 if ui.button(choice, key=key, tip=parameter.meaning, selected=is_on, small=True):
                     self._set(name, choice)
         else:
-            chosen = ui.dropdown(name, choices, parameter.value, tip=parameter.meaning)
-            if chosen:
-                self._set(name, chosen)
+            picked = ui.dropdown(name, choices, parameter.value, tip=parameter.meaning)
+            if picked is not None:
+                self._set(name, picked)
         self._show_reset(ui, parameter, parameter.default)
 
     def _show_reset(self, ui: Ui, parameter: Parameter, default: str) -> None:
@@ -337,7 +344,7 @@ class ViewerPanel(CommandPanel):
                 show_report(ui, self.report)
 
     def _show_files(self, ui: Ui) -> None:
-        ui.row(0, 0, height=28, below=5)
+        ui.row(0, 0, height=_HIGH_ROW_PX, below=5)
         for label, command in _FILE_BUTTONS:
             is_recording = command == "video" and self.viewer.view.is_recording
             text = "Stop video" if is_recording else label
@@ -348,7 +355,7 @@ def show_report(ui: Ui, report: RobotReport) -> None:
     """Show the explanation of a robot, with an arrow for each force."""
     ui.paragraph(report.title, size=14, bold=True)
     ui.space(3)
-    ui.paragraph(report.verdict, size=12.5, bold=True, color=ui.theme.final)
+    ui.paragraph(report.verdict, size=12.5, bold=True, color=ui.theme.accent)
     ui.space(4)
     sizes = [float(np.hypot(*line.vector)) for line in report.lines if line.vector is not None]
     largest = max(sizes, default=1.0)

@@ -98,7 +98,7 @@ class ViewerPointer(Pointer):
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
-        return is_inside(layout.track, self.pixel) or is_inside(layout.chart, self.pixel)
+        return is_inside(layout.time_slider, self.pixel) or is_inside(layout.chart, self.pixel)
 
     def leave(self) -> None:
         """React when the mouse leaves the panes."""
