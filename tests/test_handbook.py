@@ -88,7 +88,7 @@ def test_a_folder_with_something_in_it_stays_as_it_is(
 ) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     assert main(["handbook", "--out", str(tmp_path)]) == 2
-    assert "exists already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
 
 

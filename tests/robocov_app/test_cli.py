@@ -122,7 +122,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     row = answer(capsys, "import", str(plan), "-o", str(out))
     assert row["area_kept_m2"] == pytest.approx(33.0)
     assert load_map(out).free_area == pytest.approx(33.0)
-    assert "exists already" in complaint(capsys, "import", str(plan), "-o", str(out))
+    assert "already exists" in complaint(capsys, "import", str(plan), "-o", str(out))
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_an_out_that_cannot_be_a_folder(tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "file"
     file.write_text("")
     line = complaint(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
-    assert line.startswith(f"{file / 'x'}: cannot be used for results: Not a directory")
+    assert line.startswith(f"{file / 'x'}: cannot be written: Not a directory")
 
 
 LONG = "x" * 300

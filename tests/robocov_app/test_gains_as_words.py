@@ -87,7 +87,7 @@ def test_a_study_takes_lists_of_words(study: Path) -> None:
         ("target = 3", r"gains\.rapf\.target: expected one of centroid, sensing, median, got 3\.0"),
         (
             'target = ["median", "median"]',
-            r"gains\.rapf\.target\[1\]: duplicate value 'median', given already at",
+            r"gains\.rapf\.target\[1\]: duplicate value 'median', already given at",
         ),
         (
             "target = {low = 0, high = 1}",

@@ -62,7 +62,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
         rng = np.random.default_rng([_SEED_ORDER.index(kind), seed, attempt])
         boundary, obstacles = FLOOR_PLANS[kind](rng)
         plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
-        if not _is_connected(plan) or not _is_blocked_enough(plan):
+        if not _is_connected(plan) or not _has_enough_obstacles(plan):
             continue
         start = _find_entry(plan)
         if start is None:
@@ -81,7 +81,7 @@ def _is_connected(plan: Environment) -> bool:
     return len(plan.free.geoms) == 1 and isinstance(wide_space, shapely.Polygon)
 
 
-def _is_blocked_enough(plan: Environment) -> bool:
+def _has_enough_obstacles(plan: Environment) -> bool:
     blocked_area = sum(obstacle.polygon.area for obstacle in plan.obstacles)
     return bool(blocked_area >= _MIN_BLOCKED_FRACTION * plan.area)
 

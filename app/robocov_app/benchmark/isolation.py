@@ -37,7 +37,7 @@ from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov_app.sweep.tasks import Task
 
-_FAILED_ATTEMPTS = 1000
+_MAX_ATTEMPTS = 1000
 """Number of attempts after which a region counts as too thin for drawing random points in it."""
 
 
@@ -127,21 +127,21 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
     """
     count = len(observations.positions)
     is_own = np.arange(count) == robot
-    is_known = is_own.copy()
+    is_heard = is_own.copy()
+    is_heard[observations.neighbors.list_neighbors(robot)] = True
+    has_true_position = is_own
     # If positions are reported by messages, a robot knows those in the messages, not the true ones.
     if observations.reported_positions is None or observations.neighbors.is_complete:
-        is_known[observations.neighbors.list_neighbors(robot)] = True
+        has_true_position = is_heard
     hidden = replace(
         observations,
-        positions=_freeze(np.where(is_known[:, None], observations.positions, substitutes)),
+        positions=_freeze(np.where(has_true_position[:, None], observations.positions, substitutes)),
         velocities=_freeze(np.where(is_own[:, None], observations.velocities, 0.0)),
         obstacle_points=_freeze(np.where(is_own[:, None], observations.obstacle_points, np.nan)),
     )
     if observations.max_speeds is not None:
-        is_audible = is_own.copy()
-        is_audible[observations.neighbors.list_neighbors(robot)] = True
         own_speed = observations.max_speeds[robot]
-        hidden.max_speeds = _freeze(np.where(is_audible, observations.max_speeds, own_speed))
+        hidden.max_speeds = _freeze(np.where(is_heard, observations.max_speeds, own_speed))
     if observations.steering is not None:
         hidden.steering = _freeze(np.where(is_own[:, None], observations.steering, 0.0))
     if observations.scans is not None:
@@ -194,7 +194,7 @@ def _freeze(array: Any) -> Any:
 def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Array:
     """Draw random positions in a region as placeholders for those of unknown robots, (count, 2) m."""
     low_x, low_y, high_x, high_y = region.bounds
-    for _ in range(_FAILED_ATTEMPTS):
+    for _ in range(_MAX_ATTEMPTS):
         points = rng.uniform((low_x, low_y), (high_x, high_y), size=(16 * count, 2))
         inside = points[region.contains(points)]
         if len(inside) >= count:
@@ -253,14 +253,14 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
         robots = checked if working is None else checked[working[checked]]
         if step >= len(decisions.forces):
             reason = decisions.problem or "the process ended"
-            return f"{_format_robot(replay.robot)} in a process of its own: {reason}"
+            return f"{_format_robot(replay.robot)} in a separate process: {reason}"
         is_same = _have_same_rows(transcript.forces[step], decisions.forces[step], robots)
         is_same &= _have_same_rows(transcript.goals[step], decisions.goals[step], robots)
         is_same &= _have_same_messages(transcript.messages[step], decisions.messages[step], robots)
         if not is_same.all():
             robot = int(robots[~is_same][0])
             return (
-                f"robot {robot + 1} decides otherwise from {observations.time:.2f} s on "
+                f"robot {robot + 1} decides differently from {observations.time:.2f} s on "
                 f"if its process receives only {_describe_knowledge(replay)}"
             )
     return None

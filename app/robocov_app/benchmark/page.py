@@ -217,7 +217,10 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
     """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
     family_head, family_rows = ratings.build_family_rows(ranked)
-    rows = [ratings.build_rating_row(rating, entries.information[rating.label]) for rating in ranked]
+    rows = []
+    for rating in ranked:
+        cells = ratings.build_rating_cells(rating, entries.information[rating.label])
+        rows.append(tuple(cells[column] for column in ratings.HEAD))
     return {
         "name": name,
         "title": suite.format_heading(name),

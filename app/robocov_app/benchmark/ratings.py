@@ -274,7 +274,7 @@ def format_number(value: float | None, form: str = ".3g") -> str:
     return f"{value:{form}}"
 
 
-def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
+def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
     """Build the row of a rating in the table of its track.
 
     Parameters
@@ -285,8 +285,8 @@ def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
 
     Returns
     -------
-    tuple of str
-        Cells for the columns in `HEAD`.
+    dict of str to str
+        Cells by the columns in `HEAD`, in the same order.
     """
     gap = rating.gap
     gaps = rating.get_values("gap")
@@ -295,25 +295,26 @@ def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
     fraction_at_rest, rest_time = rating.compute_rest()
     rest_text = f"{fraction_at_rest:.0%}" if rating.rows else NO_VALUE
     contacts = sum(row["contacts"] > 0 for row in rating.rows)
-    return (
-        rating.label,
-        information,
-        format_number(100.0 * rating.score, ".1f"),
-        _format_runs(rating, len(gaps)),
-        format_number(100.0 * gap.estimate, ".1f") + _format_bound(rating, len(gaps)),
-        NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}",
-        format_number(mean_gap, ".1f"),
-        format_number(worst_gap, ".1f"),
-        format_number(rating.compute_median("near_final_s"), ".0f"),
-        format_number(_compute_cost_integral(rating), ".0f"),
-        format_number(rating.compute_median("path_length_m"), ".1f"),
-        format_number(rating.compute_median("work_J"), ".0f"),
-        f"{contacts} of {len(rating.rows)}",
-        rest_text,
-        format_number(rest_time, ".0f"),
-        format_number(rating.compute_rate("told_bytes"), ".0f"),
-        format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
-    )
+    interval = NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}"
+    return {
+        "Controller": rating.label,
+        "Knows": information,
+        "Score, %": format_number(100.0 * rating.score, ".1f"),
+        "Runs": _format_runs(rating, len(gaps)),
+        "Gap, %": format_number(100.0 * gap.estimate, ".1f") + _format_bound(rating, len(gaps)),
+        "95 %": interval,
+        "Mean": format_number(mean_gap, ".1f"),
+        "Worst": format_number(worst_gap, ".1f"),
+        "To 5 %, s": format_number(rating.compute_median("near_final_s"), ".0f"),
+        "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
+        "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
+        "Work, J": format_number(rating.compute_median("work_J"), ".0f"),
+        "Contacts": f"{contacts} of {len(rating.rows)}",
+        "At rest": rest_text,
+        "Rest, s": format_number(rest_time, ".0f"),
+        "B/s": format_number(rating.compute_rate("told_bytes"), ".0f"),
+        "µs/s": format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
+    }
 
 
 def _format_runs(rating: Rating, gaps: int) -> str:
@@ -391,6 +392,6 @@ def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list
     """
     rows = []
     for track, ratings in build_ratings([result]).items():
-        cells = dict(zip(HEAD, build_rating_row(ratings[0], ""), strict=True))
+        cells = build_rating_cells(ratings[0], information="")
         rows.append((track, *(cells[name] for name in _SUMMARY_COLUMNS)))
     return ("Track", *_SUMMARY_COLUMNS), rows

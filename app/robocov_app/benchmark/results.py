@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 from robocov.errors import InputError, quote
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
+from robocov_app.runs.cost import AREA_TOLERANCE_M2
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome
@@ -33,8 +34,6 @@ FIGURES = (
     "stuck_robots",
 )
 """Figures of a run that a row contains in addition to its effort and its gaps."""
-_SAME_AREA_M2 = 1e-6
-"""Maximum difference between uncovered areas that count as the same."""
 Row: TypeAlias = dict[str, Any]
 """One run of a result: its track, map and seed, and its figures or its error."""
 
@@ -108,7 +107,7 @@ def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[
         no bound is known.
     """
     reference = find_reference(map_name, suite.TRACKS[track].survivors)
-    if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > _SAME_AREA_M2:
+    if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > AREA_TOLERANCE_M2:
         return {"gap": None, "gap_to_bound": None}
     cost = figures["mean_distance_m"]
     bound = reference["lower_bound_m"]
@@ -200,7 +199,9 @@ def check_gaps(result: Mapping[str, Any], path: Path) -> None:
             continue
         for name, value in compute_gaps(row["track"], row["map"], row).items():
             if row[name] != value:
-                raise InputError(f"{path}: rows[{k}]: {name}: expected {value} by its cost, got {row[name]}")
+                raise InputError(
+                    f"{path}: rows[{k}]: {name}: expected {value} from its cost, got {row[name]}"
+                )
 
 
 _HEAD_TYPES = {"entry": dict, "selection": dict, "versions": dict, "rows": list, "method": list}
@@ -234,13 +235,25 @@ def _check_row(row: Any, place: str) -> None:
         raise InputError(f"{place}: {row['track']} on {row['map']} is no run of the suite")
 
 
+_TYPE_NAMES: Mapping[Any, str] = {
+    dict: "an object",
+    list: "a list",
+    str: "a string",
+    bool: "true or false",
+    int: "a whole number",
+    str | None: "a string or null",
+    int | float | None: "a number or null",
+}
+
+
 def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None:
     """Raise InputError unless a JSON object has all keys in `types`, with values of these types."""
     for name, expected in types.items():
         if not isinstance(values, dict) or name not in values:
-            raise InputError(f"{place}: {name}: missing, expected a whole result")
+            raise InputError(f"{place}: {name}: missing, expected a complete result")
         if not isinstance(values[name], expected):
-            raise InputError(f"{place}: {name}: expected another kind of value, got {quote(values[name])}")
+            type_name = _TYPE_NAMES[expected]
+            raise InputError(f"{place}: {name}: expected {type_name}, got {quote(values[name])}")
 
 
 def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from robocov.defaults import DEFAULT_DURATION_S
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, describe_unknown_name
+from robocov.errors import InputError, ParameterError, describe_unknown_name, quote
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.floor_plans import FLOOR_PLANS, build_floor_plan
@@ -118,16 +118,16 @@ TRACKS: Mapping[str, Track] = {
         maps=tuple(name for names in FAMILIES.values() for name in names),
         seeds=(0, 1),
     ),
-    "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
-    "lossy": Track("2 messages a second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
+    "short-range": Track("communication range of 3 m", changes={"communication_range": 3.0}),
+    "lossy": Track("2 messages per second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
-    "unicycle": Track("robots on two wheels turn before they drive", changes={"kinematics": "unicycle"}),
+    "unicycle": Track("robots on two wheels, which turn before driving", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
     "density": Track("two hot spots count 20 times as much", OTHER_FAMILIES["density"]),
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
-    "tuning": Track("as ideal, for choosing gains: no result", OTHER_FAMILIES["tuning"]),
+    "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"]),
 }
 """All tracks by name, of which only `RATED_TRACKS` count."""
 RATED_TRACKS = tuple(name for name in TRACKS if name != "tuning")
@@ -160,7 +160,9 @@ def build_map(name: str) -> Environment:
         If the suite has no such map.
     """
     if name not in FAMILY_OF:
-        raise ParameterError(f"--maps: {describe_unknown_name('map of the benchmark', name, FAMILY_OF)}")
+        raise ParameterError(
+            f"--maps: unknown map of the benchmark {quote(name)}; `robocov benchmark suite` lists them"
+        )
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):
         plain = build_map(f"{kind}-{seed}")
@@ -209,7 +211,7 @@ def load_suite_map(name: str) -> Environment:
     if name not in frozen_maps or compute_map_hash(environment) != frozen_maps[name]["sha256"]:
         raise InputError(
             f"map {name}: expected the map of suite {VERSION}, whose hash is in {SUITE_FILE.name}, "
-            "got another one. Its file or its generator has changed."
+            "got a different one. Its file or its generator has changed."
         )
     return environment
 

@@ -28,12 +28,12 @@ _OPTIONS_BY_ACTION = {
 class Arguments(JsonOption):
     """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best placements known.
 
-    `robocov benchmark --controller NAME --out DIR` executes the runs, and resumes after any interruption;
-    DIR/result.json is small. `robocov benchmark verify DIR` repeats a sample of its runs, bit for bit, calls
-    the controller for single robots in processes of their own, and runs it on new maps.
-    `robocov benchmark page DIR ... --out FILE.html` compares results with those of the built-in controllers,
-    which the package contains; without DIR it shows these alone. `suite` lists tracks and families;
-    `references` computes missing best placements of the suite. The controller `oracle` knows them.
+    The action `run` executes the runs, resumes after any interruption, and writes DIR/result.json, which is
+    small. The action `verify DIR` repeats a sample of its runs, bit for bit, calls the controller for single
+    robots in separate processes, and runs it on new maps. The action `page DIR ... --out FILE.html` compares
+    results with those of the built-in controllers, which the package contains; without DIR it shows these
+    alone. The action `suite` lists tracks and maps, and `references` computes missing best placements of the
+    suite. The controller `oracle` knows them.
 
     Example: robocov benchmark --controller mine.py:Mine --quick --out mine
     """
@@ -50,9 +50,9 @@ class Arguments(JsonOption):
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
     """Gains that differ from their defaults."""
     track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()
-    """Only these tracks."""
+    """Only these tracks; `robocov benchmark suite` lists them."""
     maps: Annotated[tuple[str, ...], tyro.conf.arg(metavar="MAP ...")] = ()
-    """Only these maps."""
+    """Only these maps; `robocov benchmark suite` lists them."""
     quick: bool = False
     """Two tracks, with the first map of each family and one seed."""
     out: Path | None = None
@@ -62,13 +62,13 @@ class Arguments(JsonOption):
     scheduler: str | None = None
     """Address of a Dask scheduler whose workers do the runs."""
     sample: int = 10
-    """Number of runs to repeat."""
+    """Number of runs that verify repeats."""
     robots: int = 2
-    """Number of robots to isolate in each of these runs."""
+    """Number of robots to isolate in each repeated run."""
     new_maps: int = 5
-    """Number of new maps to run the controller on, at most one of each family."""
+    """Number of new maps on which verify runs the controller, at most one of each family."""
     seed: int | None = None
-    """Seed of the sample, the robots and the new maps; by default a new one is drawn."""
+    """Seed of verify for the sample, the robots and the new maps; by default a new one is drawn."""
     alone: bool = False
     """Leave the built-in controllers out of the page."""
     title: str = "Benchmark of coverage controllers"
@@ -85,7 +85,7 @@ class Arguments(JsonOption):
             require_number("--seed", self.seed, 0, 2**63 - 1, whole=True)
         self._check_applicable_options()
         if self.action == "run" and self.controller is None:
-            raise ParameterError("--controller: expected the name of one, or FILE.py:CLASS, got none")
+            raise ParameterError("--controller: expected a controller name or FILE.py:CLASS, got none")
         self._check_paths()
 
     def _check_applicable_options(self) -> None:
@@ -99,7 +99,7 @@ class Arguments(JsonOption):
                 is_given = getattr(self, name) != default
                 if is_given and name not in _OPTIONS_BY_ACTION[self.action]:
                     option = "DIR" if name == "paths" else f"--{name.replace('_', '-')}"
-                    raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
+                    raise ParameterError(f"{option}: not an option of robocov benchmark {self.action}")
 
     def _check_paths(self) -> None:
         """Raise a ParameterError if the number of results does not fit the action."""
@@ -179,7 +179,7 @@ def _print_suite(options: Arguments) -> int:
     title = f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK_TRACKS)}"
     print_table(columns, rows, title=title)
     echo()
-    families = [(name, ", ".join(maps)) for name, maps in suite.FAMILIES.items()]
+    families = [(name, ", ".join(maps)) for name, maps in {**suite.FAMILIES, **suite.OTHER_FAMILIES}.items()]
     print_table([("Family", BOLD), ("Maps", {})], families)
     return 0
 

@@ -17,6 +17,7 @@ from robocov.mapfile import load_map
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
+from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.output import print_answer
 
 _MAX_COORDINATE_M = 1e300
@@ -43,7 +44,7 @@ class Arguments(FigureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_number("--lattice", self.lattice, 2, 2048, whole=True)
+        require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE, whole=True)
         if self.sites is not None:
             resolve_target(self.sites)
 

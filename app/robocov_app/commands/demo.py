@@ -12,6 +12,7 @@ import tyro
 
 from robocov.errors import ParameterError, StartError, require_number
 from robocov_app.commands.options import LayerOptions, ScenarioOptions, WindowOptions, get_robot_count
+from robocov_app.runs.settings import MIN_LATTICE
 from robocov_app.terminal.arguments import parse_gains, parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import echo
@@ -31,6 +32,8 @@ DEFAULT_MAP = "rooms"
 """Map of the window if an option is given, but no map."""
 _MAX_CONTROLLERS = 4
 """Maximum number of controllers side by side."""
+_MAX_WINDOW_LATTICE = 1024
+"""Maximum lattice size in the window, which evaluates the cost several times per second."""
 
 
 @dataclass
@@ -60,7 +63,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     frames: int | None = None
     """Number of frames to render without a display, 30 per second; requires --out or --video."""
     out: Path | None = None
-    """Folder for these frames: 000000.png, 000001.png, ..."""
+    """Folder for the frames of --frames: 000000.png, 000001.png, ..."""
     video: Path | None = None
     """MP4 file to render without a display; with --tour, all of the tour."""
 
@@ -69,7 +72,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
         super().__post_init__()
         require_number("--robots", self.robots, 1, 1000)
         require_number("--seed", self.seed, 0, 2**63 - 1)
-        require_number("--lattice", self.lattice, 2, 1024)
+        require_number("--lattice", self.lattice, MIN_LATTICE, _MAX_WINDOW_LATTICE)
         require_number("--speed", self.speed, 0.01, 1000.0)
         if self.frames is not None:
             require_number("--frames", self.frames, 1, 1_000_000)
@@ -272,8 +275,8 @@ def build_session(options: Arguments) -> Session:
         start_name = scenario.start_name
         scenario = replace(scenario, start="uniform")
         session = Session(scenario)
-        text = f"no space for {robots} robots at start '{start_name}': they start uniformly"
-        echo(f"robocov: {text} (as with --start uniform)", to_stderr=True)
+        problem = f"not enough space for {robots} robots at start '{start_name}'"
+        echo(f"robocov: {problem}; using --start uniform", to_stderr=True)
     session.playback.clock.speed = options.speed
     session.playback.is_playing = not options.paused
     return session

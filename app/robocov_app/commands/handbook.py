@@ -101,13 +101,13 @@ def _build_pages(folder: Path) -> None:
         If Sphinx is not installed or fails.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists already; expected a new or an empty folder")
+        raise InputError(f"{folder}: already exists; expected a new or empty folder")
     if _BUNDLED_PAGES.is_dir():
         shutil.copytree(_BUNDLED_PAGES, folder, dirs_exist_ok=True)
         return
     missing_modules = [name for name in _REQUIRED_MODULES if importlib.util.find_spec(name) is None]
     if missing_modules:
-        alternative = f"the pages can be read as text, too: {find_page_sources() / 'index.md'}"
+        alternative = f"the pages can also be read as text: {find_page_sources() / 'index.md'}"
         raise RobocovError(
             f'{missing_modules[0]} is not installed: pip install "robocov[docs]"; {alternative}'
         )

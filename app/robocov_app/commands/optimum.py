@@ -22,15 +22,14 @@ from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, Optimum, find_optimum
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
-from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost, save_distance_figure
+from robocov_app.runs.cost import AREA_TOLERANCE_M2, MIN_FIGURE_LATTICE, build_cost, save_distance_figure
 from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
+from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.output import check_output_file, print_answer
 from robocov_app.terminal.progress import show_late_progress
 
 _AGREEMENT_TOLERANCES = (0.001, 0.005, 0.02)
 """Relative cost differences within which restarts count as agreeing with the best one."""
-_AREA_TOLERANCE_M2 = 1e-6
-"""Maximum difference between the uncovered areas of placements that cover the same components."""
 
 
 @dataclass
@@ -70,18 +69,18 @@ class Arguments(FigureOptions):
     def __post_init__(self) -> None:
         """Check that the options are in range and do not contradict each other."""
         if (self.map is None) == (self.run is None):
-            raise InputError("MAP or --run DIR: expected one of the two")
+            raise InputError("expected either MAP or --run DIR")
         if self.run is not None:
             self._check_run_options()
         if self.robots is not None:
             require_number("--robots", self.robots, 1, MAX_ROBOTS, whole=True)
         require_number("--restarts", self.restarts, 1, MAX_RESTARTS, whole=True)
-        require_number("--lattice", self.lattice, 2, 2048, whole=True)
+        require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE, whole=True)
         require_number("--precision", self.precision, MIN_PRECISION, 1.0)
         if self.seed < 0:
             raise ParameterError(f"--seed: expected a whole number of at least 0, got {self.seed}")
         if self.positions is not None:
-            check_output_file(self.positions, "another name", overwrite=self.overwrite)
+            check_output_file(self.positions, "another --positions", overwrite=self.overwrite)
         super().__post_init__()
 
     def _check_run_options(self) -> None:
@@ -187,7 +186,7 @@ def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> l
             raise InputError(f"{saved.folder}: {expected}, got {len(saved.record.team)}")
         result = cost(saved.record.positions[-1])
         gap = None
-        if abs(result.uncovered_area - best.uncovered_area) < _AREA_TOLERANCE_M2:
+        if abs(result.uncovered_area - best.uncovered_area) < AREA_TOLERANCE_M2:
             gap = best.compute_gap(result.mean_distance)
         gaps.append({"run": saved.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
     return gaps
@@ -270,7 +269,7 @@ def _describe_search(best: Optimum, robots: int, seconds: float) -> list[str]:
 
 def _describe_gap(gap: dict[str, Any]) -> str:
     """Return the gap of a run as a line of text."""
-    comparison = "covers other rooms than the best placement"
+    comparison = "covers different rooms from the best placement"
     if gap["gap"] is not None:
         comparison = f"{gap['gap']:.1%} above the best"
     return f"{gap['run']}: mean distance {gap['mean_distance_m']:.4f} m, {comparison}"

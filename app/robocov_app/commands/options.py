@@ -23,6 +23,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.errors import ParameterError, require_number
+from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.arguments import parse_size, parse_window_size
 
 if TYPE_CHECKING:
@@ -333,7 +334,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         require_number("--robots", self.robots, 1, 10_000)
         require_number("--seed", self.seed, 0, 2**63 - 1)
         require_number("--duration", self.duration, 0.0, 1e6, "s")
-        require_number("--lattice", self.lattice, 2, 2048)
+        require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE)
         self._check_record_size()
 
     def _check_record_size(self) -> None:

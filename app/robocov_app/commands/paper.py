@@ -144,14 +144,14 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
     counts = f"{expected.runs:,} runs"
     finished = expected.runs - expected.left
     if finished:
-        counts += f", {finished:,} of them done already"
+        counts += f", {finished:,} of them already done"
     seconds_per_run = ", ".join(
         f"{name} {seconds:.2f} s" for name, seconds in expected.seconds_per_run.items()
     )
     time = f"{format_duration(expected.seconds)} on {workers} processes"
     if on_cluster:
-        time = f"{format_duration(expected.seconds * workers)} of computing, on a Dask cluster"
-    return f"{counts}, about {time} (measured: {seconds_per_run} a run); Ctrl-C keeps finished runs"
+        time = f"{format_duration(expected.seconds * workers)} of computing time on a Dask cluster"
+    return f"{counts}, about {time} (measured: {seconds_per_run} per run); Ctrl-C keeps finished runs"
 
 
 def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:

@@ -136,11 +136,11 @@ def _check_damaged_runs(options: Arguments, results: Sequence[ReportedResult]) -
     damaged_runs = [(result.folder, run) for result in results for run in result.damaged_runs]
     if not any(result.runs for result in results):
         folder, run = damaged_runs[0]
-        raise InputError(f"{folder}: {run.folder}: {run.reason}; no run is left to report")
+        raise InputError(f"{folder}: {run.folder}: {run.reason}; no runs remain to report")
     if options.json:
         return
     for folder, run in damaged_runs:
-        echo(f"robocov: warning: {folder}: {run.folder} is left out: {run.reason}", to_stderr=True)
+        echo(f"robocov: warning: {folder}: {run.folder} is skipped: {run.reason}", to_stderr=True)
 
 
 def _add_references(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:

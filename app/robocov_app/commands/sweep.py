@@ -112,15 +112,15 @@ def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
     runs = f"{'runs':<20} {estimate.runs:>7}"
     finished = estimate.runs - estimate.left
     if finished:
-        runs += f"   ({finished} of them done already)"
+        runs += f"   ({finished} of them already done)"
     lines.append(runs)
     lines += estimate.notes
     if estimate.error is not None:
         lines.append(f"the trial run, {estimate.run}, failed: {estimate.error}")
-    lines.append(f"a run takes {estimate.seconds_a_run:.2f} s and {estimate.bytes_a_run / 1e3:.0f} kB")
+    lines.append(f"a run takes {estimate.seconds_per_run:.2f} s and {estimate.bytes_per_run / 1e3:.0f} kB")
     lines.append(
         f"all remaining runs: about {format_duration(estimate.seconds)} on "
-        f"{format_count(workers, 'worker')}; {estimate.bytes / 1e6:.0f} MB in all"
+        f"{format_count(workers, 'worker')}; {estimate.total_bytes / 1e6:.0f} MB in all"
     )
     return lines
 
@@ -180,8 +180,8 @@ def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
 
 def _describe_tables(out: Path) -> str:
     """Return a line of text with the paths of the written tables."""
-    text = f"the table is {out / SWEEP_TABLE_FILE}"
+    text = f"table: {out / SWEEP_TABLE_FILE}"
     parquet = out / SWEEP_PARQUET_FILE
     if parquet.exists():
-        text += f", and as Parquet {parquet}"
+        text += f"; as Parquet: {parquet}"
     return text

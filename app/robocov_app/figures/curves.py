@@ -25,7 +25,7 @@ from robocov_app.look.labels import spread_labels
 from robocov_app.look.theme import Theme
 
 DISTANCE = "mean distance to the nearest robot (m)"
-TIME = "mean time until the first robot is there (s)"
+TIME = "mean time until the first robot arrives (s)"
 WEIGHTED_DISTANCE = "mean distance to the nearest robot, weighted by φ (m)"
 
 _MIN_EXPONENT_VALUE = 1e7

@@ -412,8 +412,8 @@ def _check_curve(curve: TimeCurve) -> None:
     if len(curve.times) != len(curve.values) or not np.isfinite(curve.values).any():
         finite = int(np.isfinite(curve.values).sum())
         raise ParameterError(
-            f"curve {quote(curve.label)}: {len(curve.times)} times, {finite} finite values, "
-            f"expected a value for each time and a finite one"
+            f"curve {quote(curve.label)}: expected a value for each time, at least one of them finite, "
+            f"got {len(curve.times)} times and {finite} finite values"
         )
 
 

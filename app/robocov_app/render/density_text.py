@@ -45,7 +45,7 @@ def list_density_lines(environment: Environment) -> list[str]:
 def get_cost_name(environment: Environment) -> str:
     """Return the name of the coverage cost, which shows whether it is weighted by a density."""
     if describe_density(environment):
-        return "mean distance by φ"
+        return "mean distance weighted by φ"
     return "mean distance"
 
 

@@ -12,6 +12,8 @@ from robocov.mapfile.check import MANY_VERTICES, count_vertices
 from robocov.team import Team
 from robocov_app.terminal.progress import show_late_progress
 
+AREA_TOLERANCE_M2 = 1e-6
+"""Maximum difference between the uncovered areas of placements that cover the same components."""
 MIN_FIGURE_LATTICE = 256
 """Minimum lattice size of figures of distances, so that its cells are narrower than most walls."""
 MIN_VIDEO_LATTICE = 128

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from robocov_app.look.theme import Theme
 
 DEFAULT_VIDEO_SIZE_PX = (1280, 720)
+MIN_LATTICE = 2
+MAX_LATTICE = 2048
+"""Maximum lattice size that options and study files accept. The library accepts larger ones."""
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Cluster(Executor):
                 _check_connection(dask, address)
             self._client = dask.Client(address, timeout=CONNECTION_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError, TypeError, TimeoutError) as error:
-            reason = " ".join(str(error).split()) or f"no answer in {CONNECTION_TIMEOUT_S:g} s"
+            reason = " ".join(str(error).split()) or f"no answer within {CONNECTION_TIMEOUT_S:g} s"
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
         self._threads = 0
         self._threads_counted_at = -math.inf

@@ -29,13 +29,13 @@ class SweepEstimate:
         Name of the trial run.
     error : str or None
         Reason why the trial run failed; None if it did not.
-    seconds_a_run : float, s
+    seconds_per_run : float, s
         Computing time of the trial run.
-    bytes_a_run : int
+    bytes_per_run : int
         Size of the files of the trial run.
     seconds : float, s
         Estimated time for all remaining runs.
-    bytes : int
+    total_bytes : int
         Estimated size of the files of all runs.
     notes : list of str
         Remarks on runs that were executed earlier.
@@ -46,10 +46,10 @@ class SweepEstimate:
     axes: dict[str, int]
     run: str
     error: str | None
-    seconds_a_run: float
-    bytes_a_run: int
+    seconds_per_run: float
+    bytes_per_run: int
     seconds: float
-    bytes: int
+    total_bytes: int
     notes: list[str]
 
 
@@ -75,9 +75,9 @@ def estimate_sweep(
     survey = Ledger(folder).survey(
         generate_tasks(study), retry_failed=retry_failed, keep_versions=keep_versions
     )
-    left = sum(survey.is_left)
+    left = sum(survey.must_execute)
     # If no run remains, the very first one is measured.
-    task = next(compress(generate_tasks(study), survey.is_left), None) or next(generate_tasks(study))
+    task = next(compress(generate_tasks(study), survey.must_execute), None) or next(generate_tasks(study))
     # Not timed: the coverage cost is prepared only once for all runs on a map.
     prepare_cost(task)
     started = time.perf_counter()
@@ -91,10 +91,10 @@ def estimate_sweep(
         axes=count_axes(study),
         run=task.name,
         error=outcome.error,
-        seconds_a_run=seconds,
-        bytes_a_run=size,
+        seconds_per_run=seconds,
+        bytes_per_run=size,
         seconds=seconds * left / parallel_runs,
-        bytes=size * len(study),
+        total_bytes=size * len(study),
         notes=survey.describe(keep_versions=keep_versions),
     )
 

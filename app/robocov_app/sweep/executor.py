@@ -176,7 +176,7 @@ class Executor(ABC):
         max_ends = max(_MAX_CONSECUTIVE_ENDS, _MAX_CONSECUTIVE_ENDS_PER_TASK * self.capacity)
         if self._consecutive_ends > max_ends:
             raise OutputError(
-                f"{self._consecutive_ends} workers have ended one after the other, the last one because "
+                f"{self._consecutive_ends} workers ended in a row, the last one because "
                 f"{lost.cause}; finished runs are kept, and the same command resumes"
             )
         if had_others and not lost.is_caused_by_task:

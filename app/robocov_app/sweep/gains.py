@@ -117,7 +117,8 @@ def _draw_samples(
         return [()]
     if sampling is None:
         range_path = format_path((*path, next(iter(ranges))))
-        raise ParameterError(f"{range_path}: a range requires a table [sampling] with method and samples")
+        expected = "expected a table [sampling] with method and samples for a range, got none"
+        raise ParameterError(f"{range_path}: {expected}")
     points = sampling.draw_points(len(ranges))
     columns = [gain_range.interpolate(points[:, k]) for k, gain_range in enumerate(ranges.values())]
     return list(zip(*columns, strict=True))

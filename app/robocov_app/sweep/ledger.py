@@ -67,8 +67,8 @@ class Survey:
 
     Attributes
     ----------
-    is_left : bytearray
-        1 for each run that remains to be executed, 0 for the others, in the order of the tasks.
+    must_execute : bytearray
+        1 for each run that must still be executed, 0 for the others, in the order of the tasks.
     damaged : list of str
         Names of damaged runs.
     outdated : Counter
@@ -79,7 +79,7 @@ class Survey:
         Number of reused runs that failed.
     """
 
-    is_left: bytearray = field(default_factory=bytearray)
+    must_execute: bytearray = field(default_factory=bytearray)
     damaged: list[str] = field(default_factory=list)
     outdated: Counter[str] = field(default_factory=Counter)
     without_checksums: int = 0
@@ -88,12 +88,12 @@ class Survey:
     @property
     def remaining(self) -> int:
         """Number of runs that remain to be executed."""
-        return sum(self.is_left)
+        return sum(self.must_execute)
 
     @property
     def reused(self) -> int:
         """Number of runs that are used without being repeated."""
-        return len(self.is_left) - self.remaining
+        return len(self.must_execute) - self.remaining
 
     def describe(self, *, keep_versions: bool) -> list[str]:
         """Return remarks on damaged runs and on runs of other versions, one per line.
@@ -113,11 +113,11 @@ class Survey:
             lines.append(f"{runs} will be repeated: {names}")
         decision = "will be repeated"
         if keep_versions:
-            decision = "will be used nevertheless"
+            decision = "will be reused anyway"
         for differences, count in self.outdated.items():
             lines.append(f"{format_count(count, 'run')} made with {differences} {decision}")
         if self.outdated and not keep_versions:
-            lines.append("--keep-versions uses them as they are")
+            lines.append("--keep-versions reuses them as they are")
         if self.without_checksums:
             runs = format_count(self.without_checksums, "run")
             lines.append(
@@ -164,8 +164,9 @@ class Ledger:
         """
         survey = Survey()
         for task in tasks:
-            is_left = self._survey_task(survey, task, retry_failed=retry_failed, keep_versions=keep_versions)
-            survey.is_left.append(is_left)
+            survey.must_execute.append(
+                self._survey_task(survey, task, retry_failed=retry_failed, keep_versions=keep_versions)
+            )
         return survey
 
     def _survey_task(self, survey: Survey, task: Task, *, retry_failed: bool, keep_versions: bool) -> bool:
@@ -203,13 +204,15 @@ class Ledger:
             row = json.loads(_read_file(folder / _ROW_FILE))
             figures = row["figures"]
             error = row["error"]
-            _require(row["format"] == _ROW_FORMAT and row["digest"] == task.input_hash)
-            _require(all(value is None or type(value) in (int, float) for value in figures.values()))
-            _require(isinstance(error, str | None))
+            _require_undamaged(row["format"] == _ROW_FORMAT and row["digest"] == task.input_hash)
+            _require_undamaged(
+                all(value is None or type(value) in (int, float) for value in figures.values())
+            )
+            _require_undamaged(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
                 versions = _read_format_1_versions(folder, figures, error)
                 return Entry(figures, error, versions, has_checksums=False)
-            _require(row.pop("check_sum") == _compute_row_checksum(row))
+            _require_undamaged(row.pop("check_sum") == _compute_row_checksum(row))
             if checks_files:
                 _check_files(folder, row["files"])
             return Entry(figures, error, row["versions"])
@@ -305,7 +308,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     if is_used and not is_sweep(folder):
         raise InputError(f"{folder}: expected an empty folder or a sweep; choose another --out")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder}: cannot be used for results: Permission denied")
+        raise OutputError(f"{folder}: cannot be written: Permission denied")
     with lock_folder(folder):
         ledger = Ledger(folder)
         try:
@@ -318,7 +321,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
             ledger.runs_folder.mkdir(exist_ok=True)
         except OSError as error:
             path = error.filename or folder
-            raise OutputError(f"{path}: cannot be used for results: {error.strerror or error}") from error
+            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
         yield ledger
 
 
@@ -356,13 +359,13 @@ def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str
     file_name = RUN_FILE if error is None else ERROR_FILE
     run = json.loads(_read_file(folder / file_name))
     if error is not None:
-        _require(run["error"] == error)
+        _require_undamaged(run["error"] == error)
         return {}
     for name in FIGURES:
         value = run["summary"][name]
         # The table contains the mean of values for each robot.
         expected = sum(value) / len(value) if isinstance(value, list) else value
-        _require(figures[name] == expected)
+        _require_undamaged(figures[name] == expected)
     return dict(run["versions"])
 
 
@@ -370,7 +373,7 @@ def _check_files(folder: Path, files: Mapping[str, tuple[int, str]]) -> None:
     """Raise DamagedRunError unless each file has its recorded size and checksum."""
     for name, (size, checksum) in files.items():
         content = _read_file(folder / name)
-        _require(len(content) == size and _compute_file_checksum(content) == checksum)
+        _require_undamaged(len(content) == size and _compute_file_checksum(content) == checksum)
 
 
 def _describe_file(content: bytes) -> tuple[int, str]:
@@ -378,7 +381,7 @@ def _describe_file(content: bytes) -> tuple[int, str]:
     return len(content), _compute_file_checksum(content)
 
 
-def _require(is_valid: bool) -> None:
+def _require_undamaged(is_valid: bool) -> None:
     if not is_valid:
         raise DamagedRunError
 

@@ -83,4 +83,4 @@ def require_distinct(values: Sequence[object], path: JsonPath) -> None:
         if first_index < index:
             place = format_path((*path, index))
             first_place = format_path((*path, first_index))
-            raise ParameterError(f"{place}: duplicate value {quote(value)}, given already at {first_place}")
+            raise ParameterError(f"{place}: duplicate value {quote(value)}, already given at {first_place}")

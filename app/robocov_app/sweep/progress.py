@@ -92,9 +92,9 @@ class SweepProgress:
         if self.lost_workers:
             parts.append(f"{format_count(self.lost_workers, 'worker')} lost")
         if self.rate >= _MIN_WHOLE_RATE_PER_S:
-            parts.append(f"{self.rate:.0f} a second")
+            parts.append(f"{self.rate:.0f} per second")
         elif self.rate > 0:
-            parts.append(f"{self.rate:.2g} a second")
+            parts.append(f"{self.rate:.2g} per second")
         return ", ".join(parts)
 
     def describe_all(self) -> str:

@@ -38,6 +38,7 @@ from robocov.mapfile import to_json
 from robocov.scenario import MAX_RECORD_ROWS
 from robocov.simulation import check_dt, check_joins
 from robocov.team_files import build_team
+from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.sweep.controller_files import load_study_controller, source_to_json
 from robocov_app.sweep.gains import Gains, GainsSpecification, build_gains
 from robocov_app.sweep.parameters import (
@@ -58,8 +59,7 @@ ALL_STARTS = "*"
 """Selects all starts of each map."""
 MAX_ROBOTS = 10_000
 _MAX_MAP_NAME_CHARS = 100
-_MIN_LATTICE = 2
-_MAX_LATTICE = 2048
+
 _MAX_NUMBERS = {"duration": 1e6, "dt": 1.0, "cost_hz": 1e4, "record_hz": 1e4}
 """Maximum values of a study's numbers, in s and Hz."""
 Swept: TypeAlias = float | Sequence[float | None] | None
@@ -171,7 +171,7 @@ class Study:
         """Check all values, and replace given values by resolved ones; later steps rely on earlier ones."""
         self._check_size()
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
-            self._set(name, tuple(getattr(self, name)))
+            self._replace_field(name, tuple(getattr(self, name)))
         self._resolve_group_size()
         self._check_names()
         self._check_numbers()
@@ -181,7 +181,7 @@ class Study:
         self._resolve_controllers()
         self._check_record_size()
 
-    def _set(self, name: str, value: object) -> None:
+    def _replace_field(self, name: str, value: object) -> None:
         """Replace a given value by its resolved form while the frozen study is being built."""
         object.__setattr__(self, name, value)
 
@@ -206,7 +206,7 @@ class Study:
             raise ParameterError(
                 f"robots: expected {size} as in the groups of the team, got {list(self.robots)}"
             )
-        self._set("robots", (size,))
+        self._replace_field("robots", (size,))
 
     def _check_names(self) -> None:
         """Raise an error if the name of a controller or a map is invalid."""
@@ -225,9 +225,9 @@ class Study:
             require_number(f"robots[{index}]", robots, 1, MAX_ROBOTS, whole=True)
         for index, seed in enumerate(self.seeds):
             require_number(f"seeds[{index}]", seed, 0, MAX_SEED, whole=True)
-        require_number("lattice", self.lattice, _MIN_LATTICE, _MAX_LATTICE, whole=True)
+        require_number("lattice", self.lattice, MIN_LATTICE, MAX_LATTICE, whole=True)
         for name, maximum in _MAX_NUMBERS.items():
-            self._set(name, require_number(name, getattr(self, name), 0.0, maximum))
+            self._replace_field(name, require_number(name, getattr(self, name), 0.0, maximum))
         check_dt(self.dt)
         require_type("metrics", self.metrics, bool, "true or false")
 
@@ -273,7 +273,7 @@ class Study:
             axes[GROUPS] = [json.dumps([dict(group) for group in self.group])]
         condition_axes = parse_condition_axes(self.conditions)
         self._check_conditions(_combine(condition_axes))
-        self._set("teams", tuple(_combine(axes | condition_axes)))
+        self._replace_field("teams", tuple(_combine(axes | condition_axes)))
 
     def _check_conditions(self, combinations: Sequence[Mapping[str, ParameterValue]]) -> None:
         """Raise an error if conditions are impossible with one of the numbers of robots, or on a map."""
@@ -302,8 +302,8 @@ class Study:
             gains[name] = build_gains(controller_class, specification, self.sampling, ("gains", name))
         if self.sampling is not None and not any(entry.ranges for entry in gains.values()):
             raise ParameterError("sampling: expected at least one gain with a range {low, high}, got none")
-        self._set("sources", sources)
-        self._set("gains", gains)
+        self._replace_field("sources", sources)
+        self._replace_field("gains", gains)
 
     def _check_record_size(self) -> None:
         """Raise an error if the record of a run would not fit into memory."""
@@ -311,7 +311,7 @@ class Study:
         rows = self.duration / self.dt * robots
         if rows > MAX_RECORD_ROWS:
             raise ParameterError(
-                f"duration: expected at most {MAX_RECORD_ROWS:.0e} rows of a record, "
+                f"duration: expected a record of at most {MAX_RECORD_ROWS:.0e} rows, "
                 f"got {self.duration:g} s of {robots} robots at {self.dt:g} s, which are {rows:.3g} rows"
             )
 

@@ -308,7 +308,6 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
         if name in maps:
-            expected = f"maps whose names differ, and there is a {name!r} already"
-            raise InputError(f"maps[{k}]: expected {expected}, got {quote(entry)}")
+            raise InputError(f"maps[{k}]: expected maps with different names, got a second {quote(name)}")
         maps[name] = StudyMap(name, environment)
     return list(maps.values())

@@ -128,10 +128,10 @@ def sweep(
         progress.reused = survey.reused
         for line in survey.describe(keep_versions=keep_versions):
             reporter.print_line(line)
-        rows = _RowWriter(ledger, table, zip(survey.is_left, generate_tasks(study), strict=False))
+        rows = _RowWriter(ledger, table, zip(survey.must_execute, generate_tasks(study), strict=False))
         outcomes = _OutcomeStore(ledger, rows, requires_same_versions=not keep_versions)
         failure = _execute_remaining(
-            tasks=compress(generate_tasks(study), survey.is_left),
+            tasks=compress(generate_tasks(study), survey.must_execute),
             open_executor=partial(_open_executor, scheduler, workers, survey.remaining),
             outcomes=outcomes,
             reporter=reporter,
@@ -283,13 +283,13 @@ class _RowWriter:
         self._ledger = ledger
         self._table = table
         self._tasks = tasks
-        self._next = next(tasks, None)
+        self._next_task = next(tasks, None)
 
     def write(self) -> None:
         """Write the next rows, up to the first task that has not finished."""
-        while self._next is not None:
-            was_left, task = self._next
-            if was_left and task.name not in self.finished:
+        while self._next_task is not None:
+            was_remaining, task = self._next_task
+            if was_remaining and task.name not in self.finished:
                 return
             if not self._write_row(task):
                 raise OutputError(f"{self._ledger.folder}: {task.name} was removed by another program")
@@ -297,14 +297,14 @@ class _RowWriter:
 
     def write_remaining(self) -> None:
         """Write the rows of all remaining tasks that have finished, and leave out the others."""
-        while self._next is not None:
-            _, task = self._next
+        while self._next_task is not None:
+            _, task = self._next_task
             self._write_row(task)
             self._advance(task)
 
     def _advance(self, task: Task) -> None:
         self.finished.discard(task.name)
-        self._next = next(self._tasks, None)
+        self._next_task = next(self._tasks, None)
 
     def _write_row(self, task: Task) -> bool:
         """Write the row of a task; return False if the ledger has no entry for it."""

@@ -55,7 +55,7 @@ _FINAL_COLUMNS = (
     Column("error", "string", "", "why the run failed, null if it did not"),
 )
 _MEAN_TIME_COLUMN = Column(
-    MEAN_TIME, "double", "s", "mean time until the first robot is at a place, each at its top speed"
+    MEAN_TIME, "double", "s", "mean time until the first robot reaches a point, each at its top speed"
 )
 _METRIC_COLUMNS = (
     Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
@@ -65,7 +65,7 @@ _METRIC_COLUMNS = (
     Column("effort_N2_s", "double", "N² s", "integral of |F|² of these forces, sum over the robots"),
     Column("components", "double", "", "connected components of the communication graph"),
     Column("algebraic_connectivity", "double", "", "of the communication graph"),
-    Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null where there is one"),
+    Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null for a single robot"),
     Column(
         "near_final_s", "double", "s", "time after which the mean distance stays within 5 % of its last value"
     ),

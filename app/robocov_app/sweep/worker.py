@@ -35,7 +35,7 @@ _COLLECTION_STEPS = 1000
 """Number of steps between two garbage collections in a long run."""
 FIGURES = {
     "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
-    "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
+    "mean_distance_over_run_m": ("double", "m", "time average of the mean distance over the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
     "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
     "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),

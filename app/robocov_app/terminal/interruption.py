@@ -72,7 +72,7 @@ class Interruption:
             raise KeyboardInterrupt
         self.requested = True
         with suppress(OSError):
-            os.write(2, b"\nstopping; press Ctrl-C again to end at once\n")
+            os.write(2, b"\nstopping; press Ctrl-C again to stop immediately\n")
 
 
 def block_interrupts() -> None:

@@ -104,7 +104,7 @@ def check_output_file(
     source : Path or None
         File that the command reads, which must never be replaced.
     source_kind : str
-        What the source is, for the message.
+        Kind of the source, for the message.
 
     Raises
     ------
@@ -114,9 +114,9 @@ def check_output_file(
     if not resolve_target(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
-        raise InputError(f"{path}: the {source_kind} that is read; choose {alternative}")
+        raise InputError(f"{path}: is the {source_kind} being read; choose {alternative}")
     if not overwrite:
-        raise InputError(f"{path}: exists already; choose {alternative} or pass --overwrite")
+        raise InputError(f"{path}: already exists; choose {alternative} or pass --overwrite")
 
 
 def list_files(folder: Path) -> str:

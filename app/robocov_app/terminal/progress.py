@@ -125,4 +125,4 @@ def report_compilation() -> Iterator[None]:
 
 
 def _print_compilation_notice() -> None:
-    echo("compiling the simulation, once", to_stderr=True)
+    echo("compiling the simulation (only once)", to_stderr=True)

@@ -90,7 +90,8 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
         exit_status = 128 - status if status < 0 else status
         return exit_status or 1, ""
     names = ", ".join(controllers)
-    return 1, f"controller {names}: it ended Python ({describe_status(status)}) before the command was done"
+    reason = f"it terminated Python ({describe_status(status)}) before the command had finished"
+    return 1, f"controller {names}: {reason}"
 
 
 @contextmanager

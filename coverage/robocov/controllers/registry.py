@@ -30,7 +30,7 @@ from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import ControllerSource, explain_fault, load_class
 from robocov.controllers.visibility import Visibility
 from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
-from robocov.errors import ParameterError, describe_unknown_name, require_type
+from robocov.errors import ParameterError, describe_unknown_name, quote, require_type
 
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
@@ -173,7 +173,7 @@ def load_controller_class(name: str, *, source: ControllerSource | None = None) 
     # Only the package that offers the name is loaded. If several do, the last one counts.
     entries = [entry for entry in entry_points(group=_ENTRY_POINT_GROUP) if entry.name == name]
     if not entries:
-        raise ParameterError(describe_unknown_name("controller", name, list_controller_classes()))
+        raise ParameterError(_describe_unknown_controller(name))
     entry = entries[-1]
     try:
         return _load_entry(entry)
@@ -181,6 +181,14 @@ def load_controller_class(name: str, *, source: ControllerSource | None = None) 
         raise
     except BaseException as error:
         raise _explain_entry_fault(entry, error) from error
+
+
+def _describe_unknown_controller(name: str) -> str:
+    """Return the message for an unknown name, with a hint if it looks like a class in a Python file."""
+    file, _, class_name = name.partition(":")
+    if file and class_name:
+        return f"unknown controller {quote(name)}: for a class in a file, write {file}.py:{class_name}"
+    return describe_unknown_name("controller", name, list_controller_classes())
 
 
 def make_controller(

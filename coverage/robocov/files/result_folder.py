@@ -314,7 +314,7 @@ def report_folder_errors(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {describe_error(error)}") from error
+        raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
 
 
 def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:

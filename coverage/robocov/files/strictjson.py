@@ -40,6 +40,7 @@ _MAX_BITS = 1023
 _SYNTAX_EXCERPT_CHARACTERS = 12
 """Number of characters of the text that the message about a syntax error quotes."""
 _WHITESPACE = " \t\n\r"
+_VALUE_START = re.compile(r'["{\[0-9-]')
 
 
 class _Object(dict[str, Any]):
@@ -309,12 +310,22 @@ def _find_error(text: str, error: json.JSONDecodeError) -> int:
     before = text[: error.pos].rstrip(_WHITESPACE)
     if text[error.pos : error.pos + 1] in ("}", "]") and before.endswith(","):
         return len(before) - 1  # Later versions report the comma itself.
+    if _is_comma_missing(text, error):
+        return len(before)
     return error.pos
+
+
+def _is_comma_missing(text: str, error: json.JSONDecodeError) -> bool:
+    """Return whether a value follows another one without a comma."""
+    return error.msg == "Expecting ',' delimiter" and _VALUE_START.match(text, error.pos) is not None
 
 
 def _describe_syntax_error(text: str, error: json.JSONDecodeError) -> str:
     """Return why a text is not JSON, in the same words in all versions of Python."""
     offset = _find_error(text, error)
+    if _is_comma_missing(text, error):
+        last_line = text[max(0, offset - _SYNTAX_EXCERPT_CHARACTERS) : offset].splitlines()[-1]
+        return f"not JSON: expected ',' after {quote(last_line)}"
     excerpt = text[offset : offset + _SYNTAX_EXCERPT_CHARACTERS]
     quotation = quote(excerpt.splitlines()[0] or excerpt) if excerpt else "end of file"
     if excerpt[:1] == "," and text[offset + 1 :].lstrip(_WHITESPACE)[:1] in ("}", "]"):

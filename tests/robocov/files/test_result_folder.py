@@ -152,12 +152,12 @@ def test_an_emptied_result_folder_can_be_used_again(tmp_path: Path) -> None:
 
 def test_a_file_instead_of_a_folder_is_rejected(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
-    with pytest.raises(OutputError, match="cannot be used for results"):
+    with pytest.raises(OutputError, match="cannot be written"):
         save_result(tmp_path / "x", NEW)
 
 
 def test_names_that_are_too_long_give_an_error(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be used for results: File name too long"):
+    with pytest.raises(OutputError, match="cannot be written: File name too long"):
         save_result(tmp_path / ("x" * 256), NEW)
 
 

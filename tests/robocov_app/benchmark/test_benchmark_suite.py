@@ -74,7 +74,7 @@ def test_a_reference_has_the_cost_that_it_tells() -> None:
 def test_names_that_are_unknown() -> None:
     with pytest.raises(ParameterError, match="--track: unknown track 'ideel': did you mean 'ideal'"):
         suite.select_maps(["ideel"], [], quick=False)
-    with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'"):
+    with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'; `robocov"):
         suite.select_maps([], ["room"], quick=False)
     with pytest.raises(ParameterError, match="--maps: expected a map of ideal, got forklifts"):
         suite.select_maps(["ideal"], ["forklifts"], quick=False)

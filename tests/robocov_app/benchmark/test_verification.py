@@ -197,7 +197,7 @@ def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, 
     (tmp_path / "mine.py").write_text(IMPORTS + code)
     difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
     assert difference is not None
-    assert "robot 3 decides otherwise from" in difference
+    assert "robot 3 decides differently from" in difference
     assert difference.endswith("if its process receives only its own observations")
 
 
@@ -210,7 +210,7 @@ def test_robots_may_send_messages(track: str, tmp_path: Path) -> None:
 def test_messages_with_hidden_knowledge_are_found(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
     difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
-    assert difference is not None and "decides otherwise" in difference
+    assert difference is not None and "decides differently" in difference
 
 
 def test_contents_are_compared_bit_for_bit() -> None:
@@ -247,7 +247,7 @@ def verify(folder: Path, name: str, options: VerificationOptions = SMALL) -> Ver
     ("code", "track", "expected"),
     [
         (HEAD.removeprefix(IMPORTS) + PULL, "ideal", None),
-        (GLOBAL, "short-range", "decides otherwise"),
+        (GLOBAL, "short-range", "decides differently"),
         (ON_DISK, "ideal", "its controller tried writing"),
         (READER, "ideal", "its controller tried reading"),
     ],
@@ -389,4 +389,4 @@ def test_a_process_that_ended_is_a_difference() -> None:
     replay = Replay(task, 1, transcript.observations, None)
     decisions = _decide_again(replace(replay, observations=replay.observations[:5]))
     difference = find_difference(transcript, replay, decisions)
-    assert difference == "robot 2 in a process of its own: the process ended"
+    assert difference == "robot 2 in a separate process: the process ended"

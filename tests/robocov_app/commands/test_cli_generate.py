@@ -160,7 +160,7 @@ def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.Cap
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "map.json"
     file.write_text("mine")
-    assert "exists already; choose another --out or pass --overwrite" in complaint(
+    assert "already exists; choose another --out or pass --overwrite" in complaint(
         capsys, "generate", "-o", str(file)
     )
     assert file.read_text() == "mine"

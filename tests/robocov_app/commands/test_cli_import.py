@@ -59,7 +59,7 @@ def test_the_name_of_the_map_is_that_of_the_file(
     (tmp_path / "maps" / "grid.map").write_text(GRID)
     assert run_command(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
     assert load_map(Path("grid.json")).free_area == 1.25
-    assert "grid.json: exists already; choose another -o or pass --overwrite" in complaint(
+    assert "grid.json: already exists; choose another -o or pass --overwrite" in complaint(
         capsys, "import", "maps/grid.map"
     )
     words = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")

@@ -110,7 +110,7 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
     assert row["uncovered_area_m2"] == 0.0
     assert row["runs"][0]["gap"] is None
     assert main(["optimum", "--run", str(out), *FAST]) == 0
-    assert "covers other rooms than the best placement" in capsys.readouterr().out
+    assert "covers different rooms from the best placement" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -129,8 +129,8 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "part"),
     [
-        ((), "MAP or --run DIR: expected one of the two"),
-        (("rooms", "--run", "x"), "MAP or --run DIR: expected one of the two"),
+        ((), "expected either MAP or --run DIR"),
+        (("rooms", "--run", "x"), "expected either MAP or --run DIR"),
         (("roms",), "unknown map 'roms': did you mean 'rooms'?"),
         (("rooms", "--robots", "0"), "--robots: expected a whole number from 1 to 500, got 0"),
         (("rooms", "--robots", "many"), "--robots: "),
@@ -158,7 +158,7 @@ def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.Ca
     file = tmp_path / "mine.json"
     file.write_text("[[1, 1]]")
     words = ("optimum", "trap", *FAST, "--positions", str(file))
-    assert "exists already" in complaint(capsys, *words)
+    assert "already exists" in complaint(capsys, *words)
     assert file.read_text() == "[[1, 1]]"
     assert main([*words, "--overwrite"]) == 0
     assert len(json.loads(file.read_bytes())) == 6

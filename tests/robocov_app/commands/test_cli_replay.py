@@ -120,7 +120,7 @@ def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) ->
     for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
         words = ("--frames", *SMALL, "--overwrite", "--out", str(out))
         assert complaint(capsys, "replay", str(source), *words).endswith(
-            "expected another folder than that of the run"
+            "expected a folder other than that of the run"
         )
     assert (run / "record.npz").exists()
     assert (both / "lloyd" / "record.npz").exists()

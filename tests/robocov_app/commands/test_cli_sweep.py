@@ -39,14 +39,14 @@ def test_a_sweep_prints_its_results(study: Path, capsys: pytest.CaptureFixture[s
     out = study.parent / "out"
     assert main(["sweep", str(study), "--out", str(out), "--workers", "1"]) == 0
     said = capsys.readouterr()
-    assert said.out.splitlines() == ["8 runs done", f"the table is {out}/results.csv"]
+    assert said.out.splitlines() == ["8 runs done", f"table: {out}/results.csv"]
     assert not (out / "results.parquet").exists()
     assert said.err.splitlines()[-1].startswith("sweep: 8 of 8 runs, ")
     assert main(["sweep", str(study), "--out", str(out)]) == 0
     assert capsys.readouterr().out.startswith("0 runs done, 8 reused\n")
     pytest.importorskip("pyarrow")
     assert main(["sweep", str(study), "--out", str(out), "--parquet"]) == 0
-    assert capsys.readouterr().out.endswith(f"/results.csv, and as Parquet {out}/results.parquet\n")
+    assert capsys.readouterr().out.endswith(f"/results.csv; as Parquet: {out}/results.parquet\n")
     assert (out / "results.parquet").is_file()
 
 
@@ -104,7 +104,7 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
     out = str(study.parent / "out")
     found = answer(capsys, "sweep", str(study), "--out", out, "--dry-run", "--workers", "3")
     assert (found["runs"], found["left"], found["workers"]) == (8, 8, 3)
-    assert found["seconds"] == pytest.approx(found["seconds_a_run"] * 8 / 3)
+    assert found["seconds"] == pytest.approx(found["seconds_per_run"] * 8 / 3)
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
     said = capsys.readouterr().out
     assert "gains of rpf               2\n" in said
@@ -122,7 +122,7 @@ def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixtu
     answer(capsys, "sweep", str(study), "--out", out, "--workers", "1")
     study.write_text(STUDY.replace("seeds = 2", "seeds = 3"))
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
-    assert "runs                      12   (8 of them done already)\n" in capsys.readouterr().out
+    assert "runs                      12   (8 of them already done)\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -69,11 +69,11 @@ def test_no_file_is_overwritten_without_the_option(
 ) -> None:
     out = tmp_path / "plan.json"
     out.write_text("precious")
-    assert "exists already" in complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")
+    assert "already exists" in complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")
     assert out.read_text() == "precious"
     from robocov.mapfile import save_map
 
     save_map(load_map("square"), out)
     line = complaint(capsys, "export", str(out), "-o", str(out), "--format", "wkt", "--overwrite")
-    assert "the map that is read" in line
+    assert "is the map being read" in line
     assert load_map(out) == load_map("square")

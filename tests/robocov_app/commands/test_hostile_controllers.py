@@ -41,10 +41,10 @@ RAISED = {
     "os.close(2)": "controller mine.py:Mine: it closed the standard error",
 }
 ENDED = {
-    "os._exit(0)": "controller mine.py:Mine: it ended Python (exit status 0) before the command was done",
-    "os._exit(3)": "controller mine.py:Mine: it ended Python (exit status 3)",
-    "os.kill(os.getpid(), signal.SIGKILL)": "it ended Python (killed by signal 9 (SIGKILL))",
-    "os.abort()": "it ended Python (killed by signal 6 (SIGABRT))",
+    "os._exit(0)": "mine.py:Mine: it terminated Python (exit status 0) before the command had finished",
+    "os._exit(3)": "controller mine.py:Mine: it terminated Python (exit status 3)",
+    "os.kill(os.getpid(), signal.SIGKILL)": "it terminated Python (killed by signal 9 (SIGKILL))",
+    "os.abort()": "it terminated Python (killed by signal 6 (SIGABRT))",
 }
 ORDINARY = {
     "self.force(own)": "controller 'Mine': RecursionError: ",

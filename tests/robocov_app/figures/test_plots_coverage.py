@@ -142,7 +142,7 @@ def test_the_texts_describe_the_coverage():
     assert any(text.startswith("mean distance 1.234 m after") for text in words)
     (legend,) = figure.legends
     said = [text.get_text() for text in legend.get_texts()]
-    assert said == ["robot", "geodesic cell border", "obstacle", "no robot can come"]
+    assert said == ["robot", "geodesic cell border", "obstacle", "unreachable"]
     (legend,) = plot_coverage(build_curves(1), [build_snapshot(SHAFT)]).legends
     assert [text.get_text() for text in legend.get_texts()] == ["robot", "geodesic cell border"]
 

@@ -25,7 +25,7 @@ def test_only_nonuniform_densities_are_described():
         assert describe_density(SQUARE.with_density(density)) == ""
         assert get_cost_name(SQUARE.with_density(density)) == "mean distance"
     assert describe_density(SQUARE.with_density(POLYGONS["rooms"])) == "density φ, 0.3 to 4"
-    assert get_cost_name(SQUARE.with_density(POLYGONS["rooms"])) == "mean distance by φ"
+    assert get_cost_name(SQUARE.with_density(POLYGONS["rooms"])) == "mean distance weighted by φ"
 
 
 def test_the_range_finds_narrow_hot_spots():

@@ -128,7 +128,7 @@ def test_the_legend_explains_the_distance_layers():
     painter = Painter(ROOMS, SIZE)
     painter.change_visible(["distances", "geodesic_cells"], ["cells"])
     words = list_legend_texts(painter, what)
-    assert words[:3] == ["distance to the nearest robot", "no robot can come", "geodesic cell border"]
+    assert words[:3] == ["distance to the nearest robot", "unreachable", "geodesic cell border"]
     assert "Voronoi cell" not in words
 
 

@@ -44,8 +44,8 @@ def test_huge_coordinates_are_clipped() -> None:
 
 def test_costs_are_formatted_with_their_names() -> None:
     assert format_cost("mean distance", 1.25) == "mean distance 1.250 m"
-    text = "mean distance by φ 1.250 m, mean time 3.000 s"
-    assert format_cost("mean distance by φ", 1.25, 3.0) == text
+    text = "mean distance weighted by φ 1.250 m, mean time 3.000 s"
+    assert format_cost("mean distance weighted by φ", 1.25, 3.0) == text
 
 
 def test_marks_are_smaller_in_a_crowd() -> None:

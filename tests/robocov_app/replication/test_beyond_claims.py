@@ -115,7 +115,7 @@ def test_steps_are_judged_by_their_own_goals():
 @pytest.mark.parametrize(
     ("changes", "verdict"),
     [
-        ({}, "holds partly"),  # twelve maps are too few to show that it touches nothing and rests
+        ({}, "holds partly"),  # twelve maps are too few to show that it has no contacts and settles
         ({"ours": 1.02}, "holds partly"),
         ({"contacts": 1.0}, "holds partly"),
         ({"settled": np.nan}, "holds partly"),
@@ -148,7 +148,7 @@ def test_on_one_bad_map_the_goal_for_every_map_is_missed():
     what.values[OURS.key, "final"][:2] = 2.4
     found = judge_all_goals(what)
     assert is_goal_met(found["gap"]) and not is_goal_met(found["every-map"])
-    assert "Highest on a; above it on 1 of 12 maps." in found["every-map"].explanation
+    assert "Highest on a; above the bound on 1 of 12 maps." in found["every-map"].explanation
     ratio = found["not-worse-lloyd"].criteria[0].interval
     assert ratio.estimate == pytest.approx(1.2 / 1.08)
 

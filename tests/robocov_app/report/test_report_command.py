@@ -141,7 +141,7 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
     (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both")]) == 0
     said = capsys.readouterr()
-    assert f"robocov: warning: {tmp_path / 'both'}: rpf is left out: " in said.err
+    assert f"robocov: warning: {tmp_path / 'both'}: rpf is skipped: " in said.err
     page = (tmp_path / "both/report.html").read_text()
     assert "1 run cannot be read and is left out: rpf (" in page
     assert "Runs that failed or cannot be read" in page
@@ -150,13 +150,13 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
     # beside another result that is whole, one that is not is named, too
     (run / "record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both"), str(run)]) == 0
-    assert "one is left out: " in capsys.readouterr().err
+    assert "one is skipped: " in capsys.readouterr().err
 
 
 def test_without_readable_runs_nothing_is_written(run, capsys) -> None:
     (run / "record.npz").write_bytes(b"PK")
     said = complaint(capsys, "report", str(run))
-    assert "no run is left to report" in said and not (run / "report.html").exists()
+    assert "no runs remain to report" in said and not (run / "report.html").exists()
 
 
 @pytest.mark.slow

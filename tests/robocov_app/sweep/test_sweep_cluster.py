@@ -128,7 +128,7 @@ def test_nobody_at_the_address_is_one_line(
         silent.bind(("127.0.0.1", 0))
         silent.listen()
         for address, reason in (
-            (f"tcp://127.0.0.1:{silent.getsockname()[1]}", "no answer in 0.5 s"),
+            (f"tcp://127.0.0.1:{silent.getsockname()[1]}", "no answer within 0.5 s"),
             ("tcp://127.0.0.1:9", "Timed out"),
             ("nonsense", "missing port number"),
             ("pigeon://home:1", "unknown address scheme"),

@@ -41,9 +41,9 @@ def test_time_and_space_are_those_of_one_run_times_the_number_of_runs(
     first = next(generate_tasks(study))
     size = sum(len(content) for content in perform(first).files.values())
     assert (estimate.runs, estimate.left, estimate.run, estimate.error) == (10, 10, first.name, None)
-    assert estimate.seconds_a_run == 2.5
+    assert estimate.seconds_per_run == 2.5
     assert estimate.seconds == 2.5 * 10 / 4
-    assert (estimate.bytes_a_run, estimate.bytes) == (size, 10 * size)
+    assert (estimate.bytes_per_run, estimate.total_bytes) == (size, 10 * size)
     assert not (tmp_path / "none").exists()
 
 

@@ -111,7 +111,7 @@ def test_a_sweep_ends_if_too_many_workers_end() -> None:
     tasks = list(generate_tasks(build_small_study(seeds=range(20))))
     with (
         ScriptedExecutor(2, {task.name: [KILLED] * 9 for task in tasks}) as executor,
-        pytest.raises(OutputError, match=r"workers have ended one after the other.*signal 9"),
+        pytest.raises(OutputError, match=r"workers ended in a row.*signal 9"),
     ):
         execute(executor, tasks)
     assert executor.lost_workers == 21

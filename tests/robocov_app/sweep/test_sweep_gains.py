@@ -121,7 +121,7 @@ WRONG = [
     (
         Rapf,
         {"k_rep": [1, 2, 1.0]},
-        "gains.x.k_rep[2]: duplicate value 1.0, given already at gains.x.k_rep[0]",
+        "gains.x.k_rep[2]: duplicate value 1.0, already given at gains.x.k_rep[0]",
     ),
     (Rapf, {"k_rep": []}, "gains.x.k_rep: expected at least one value, got none"),
     (Rapf, {"k_rep": None}, "gains.x.k_rep: expected a number from "),
@@ -155,7 +155,7 @@ def test_what_cannot_be_tried_is_named_with_its_place(kind: type, wanted: object
 
 
 def test_a_range_needs_a_way_to_sample_it() -> None:
-    with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: a range requires a table"):
+    with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: expected a table \[sampling\]"):
         build_gains(Rpf, {"k_rep": Range(1, 2)}, None, ("gains", "rpf"))
 
 

@@ -149,12 +149,12 @@ def test_rows_with_wrong_types_count_as_damaged(
 def test_runs_without_checksums_can_be_used_with_a_remark(tmp_path: Path, task: Task) -> None:
     convert_to_version_1(store_run(tmp_path, task))
     survey = survey_folder(tmp_path, task)
-    assert (survey.is_left, survey.damaged, survey.without_checksums) == (bytearray([1]), [], 0)
+    assert (survey.must_execute, survey.damaged, survey.without_checksums) == (bytearray([1]), [], 0)
     assert survey.describe(keep_versions=False)[0].startswith(
         f"1 run made with robocov {__version__} instead of "
     )
     survey = survey_folder(tmp_path, task, keep_versions=True)
-    assert (survey.is_left, survey.without_checksums) == (bytearray([0]), 1)
+    assert (survey.must_execute, survey.without_checksums) == (bytearray([0]), 1)
     remark = survey.describe(keep_versions=True)[-1]
     assert remark.startswith("1 run of an earlier version of robocov without checksums will be used; damage")
 
@@ -166,11 +166,11 @@ def test_runs_of_other_versions_are_repeated_unless_they_are_to_be_used(tmp_path
     assert survey == Survey(bytearray([1]), outdated=Counter([difference]))
     assert survey.describe(keep_versions=False) == [
         f"1 run made with {difference} will be repeated",
-        "--keep-versions uses them as they are",
+        "--keep-versions reuses them as they are",
     ]
     survey = survey_folder(tmp_path, task, keep_versions=True)
     assert survey == Survey(bytearray([0]), outdated=Counter([difference]))
-    assert survey.describe(keep_versions=True) == [f"1 run made with {difference} will be used nevertheless"]
+    assert survey.describe(keep_versions=True) == [f"1 run made with {difference} will be reused anyway"]
 
 
 def test_a_run_is_on_the_disk_before_its_folder_gets_its_name(
@@ -241,7 +241,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "study.json").write_text('{"format": "robocov-map"}')
     assert not is_sweep(tmp_path)
     with (
-        pytest.raises(OutputError, match="cannot be used for results"),
+        pytest.raises(OutputError, match="cannot be written"),
         open_ledger(tmp_path / "notes.txt", STUDY),
     ):
         pass

@@ -31,7 +31,7 @@ def test_the_remaining_time_is_estimated_from_the_runs_of_this_call(clock: Clock
     clock.now += 5.0
     assert progress.rate == 2.0
     assert progress.remaining_time == 25.0
-    assert progress.describe() == "50 of 100 runs, 2 failed, 40 reused, 2 a second"
+    assert progress.describe() == "50 of 100 runs, 2 failed, 40 reused, 2 per second"
 
 
 def test_without_a_terminal_lines_are_printed_from_time_to_time(
@@ -45,8 +45,8 @@ def test_without_a_terminal_lines_are_printed_from_time_to_time(
             reporter.update(progress)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 5 + 1
-    assert lines[0] == "sweep: 20 of 1000 runs, 2 a second, 8 min 10 s left"
-    assert lines[-1] == "sweep: 100 of 1000 runs, 2 a second, 7 min 30 s left"
+    assert lines[0] == "sweep: 20 of 1000 runs, 2 per second, 8 min 10 s left"
+    assert lines[-1] == "sweep: 100 of 1000 runs, 2 per second, 7 min 30 s left"
 
 
 def test_the_reason_of_a_wait_is_printed_once_instead_of_an_estimate(
@@ -62,8 +62,8 @@ def test_the_reason_of_a_wait_is_printed_once_instead_of_an_estimate(
         progress.waiting_reason = ""
         progress.lost_workers = 3
     assert capsys.readouterr().err.splitlines() == [
-        "sweep: 2 of 10 runs, 2 a second, no workers are connected; waiting",
-        "sweep: 2 of 10 runs, 3 workers lost, 0.02 a second, 6 min 40 s left",
+        "sweep: 2 of 10 runs, 2 per second, no workers are connected; waiting",
+        "sweep: 2 of 10 runs, 3 workers lost, 0.02 per second, 6 min 40 s left",
     ]
 
 

@@ -81,7 +81,7 @@ def test_the_study_is_written_whole(tmp_path: Path) -> None:
 
 WRONG = [
     ({"maps": ()}, "maps: expected at least one, got none"),
-    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: duplicate value 'room', given already at maps[0]"),
+    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: duplicate value 'room', already given at maps[0]"),
     (
         {"maps": (StudyMap("a\nb", ROOM),)},
         "maps[0]: expected a string of 1 to 100 characters on one line",
@@ -90,7 +90,7 @@ WRONG = [
     ({"controllers": ("rapf", "rapff")}, "controllers[1]: unknown controller 'rapff': did you mean 'rapf'?"),
     (
         {"controllers": ("rapf", "rapf")},
-        "controllers[1]: duplicate value 'rapf', given already at controllers[0]",
+        "controllers[1]: duplicate value 'rapf', already given at controllers[0]",
     ),
     ({"controllers": (3,)}, "controllers[0]: expected a string, got 3"),
     ({"controllers": ("none.py:Mine",)}, "controllers[0]: 'none.py:Mine': "),
@@ -99,18 +99,18 @@ WRONG = [
     ({"robots": (True,)}, "robots[0]: expected a whole number"),
     ({"robots": ()}, "robots: expected at least one, got none"),
     ({"seeds": (1, -2)}, "seeds[1]: expected a whole number from 0 to "),
-    ({"seeds": (1, 2, 1)}, "seeds[2]: duplicate value 1, given already at seeds[0]"),
+    ({"seeds": (1, 2, 1)}, "seeds[2]: duplicate value 1, already given at seeds[0]"),
     (
         {"starts": ("corner", "conrer")},
         "starts[1]: map 'A room': unknown start 'conrer': did you mean 'corner'?",
     ),
     ({"starts": ("corner", "*")}, "starts[1]: '*' selects all starts. "),
-    ({"starts": ("corner", "corner")}, "starts[1]: duplicate value 'corner', given already at starts[0]"),
+    ({"starts": ("corner", "corner")}, "starts[1]: duplicate value 'corner', already given at starts[0]"),
     ({"duration": -1}, "duration: expected a number from 0 to 1e+06, got -1"),
     ({"duration": float("nan")}, "duration: expected a number"),
     (
         {"duration": 1e6, "dt": 1e-3},
-        "duration: expected at most 2e+07 rows of a record, got 1e+06 s of 2 robots at",
+        "duration: expected a record of at most 2e+07 rows, got 1e+06 s of 2 robots at",
     ),
     ({"dt": 0.0}, "dt: expected a number from 0.0001 to 1 s, got 0.0"),
     ({"lattice": 1}, "lattice: expected a whole number from 2 to 2048, got 1"),
@@ -118,7 +118,7 @@ WRONG = [
     ({"record_hz": "often"}, "record_hz: expected a number"),
     ({"max_speed": -1}, "team.max_speed: expected a number from 1e-06 to 1000, got -1.0 m/s"),
     ({"max_speed": (1, -1)}, "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s"),
-    ({"max_speed": (1, 1.0)}, "team.max_speed[1]: duplicate value 1.0, given already at team.max_speed[0]"),
+    ({"max_speed": (1, 1.0)}, "team.max_speed[1]: duplicate value 1.0, already given at team.max_speed[0]"),
     ({"max_speed": None}, "team.max_speed: expected a number, got None"),
     ({"max_speed": 10**400}, "team.max_speed: expected a number, got 1000"),
     ({"radius": ()}, "team.radius: expected at least one value, got none"),

@@ -111,7 +111,7 @@ WRONG = [
     (
         "robots = [3, 6]",
         "robots = [3, 3]",
-        "robots[1]: duplicate value 3, given already at robots[0]",
+        "robots[1]: duplicate value 3, already given at robots[0]",
     ),
     ("robots = [3, 6]", "robots = [0]", "robots[0]: expected a whole number from 1 to 10000, got 0"),
     ("robots = [3, 6]", "robots = [1.5]", "robots[0]: expected a whole number, got 1.5"),
@@ -138,7 +138,7 @@ WRONG = [
         "starts[0]: '*' selects all starts. Remove the other starts.",
     ),
     ('starts = "*"', "starts = 3", "starts: expected a string, or a list of strings, got 3"),
-    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: duplicate value 1, given already at seeds[0]"),
+    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: duplicate value 1, already given at seeds[0]"),
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
     ("seeds = 4", "seeds = 1e3", "seeds: expected a number of seeds, or a list of seeds, got 1000.0"),
@@ -172,7 +172,7 @@ WRONG = [
     (
         "max_speed = [0.5, 1]",
         "max_speed = [1, 1.0]",
-        "team.max_speed[1]: duplicate value 1.0, given already at team.max_speed[0]",
+        "team.max_speed[1]: duplicate value 1.0, already given at team.max_speed[0]",
     ),
     (
         "low = 0.1",
@@ -203,7 +203,7 @@ WRONG = [
     (
         "k_att = 3",
         "k_att = [3, 3.0]",
-        "gains.rapf.k_att[1]: duplicate value 3.0, given already at gains.rapf.k_att[0]",
+        "gains.rapf.k_att[1]: duplicate value 3.0, already given at gains.rapf.k_att[0]",
     ),
     ("k_att = 3", 'k_att = "null"', "gains.rapf.k_att: expected a number from "),
     ("k_att = 3", "k_att = inf", "gains.rapf.k_att: expected a number from "),
@@ -236,7 +236,7 @@ WRONG = [
     (
         '["rooms", "plans/hall.json"]',
         '["rooms", "rooms"]',
-        "maps[1]: duplicate value 'rooms', given already at maps[0]",
+        "maps[1]: duplicate value 'rooms', already given at maps[0]",
     ),
     ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: expected a string, got 3"),
     ('["rooms", "plans/hall.json"]', "[]", "maps: expected at least one, got none"),
@@ -280,7 +280,7 @@ def test_only_the_first_mistake_is_told_and_how_many_more_there_are(folder: Path
 def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
     save_map(HALL, folder / "rooms.json")
     text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'
-    with pytest.raises(InputError, match=r"maps\[1\]: expected maps whose names differ, and there is a"):
+    with pytest.raises(InputError, match=r"maps\[1\]: expected maps with different names, got a second "):
         read_study(written(folder, text))
 
 

@@ -241,7 +241,7 @@ def test_the_brush_is_used_in_the_window(tmp_path):
         assert "φ" not in driver.window.canvas._scenes[0].cost
         driver.press_key("ctrl+y")
         driver.run_frames(3)
-        assert "mean distance by φ" in driver.window.canvas._scenes[0].cost
+        assert "mean distance weighted by φ" in driver.window.canvas._scenes[0].cost
 
 
 def test_the_cost_is_computed_for_each_density():

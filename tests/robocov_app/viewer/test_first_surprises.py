@@ -201,7 +201,9 @@ def test_the_command_starts_more_robots_than_fit_uniformly(capsys: pytest.Captur
     options = demo.Arguments(map="city", robots=200)
     session = demo.build_session(options)
     assert len(session.displayed.numbers) == 200
-    assert "no space for 200 robots at start 'market': they start uniformly" in capsys.readouterr().err
+    assert (
+        "not enough space for 200 robots at start 'market'; using --start uniform" in capsys.readouterr().err
+    )
     with pytest.raises(StartError, match="space for about"):
         demo.build_session(replace(options, start="market"))
 

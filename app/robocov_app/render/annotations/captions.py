@@ -44,7 +44,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
 
 def _list_shorter_costs(cost: str) -> list[str]:
     """Return ever shorter texts of a cost: all of it, without the name, and without name and mean time."""
-    without_name = cost.replace("mean distance by φ ", "").replace("mean distance ", "")
+    without_name = cost.replace("mean distance weighted by φ ", "").replace("mean distance ", "")
     return [cost, without_name, without_name.partition(",")[0]]
 
 

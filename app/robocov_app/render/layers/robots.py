@@ -290,5 +290,5 @@ def build_selection_legend(scene: Scene) -> list[LegendEntry]:
     assert scene.selected is not None
     if scene.now.seen.reported_positions is None:
         return []
-    text = f"as robot {scene.get_number(scene.selected)} believes"
+    text = f"position believed by robot {scene.get_number(scene.selected)}"
     return [LegendEntry(text, lambda canvas, x, y: _draw_belief_ring(canvas, 0, x, y))]

@@ -58,7 +58,7 @@ def _describe_attractions(rapf: GainOutcomes) -> str:
         if len(part.gains) > 1:
             variation = format_median(compute_variation(part), "%")
             worst = format_median(compute_worst_by_best(part))
-            texts.append(f"k_att = {level:g}: {variation}, worst by best {worst}")
+            texts.append(f"k_att = {level:g}: {variation}, worst/best {worst}")
     return "; ".join(texts)
 
 

@@ -163,7 +163,7 @@ def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim
     return [
         _build_goal(
             "contacts",
-            f"{label} touches nothing.",
+            f"{label} has no contacts.",
             replace(criteria.contacts, high=0.0),
             f"{has_contact.sum()} of {len(has_contact)} runs.",
             known,
@@ -261,7 +261,7 @@ def estimate_worst_ratio(pairs: PairedComparison) -> Interval:
 def _describe_highest(values: Mapping[str, float], bound: float) -> str:
     above = sum(value > bound for value in values.values())
     highest = max(values, key=values.__getitem__)
-    return f"Highest on {highest}; above it on {above} of {len(values)} maps."
+    return f"Highest on {highest}; above the bound on {above} of {len(values)} maps."
 
 
 def is_goal_met(goal: Claim) -> bool:

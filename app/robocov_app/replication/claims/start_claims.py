@@ -60,7 +60,8 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
     rpf = np.array([rpf_spreads[name] for name in maps])
     sides = [known.share_sides[name] for name in maps]
     measure = (
-        "matched distance between the ends from different starts, relative to the side of a robot's share"
+        "distance between matched final positions from different starts, "
+        "relative to the side of a square with the mean free area per robot"
     )
     criteria = (
         Criterion(f"RAPF: {measure}", bootstrap(rapf, clusters=maps), high=SAME_PLACEMENT, unit="%"),

@@ -31,7 +31,7 @@ Starts matter more than gains for any controller that descends to a local optimu
 SAME_PLACEMENT = 0.25
 """Two placements are nearly the same if the matched robots are closer than this.
 
-In units of the side of a square whose area is one robot's share of the free space.
+In units of the side of a square with the mean free area per robot.
 """
 NEAR_OPTIMUM = 0.1
 """A team is near the reference if its cost exceeds that of the reference by at most 10 %."""

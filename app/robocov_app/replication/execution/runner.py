@@ -159,7 +159,7 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
         for name, study in studies.items():
             ledger = stack.enter_context(open_ledger(get_study_folder(folder, name), study.to_json()))
             survey = ledger.survey(generate_tasks(study), keep_versions=options.keep_versions)
-            for task in compress(generate_tasks(study), survey.is_left):
+            for task in compress(generate_tasks(study), survey.must_execute):
                 tasks[task.input_hash] = task
                 ledgers.setdefault(task.input_hash, []).append(ledger)
             notes += [f"{name}: {line}" for line in survey.describe(keep_versions=options.keep_versions)]

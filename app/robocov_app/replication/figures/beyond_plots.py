@@ -37,15 +37,19 @@ def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
         {
             "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
             "beyond-pairs": plan_pairs_plot(
-                _list_duel_rows(results), "ours by the other's, pair by pair (1: equal)", theme
+                _list_duel_rows(results), "ratio of our cost to the other's, per pair (1: equal)", theme
             ),
             "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
             "beyond-targets": plan_pairs_plot(
-                _list_target_rows(results), "by the centroid, pair by pair (1: equal)", theme
+                _list_target_rows(results),
+                "cost relative to the centroid's, per pair (1: equal)",
+                theme,
             ),
             "beyond-density": _plan_density_figure(results, theme),
             "beyond-teams": plan_pairs_plot(
-                _list_team_rows(results), "mean time, by time to by distance (1: equal)", theme
+                _list_team_rows(results),
+                "ratio of mean times, cells by time to cells by distance, per pair (1: equal)",
+                theme,
             ),
             "beyond-conditions": _plan_degradations_plot(results, theme),
         }
@@ -99,7 +103,7 @@ def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
     known, ignored = results.density.figure_runs
     weighted = known.record.environment
     records = [replace(run.record, environment=weighted) for run in (known, ignored)]
-    costs = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
+    costs = [f"mean distance weighted by φ {cost:.3f} m" for cost in results.density.costs]
     headings = list(zip(("knows φ", "ignores φ"), costs, strict=True))
     return partial(draw_side_by_side, records, headings, theme)
 

@@ -35,10 +35,12 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     return select_plots(
         {
             "claim-1-convex": plan_pairs_plot(
-                _list_convex_rows(results.convex), "RAPF relative to Lloyd, pair by pair (1: equal)", theme
+                _list_convex_rows(results.convex), "RAPF relative to Lloyd, per pair (1: equal)", theme
             ),
             "claim-2-nonconvex": plan_pairs_plot(
-                _list_nonconvex_rows(claims), "RAPF by the other controller, pair by pair (1: equal)", theme
+                _list_nonconvex_rows(claims),
+                "RAPF relative to the other controller, per pair (1: equal)",
+                theme,
             ),
             "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
             "claim-4-starts": plan_costs_plot(by_start, theme),

@@ -17,6 +17,7 @@ from robocov.files.result_names import COST_FILE, RECORD_FILE
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
+from robocov_app.runs.cost import AREA_TOLERANCE_M2
 from robocov_app.runs.saved_runs import SavedRun
 
 ResultKind: TypeAlias = Literal["run", "comparison", "sweep"]
@@ -40,7 +41,6 @@ FIGURE_NAMES = (
     "mean_time_s",
 )
 """Figures that a report shows for a run. The names are those of columns in the table of a sweep."""
-_AREA_TOLERANCE_M2 = 1e-6
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ class ReportedResult:
         if reference is None:
             return float("nan")
         uncovered_area = run.figures.get("uncovered_area_m2") or 0.0
-        if abs(uncovered_area - reference.uncovered_area) > _AREA_TOLERANCE_M2:
+        if abs(uncovered_area - reference.uncovered_area) > AREA_TOLERANCE_M2:
             return float("nan")
         return run.final_distance / reference.mean_distance - 1.0
 
