@@ -71,7 +71,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
     path = tmp_path / "plan.map"
     path.write_text(GRID)
     message = complaint(capsys, "import", str(path), "--overwrite", "-o", str(path))
-    assert f"{path}: the file that is read; choose another -o" in message
+    assert f"{path}: is the file being read; choose another -o" in message
     picture = tmp_path / "plan.png"
     picture.write_bytes(b"")
     words = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(picture))
