@@ -17,6 +17,19 @@ from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.window.status import describe_cursor
 
+# title
+
+
+def test_the_title_names_the_map_and_then_the_file(driver: Driver) -> None:
+    assert pygame.display.get_caption()[0] == "hall • robocov"
+    driver.viewer.files.save_session(driver.viewer.files.folder / "story.robocov")
+    driver.run_frames(1)
+    assert pygame.display.get_caption()[0] == "story.robocov • robocov"
+    driver.viewer.attempt(lambda: driver.session.fail_robot(1))
+    driver.run_frames(1)
+    assert pygame.display.get_caption()[0] == "● story.robocov • robocov"
+
+
 # playing
 
 

@@ -12,6 +12,7 @@ from pygame import Surface
 
 from robocov.errors import InputError
 from robocov.text import remove_controls
+from robocov_app.toolkit.window.icon import render_icon
 from robocov_app.toolkit.window.input import KEY_REPEAT_MS
 from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 
@@ -118,6 +119,8 @@ def open_window(size: tuple[int, int]) -> Surface:
     -------
     pygame.Surface
     """
+    # Some systems ignore an icon that is set later.
+    pygame.display.set_icon(render_icon())
     screen = pygame.display.set_mode(size, pygame.RESIZABLE)
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
         # The display module offers no other way yet to set the minimum size of its window.

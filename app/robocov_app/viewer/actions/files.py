@@ -77,6 +77,20 @@ class FileActions:
         self._map_names[self._viewer.session.displayed.environment.name] = name
 
     @property
+    def title(self) -> str:
+        """Title of the window: the file of the session, or the map while it has none, and the program.
+
+        A dot marks a file that lacks the latest edits.
+        """
+        file = self.workspace.path
+        name = Path(self.map_name).name if file is None else file.name
+        if not name:
+            return "robocov"
+        if file is not None and self.workspace.has_unsaved_edits:
+            name = f"● {name}"
+        return f"{name} • robocov"
+
+    @property
     def view(self) -> dict[str, object]:
         """Window settings that are saved in a session file."""
         view = self._viewer.view

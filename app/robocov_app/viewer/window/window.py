@@ -15,6 +15,7 @@ from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
+from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
@@ -123,8 +124,8 @@ class ViewerWindow(CommandWindow):
     ) -> None:
         """Build all parts of the window, and draw the first frame."""
         super().__init__(viewer, Dialogs(), size, scale, screen)
-        pygame.display.set_caption("robocov")
         self.viewer = viewer
+        set_title(viewer.files.title)
         self.is_unattended = is_unattended
         self.video: ScreenVideo | None = None
         self.run_saver = RunSaver(viewer.costs.lattice)
@@ -219,6 +220,7 @@ class ViewerWindow(CommandWindow):
         """Advance everything by a time, s."""
         self._unrecorded_s += seconds
         self._pass_time(seconds)
+        set_title(self.viewer.files.title)
         self._cost_curves.update()
         self._arrange()
         self._inspector.update(self.viewer.now)
