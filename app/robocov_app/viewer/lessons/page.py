@@ -43,24 +43,80 @@ _CAPTION_TEXT_PX = 14
 _CAPTION_TITLE_PX = 15.5
 _CAPTION_WIDTH_PX = 800
 _CAPTION_LINE_PX = 20
+_CAPTION_MARGIN_PX = 22
+"""Distance of the text from the left and right edges of the card."""
+_CAPTION_SIDE_PX = 20
+"""Minimum distance of the card from the left and right edges of the arena."""
+_CAPTION_BOTTOM_PX = 44
+"""Distance of the card from the bottom of the arena."""
+_CAPTION_HEIGHT_PX = 44
+"""Height of the card in addition to that of its lines."""
+_CAPTION_TITLE_TOP_PX = 11
+_CAPTION_TEXT_TOP_PX = 35
+_CAPTION_BAR_MARGIN_PX = 8
+"""Distance of the progress bar from the left and right edges of the card, at any scale."""
+_CAPTION_BAR_HEIGHT_PX = 2
+_CAPTION_BAR_BOTTOM_PX = 3
+"""Distance of the top of the progress bar from the bottom of the card."""
 _PAGE_MARGIN_PX = 20
 _PAGE_TITLE_PX = 18
+_PAGE_TOP_PX = 18
+_SMALL_TEXT_PX = 11
+_HEADING_LINE_PX = 30
+_TITLE_LINE_PX = 25
+_TITLE_GAP_PX = 6
+_TEXT_GAP_PX = 8
+_QUESTION_GAP_PX = 9
+_ITEM_GAP_PX = 4
+_ITEM_INDENT_PX = 20
+_ANSWER_GAP_PX = 11
 _ANSWER_INDENT_PX = 30
+_ANSWER_RIGHT_INDENT_PX = 12
+_ANSWER_TOP_PX = 5
+"""Distance of the frame of an answer above its text."""
+_ANSWER_HEIGHT_PX = 8
+"""Height of the frame of an answer in addition to that of its lines."""
+_ANSWER_RADIUS_PX = 5
+_ANSWER_EDGE_PX = 1
+_MARKED_ANSWER_EDGE_PX = 2
 _MARK_X_PX = 10
 _CHAPTER_TEXT_PX = 12
 _CHAPTER_ROW_PX = 23
 _MIN_CHAPTER_ROW_PX = 15
+_CHAPTERS_TOP_PX = 6
+_CHAPTERS_BOTTOM_PX = 10
+"""Distance of the list of chapters from the progress bar."""
+_CHAPTER_INDENT_PX = 16
+_CHAPTER_MARGINS_PX = 18
+_CHAPTER_TOP_PX = 3
+"""Distance of the area of a chapter that can be clicked above its text."""
+_CHAPTER_DOT_RADIUS_PX = 3.5
+_CHAPTER_DOT_CENTER_PX = (4, 8)
 _DOTS_ROW_PX = 24
+_DOT_RADIUS_PX = 3.0
+_CURRENT_DOT_RADIUS_PX = 4.5
+_BAR_HEIGHT_PX = 3
 _END_BUTTON_PX = 28
+_END_BUTTON_TOP_PX = 7
+"""Distance of the button that ends the lesson above the text of the heading."""
+_BUTTON_RADIUS_PX = 6
 _BUTTON_HEIGHT_PX = 34
 _BUTTON_GAP_PX = 10
 _BUTTON_TEXT_PX = 14
 _BUTTONS_ABOVE_BOTTOM_PX = 74
 _PROGRESS_ABOVE_BOTTOM_PX = 88
+_HINT_ABOVE_BOTTOM_PX = 26
 _TEXT_SIZES_PX = (14.0, 13.0, 12.0)
 """Sizes of the text, of which the first is used at which the page fits."""
 _LINE_HEIGHT = 1.5
 """Distance of lines in text sizes."""
+
+# Fractions of the color of text.
+_EMPTY_BAR_STRENGTH = 0.15
+_FUTURE_DOT_STRENGTH = 0.25
+_CLOSED_ANSWER_STRENGTH = 0.25
+_BUTTON_EDGE_STRENGTH = 0.28
+
 _PAGE_HINT = "Space holds · F2 just play · Esc ends"
 _CLOSING_TITLE = "What you found out"
 _NEXT_TITLE = "Try next"
@@ -78,25 +134,29 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     left, top, width, height = layout.arena
     text_size = round(_CAPTION_TEXT_PX * scale)
     title_size = round(_CAPTION_TITLE_PX * scale)
-    card_width = min(width - 40 * scale, _CAPTION_WIDTH_PX * scale)
+    card_width = min(width - 2 * _CAPTION_SIDE_PX * scale, _CAPTION_WIDTH_PX * scale)
     is_closing = lesson.state is LessonState.CLOSING
     text = " ".join(lesson.findings if is_closing else [lesson.chapter.text, *lesson.lines])
-    lines = wrap_text(text, text_size, card_width - 44 * scale)
-    box = pygame.Rect(0, 0, round(card_width), round((44 + _CAPTION_LINE_PX * len(lines)) * scale))
-    box.midbottom = (round(left + width / 2), round(top + height - 44 * scale))
+    lines = wrap_text(text, text_size, card_width - 2 * _CAPTION_MARGIN_PX * scale)
+    card_height = (_CAPTION_HEIGHT_PX + _CAPTION_LINE_PX * len(lines)) * scale
+    box = pygame.Rect(0, 0, round(card_width), round(card_height))
+    box.midbottom = (round(left + width / 2), round(top + height - _CAPTION_BOTTOM_PX * scale))
     draw_card(screen, box, theme, scale)
-    x = box.left + round(22 * scale)
+    x = box.left + round(_CAPTION_MARGIN_PX * scale)
     title = _CLOSING_TITLE if is_closing else f"{lesson.number + 1}  {lesson.chapter.title}"
-    screen.blit(render_text(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
+    title_top = box.top + round(_CAPTION_TITLE_TOP_PX * scale)
+    screen.blit(render_text(title, title_size, theme.accent, True), (x, title_top))
     for k, line in enumerate(lines):
-        y = box.top + round((35 + _CAPTION_LINE_PX * k) * scale)
+        y = box.top + round((_CAPTION_TEXT_TOP_PX + _CAPTION_LINE_PX * k) * scale)
         screen.blit(render_text(line, text_size, theme.ink), (x, y))
     # A thin progress bar along the lower edge of the card.
-    bar_top = box.bottom - max(3, round(3 * scale))
-    bar = pygame.Rect(box.left + 8, bar_top, box.width - 16, max(2, round(2 * scale)))
-    screen.fill(mix(theme.panel, theme.ink, 0.15), bar)
+    bar_height = max(_CAPTION_BAR_HEIGHT_PX, round(_CAPTION_BAR_HEIGHT_PX * scale))
+    bar = pygame.Rect(0, 0, box.width - 2 * _CAPTION_BAR_MARGIN_PX, bar_height)
+    bar.left = box.left + _CAPTION_BAR_MARGIN_PX
+    bar.top = box.bottom - max(_CAPTION_BAR_BOTTOM_PX, round(_CAPTION_BAR_BOTTOM_PX * scale))
+    screen.fill(mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH), bar)
     bar.width = round(bar.width * lesson.progress)
-    screen.fill(theme.final, bar)
+    screen.fill(theme.accent, bar)
 
 
 def draw_lesson_page(
@@ -109,14 +169,16 @@ def draw_lesson_page(
     list of ClickArea
         Areas of the answers, chapters and buttons that can be clicked.
     """
-    page = _LessonPage(screen, layout, theme, lesson)
+    areas: list[ClickArea] = []
+    top = layout.panel.top + _PAGE_TOP_PX * layout.scale
     for text_px in _TEXT_SIZES_PX:
         screen.fill(theme.panel, layout.panel)
-        page = _LessonPage(screen, layout, theme, lesson, text_px=text_px)
+        page = _LessonPage(screen, layout, theme, lesson, text_px, top)
         page.draw()
+        areas = page.areas
         if page.fits:
             break
-    return page.areas
+    return areas
 
 
 @dataclass
@@ -127,18 +189,30 @@ class _LessonPage:
     layout: Layout
     theme: Theme
     lesson: LessonPlayer
-    text_px: float = _TEXT_SIZES_PX[0]
+    text_px: float
+    y: float
     areas: list[ClickArea] = field(default_factory=list)
-    y: float = 0.0
     fits: bool = True
 
-    def __post_init__(self) -> None:
-        left, top, width, height = self.layout.panel
-        self.scale = self.layout.scale
-        self.x = left + _PAGE_MARGIN_PX * self.scale
-        self.width = width - 2 * _PAGE_MARGIN_PX * self.scale
-        self.y = top + 18 * self.scale
-        self.bottom = top + height
+    @property
+    def scale(self) -> float:
+        """Scale of texts and lengths."""
+        return self.layout.scale
+
+    @property
+    def x(self) -> float:
+        """Left end of the texts, px."""
+        return self.layout.panel.left + _PAGE_MARGIN_PX * self.scale
+
+    @property
+    def width(self) -> float:
+        """Width of the texts, px."""
+        return self.layout.panel.width - 2 * _PAGE_MARGIN_PX * self.scale
+
+    @property
+    def bottom(self) -> int:
+        """Lower end of the page, px."""
+        return self.layout.panel.top + self.layout.panel.height
 
     def draw(self) -> None:
         """Draw the chapter or the closing page, the list of chapters, the buttons and the progress bar."""
@@ -146,9 +220,9 @@ class _LessonPage:
         is_closing = lesson.state is LessonState.CLOSING
         count = len(lesson.lesson.chapters)
         heading = "LESSON" if is_closing else f"LESSON · {lesson.number + 1} OF {count}"
-        self._write(heading, 11, self.theme.faint, bold=True)
+        self._write(heading, _SMALL_TEXT_PX, self.theme.faint, bold=True)
         heading_y = self.y
-        self.y += 30 * self.scale
+        self.y += _HEADING_LINE_PX * self.scale
         if is_closing:
             self._draw_closing()
         else:
@@ -156,16 +230,16 @@ class _LessonPage:
         self._draw_chapters()
         self._draw_progress()
         self._draw_buttons()
-        self.y = self.bottom - 26 * self.scale
-        hint_px = 11
-        hint = shorten_to_width(_PAGE_HINT, round(hint_px * self.scale), self.width)
-        self._write(hint, hint_px, self.theme.faint)
+        self.y = self.bottom - _HINT_ABOVE_BOTTOM_PX * self.scale
+        hint = shorten_to_width(_PAGE_HINT, round(_SMALL_TEXT_PX * self.scale), self.width)
+        self._write(hint, _SMALL_TEXT_PX, self.theme.faint)
         self._draw_end_button(heading_y)
 
     def _draw_end_button(self, top: float) -> None:
         """Draw a cross in the upper right corner, which ends the lesson."""
         size = round(_END_BUTTON_PX * self.scale)
-        box = pygame.Rect(round(self.x + self.width) - size, round(top - 7 * self.scale), size, size)
+        left = round(self.x + self.width) - size
+        box = pygame.Rect(left, round(top - _END_BUTTON_TOP_PX * self.scale), size, size)
         image = render_text("×", round(_PAGE_TITLE_PX * self.scale), self.theme.faint)
         self.screen.blit(image, image.get_rect(center=box.center))
         self.areas.append(ClickArea(box, self.lesson.end))
@@ -175,16 +249,16 @@ class _LessonPage:
         lesson = self.lesson
         self._write_title(lesson.chapter.title)
         self._write_paragraph(lesson.chapter.text, self.theme.ink)
-        self.y += 8 * self.scale
+        self.y += _TEXT_GAP_PX * self.scale
         question = lesson.chapter.question
         if question is not None:
             self._write_paragraph(question.text, self.theme.accent)
-            self.y += 9 * self.scale
+            self.y += _QUESTION_GAP_PX * self.scale
             for number, answer in enumerate(lesson.marked_answers, 1):
                 self._draw_answer(number, answer)
         for comment in lesson.comments:
             self._write_paragraph(comment, self.theme.ink)
-            self.y += 4 * self.scale
+            self.y += _ITEM_GAP_PX * self.scale
 
     def _draw_closing(self) -> None:
         """Draw what was found out, the score of the user's predictions, and what to try next."""
@@ -194,10 +268,10 @@ class _LessonPage:
         if answer_count:
             text = f"{right_count} of {answer_count} predictions were right."
             self._write_paragraph(text, self.theme.accent)
-            self.y += 6 * self.scale
+            self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:
             self._draw_item("✓", finding)
-        self.y += 8 * self.scale
+        self.y += _TEXT_GAP_PX * self.scale
         self._write_title(_NEXT_TITLE)
         for step in lesson.lesson.next_steps or _DEFAULT_NEXT_STEPS:
             self._draw_item("→", step)
@@ -205,16 +279,15 @@ class _LessonPage:
     def _draw_item(self, sign: str, text: str) -> None:
         """Write a paragraph with a sign at its left."""
         self._write(sign, self.text_px, self.theme.start, bold=True)
-        indent = 20
-        self._write_paragraph(text, self.theme.ink, indent=indent, right_indent=0)
-        self.y += 4 * self.scale
+        self._write_paragraph(text, self.theme.ink, indent=_ITEM_INDENT_PX, right_indent=0)
+        self.y += _ITEM_GAP_PX * self.scale
 
     def _write_title(self, title: str) -> None:
         size = round(_PAGE_TITLE_PX * self.scale)
         for line in wrap_text(title, size, self.width, True):
             self._write(line, _PAGE_TITLE_PX, self.theme.accent, bold=True)
-            self.y += 25 * self.scale
-        self.y += 6 * self.scale
+            self.y += _TITLE_LINE_PX * self.scale
+        self.y += _TITLE_GAP_PX * self.scale
 
     def _write(
         self, text: str, size: float, color: Color, *, indent: float = 0.0, bold: bool = False
@@ -244,17 +317,32 @@ class _LessonPage:
             AnswerMark.CHOSEN: theme.accent,
         }
         is_open = self.lesson.state is LessonState.ASKING
-        edge = colors.get(answer.mark, theme.accent if is_open else mix(theme.panel, theme.ink, 0.25))
+        default_edge = theme.accent
+        if not is_open:
+            default_edge = mix(theme.panel, theme.ink, _CLOSED_ANSWER_STRENGTH)
+        edge = colors.get(answer.mark, default_edge)
         ink = theme.ink if is_open or answer.mark is not AnswerMark.NONE else theme.faint
-        lines = wrap_text(answer.text, round(self.text_px * scale), self.width - 42 * scale)
-        height = round((_LINE_HEIGHT * self.text_px * len(lines) + 8) * scale)
-        box = pygame.Rect(round(self.x), round(top - 5 * scale), round(self.width), height)
-        width = max(round(scale * (1 if answer.mark is AnswerMark.NONE else 2)), 1)
-        draw_rounded_box(self.screen, box, theme.background, edge=edge, radius=round(5 * scale), width=width)
+        text_width = self.width - (_ANSWER_INDENT_PX + _ANSWER_RIGHT_INDENT_PX) * scale
+        lines = wrap_text(answer.text, round(self.text_px * scale), text_width)
+        height = round((_LINE_HEIGHT * self.text_px * len(lines) + _ANSWER_HEIGHT_PX) * scale)
+        box = pygame.Rect(round(self.x), round(top - _ANSWER_TOP_PX * scale), round(self.width), height)
+        edge_px = _MARKED_ANSWER_EDGE_PX
+        if answer.mark is AnswerMark.NONE:
+            edge_px = _ANSWER_EDGE_PX
+        draw_rounded_box(
+            self.screen,
+            box,
+            theme.background,
+            edge=edge,
+            radius=round(_ANSWER_RADIUS_PX * scale),
+            width=max(round(scale * edge_px), 1),
+        )
         sign = _MARK_SIGNS[answer.mark] or str(number)
         self._write(sign, self.text_px, edge, indent=_MARK_X_PX, bold=True)
-        self._write_paragraph(answer.text, ink, indent=_ANSWER_INDENT_PX, right_indent=12)
-        self.y = box.bottom + 11 * scale
+        self._write_paragraph(
+            answer.text, ink, indent=_ANSWER_INDENT_PX, right_indent=_ANSWER_RIGHT_INDENT_PX
+        )
+        self.y = box.bottom + _ANSWER_GAP_PX * scale
         if is_open:
             self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
 
@@ -262,8 +350,8 @@ class _LessonPage:
         """Draw the list of chapters above the progress bar; in a small window, a row of dots."""
         scale = self.scale
         count = len(self.lesson.lesson.chapters)
-        self.y += 6 * scale
-        bottom = self.bottom - (_PROGRESS_ABOVE_BOTTOM_PX + 10) * scale
+        self.y += _CHAPTERS_TOP_PX * scale
+        bottom = self.bottom - (_PROGRESS_ABOVE_BOTTOM_PX + _CHAPTERS_BOTTOM_PX) * scale
         free_height = bottom - self.y
         self.fits = free_height >= _DOTS_ROW_PX * scale
         if free_height < _MIN_CHAPTER_ROW_PX * scale * count:
@@ -280,17 +368,20 @@ class _LessonPage:
         count = len(self.lesson.lesson.chapters)
         spacing = self.width / count
         for number in range(count):
-            box = pygame.Rect(
-                round(self.x + number * spacing), round(top), round(spacing), round(_DOTS_ROW_PX * self.scale)
-            )
-            radius = 4.5 if number == self.lesson.number else 3.0
+            left = round(self.x + number * spacing)
+            box = pygame.Rect(left, round(top), round(spacing), round(_DOTS_ROW_PX * self.scale))
+            radius = _DOT_RADIUS_PX
+            if number == self.lesson.number:
+                radius = _CURRENT_DOT_RADIUS_PX
             self._draw_dot(number, box.center, radius)
             self.areas.append(ClickArea(box, partial(self.lesson.go_to, number)))
 
     def _draw_dot(self, number: int, center: tuple[float, float], radius: float) -> None:
         """Draw the dot of a chapter, filled if it was reached."""
         theme = self.theme
-        fill = theme.accent if number <= self.lesson.number else mix(theme.panel, theme.ink, 0.25)
+        fill = theme.accent
+        if number > self.lesson.number:
+            fill = mix(theme.panel, theme.ink, _FUTURE_DOT_STRENGTH)
         canvas = create_flat_canvas(self.screen, theme, self.scale)
         canvas.draw_sprite(partial(sprites.render_dot, radius * self.scale, fill), center)
 
@@ -300,14 +391,15 @@ class _LessonPage:
         scale = self.scale
         lesson = self.lesson
         is_current = number == lesson.number and lesson.state is not LessonState.CLOSING
-        self._draw_dot(number, (self.x + 4 * scale, self.y + 8 * scale), 3.5)
+        dx, dy = _CHAPTER_DOT_CENTER_PX
+        self._draw_dot(number, (self.x + dx * scale, self.y + dy * scale), _CHAPTER_DOT_RADIUS_PX)
         size = round(_CHAPTER_TEXT_PX * scale)
-        title = shorten_to_width(
-            lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current
-        )
+        max_width = self.width - _CHAPTER_MARGINS_PX * scale
+        title = shorten_to_width(lesson.lesson.chapters[number].title, size, max_width, is_current)
         color = theme.ink if is_current else theme.faint
-        self._write(title, _CHAPTER_TEXT_PX, color, indent=16, bold=is_current)
-        box = pygame.Rect(round(self.x), round(self.y - 3 * scale), round(self.width), round(row))
+        self._write(title, _CHAPTER_TEXT_PX, color, indent=_CHAPTER_INDENT_PX, bold=is_current)
+        top = round(self.y - _CHAPTER_TOP_PX * scale)
+        box = pygame.Rect(round(self.x), top, round(self.width), round(row))
         self.areas.append(ClickArea(box, partial(lesson.go_to, number)))
 
     def _draw_progress(self) -> None:
@@ -315,8 +407,10 @@ class _LessonPage:
         theme = self.theme
         scale = self.scale
         bar_top = round(self.bottom - _PROGRESS_ABOVE_BOTTOM_PX * scale)
-        bar = pygame.Rect(round(self.x), bar_top, round(self.width), max(3, round(3 * scale)))
-        pygame.draw.rect(self.screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
+        bar_height = max(_BAR_HEIGHT_PX, round(_BAR_HEIGHT_PX * scale))
+        bar = pygame.Rect(round(self.x), bar_top, round(self.width), bar_height)
+        empty_color = mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH)
+        pygame.draw.rect(self.screen, empty_color, bar, border_radius=bar.height)
         bar.width = max(round(bar.width * self.lesson.progress), bar.height)
         pygame.draw.rect(self.screen, theme.accent, bar, border_radius=bar.height)
 
@@ -347,8 +441,8 @@ class _LessonPage:
         """Draw a button; a primary one is filled with the accent color."""
         theme = self.theme
         fill = theme.accent if is_primary else get_field_color(theme)
-        edge = theme.accent if is_primary else mix(theme.panel, theme.ink, 0.28)
+        edge = theme.accent if is_primary else mix(theme.panel, theme.ink, _BUTTON_EDGE_STRENGTH)
         ink = get_accent_ink(theme) if is_primary else theme.ink
-        draw_rounded_box(self.screen, box, fill, edge=edge, radius=round(6 * self.scale))
+        draw_rounded_box(self.screen, box, fill, edge=edge, radius=round(_BUTTON_RADIUS_PX * self.scale))
         image = render_text(label, round(_BUTTON_TEXT_PX * self.scale), ink, is_primary)
         self.screen.blit(image, image.get_rect(center=box.center))
