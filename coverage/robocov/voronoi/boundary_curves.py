@@ -17,6 +17,8 @@ cannot disagree.
 A curve is a row of an array, whose columns are named below.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
@@ -46,7 +48,7 @@ _NORMAL_X = 0
 _NORMAL_Y = 1
 _DISTANCE = 2  # r, m
 _COEFFICIENT = 3  # a, 1/m
-_BEGIN = 4  # the values of t between which the curve may bound the cell, m
+_START = 4  # the values of t between which the curve may bound the cell, m
 _END = 5
 _CURVE_CELL = 6
 _CURVE_OTHER_CELL = 7
@@ -78,6 +80,31 @@ _MIN_SQUARED_SINE = 1e-29
 At smaller angles, rounding alone decides whether and where they meet. One curve is then treated as lying
 within the other, which moves no boundary by more than rounding does.
 """
+
+
+class _Equation(NamedTuple):
+    """The coefficients of the equation a |q|² + b q = c of a curve."""
+
+    a: float
+    """1/m"""
+    bx: float
+    by: float
+    c: float
+    """m"""
+
+
+class _Intersection(NamedTuple):
+    """The crossings of two curves, from the point of view of the first one."""
+
+    enter: float
+    """Parameter t at which the first curve enters the cell's side of the second one, m; nan if the curves do
+    not intersect."""
+    leave: float
+    """Parameter t at which the first curve leaves that side, m; nan if the curves do not intersect."""
+    is_first_outside: bool
+    """Whether the first curve is nowhere on the cell's side of the second one."""
+    is_second_outside: bool
+    """Whether the second curve is nowhere on the cell's side of the first one."""
 
 
 @kernel
@@ -122,7 +149,7 @@ def trace_boundaries(
             end_edge += 1
         own_pairs = pairs[first_pair:end_pair]
         own_edges = edges[first_edge:end_edge]
-        if _is_empty(own_pairs):
+        if _is_cell_empty(own_pairs):
             is_straight[i] = False
             continue
         line_count = len(own_edges)
@@ -138,9 +165,9 @@ def trace_boundaries(
             crossings = np.empty((curve_count, curve_count, 2))
             _find_crossings(curves[:curve_count], line_count, crossings)
             for c in range(curve_count):
-                # Each other curve cuts out at most one gap, and each part is divided at most once.
+                # Each other curve cuts out at most one gap, and each section is divided at most once.
                 pieces = _make_room(pieces, piece_count, 2 * curve_count + 2)
-                piece_count = _add_parts(curves[c], crossings[c], pieces, piece_count)
+                piece_count = _add_boundary(curves[c], crossings[c], pieces, piece_count)
     return pieces[:piece_count]
 
 
@@ -173,7 +200,7 @@ def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
 
 
 @kernel
-def _is_empty(pairs: Array) -> bool:
+def _is_cell_empty(pairs: Array) -> bool:
     """Return whether a cell is empty because a faster robot is at the position of its robot."""
     for k in range(len(pairs)):
         squared_distance = pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2
@@ -207,7 +234,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
             curves[curve_count, _COEFFICIENT] = (
                 0.5 * (difference_of_squares / (own_speed * other_speed)) / distance
             )
-            curves[curve_count, _BEGIN] = -np.inf
+            curves[curve_count, _START] = -np.inf
             curves[curve_count, _END] = np.inf
             curves[curve_count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
             curves[curve_count, _CURVE_OTHER_CELL] = pairs[k, PAIR_NEIGHBOR]
@@ -250,7 +277,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
         normal_y = curves[e, _NORMAL_Y]
         curves[e, _COEFFICIENT] = 0.0
         # On a line, t is half the signed distance along it from the point nearest to the generator.
-        curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, EDGE_START_Y] - normal_y * edges[e, EDGE_START_X])
+        curves[e, _START] = 0.5 * (normal_x * edges[e, EDGE_START_Y] - normal_y * edges[e, EDGE_START_X])
         curves[e, _END] = 0.5 * (normal_x * edges[e, EDGE_END_Y] - normal_y * edges[e, EDGE_END_X])
         curves[e, _CURVE_CELL] = edges[e, EDGE_CELL]
         curves[e, _CURVE_OTHER_CELL] = edges[e, EDGE_OTHER_CELL]
@@ -294,127 +321,144 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
     """For each pair of curves, find the part of the first one that is on the cell's side of the second one.
 
     A point of a curve can bound the cell only where it is on the cell's side of all other curves. Entry
-    [one, other] of `crossings`, (k, k, 2), receives the values of the parameter t of `one` at which it enters
-    and leaves the cell's side of `other`, or nan if the two do not intersect. A curve that is nowhere on the
-    cell's side of another one gets an empty interval of t. The first `line_count` curves are the edges of the
-    cell among equally fast robots, a convex polygon. They do not shorten each other, and are not compared.
+    [first, second] of `crossings`, (k, k, 2), receives the values of the parameter t of the first curve at
+    which it enters and leaves the cell's side of the second one, or nan if the two do not intersect. A curve
+    that is nowhere on the cell's side of another one gets an empty interval of t. The first `line_count`
+    curves are the edges of the cell among equally fast robots, a convex polygon. They do not shorten each
+    other, and are not compared.
     """
     count = len(curves)
-    for one in range(count):
-        crossings[one, one, _ENTER] = np.nan
-        crossings[one, one, _LEAVE] = np.nan
-        for other in range(one + 1, count):
+    for first in range(count):
+        crossings[first, first, _ENTER] = np.nan
+        crossings[first, first, _LEAVE] = np.nan
+        for second in range(first + 1, count):
             enter = np.nan
             leave = np.nan
-            is_one_outside = False
-            is_other_outside = False
-            if other >= line_count:
-                enter, leave, is_one_outside, is_other_outside = _intersect(curves[one], curves[other])
-            # An interval that ends at minus infinity is empty.
-            if is_one_outside:
-                curves[one, _END] = -np.inf
-            if is_other_outside:
-                curves[other, _END] = -np.inf
-            crossings[one, other, _ENTER] = enter
-            crossings[one, other, _LEAVE] = leave
-            # Both curves have the cell on their left. Therefore, where `one` leaves the cell's side of
-            # `other`, `other` enters that of `one`, and vice versa.
-            x, y = _evaluate(curves[one], leave)
-            crossings[other, one, _ENTER] = _find_parameter(curves[other], x, y)
-            x, y = _evaluate(curves[one], enter)
-            crossings[other, one, _LEAVE] = _find_parameter(curves[other], x, y)
+            if second >= line_count:
+                intersection = _intersect(curves[first], curves[second])
+                enter = intersection.enter
+                leave = intersection.leave
+                if intersection.is_first_outside:
+                    _make_empty(curves, first)
+                if intersection.is_second_outside:
+                    _make_empty(curves, second)
+            crossings[first, second, _ENTER] = enter
+            crossings[first, second, _LEAVE] = leave
+            # Both curves have the cell on their left. Therefore, where the first curve leaves the cell's side
+            # of the second one, the second one enters that of the first, and vice versa.
+            x, y = _evaluate(curves[first], leave)
+            crossings[second, first, _ENTER] = _find_parameter(curves[second], x, y)
+            x, y = _evaluate(curves[first], enter)
+            crossings[second, first, _LEAVE] = _find_parameter(curves[second], x, y)
 
 
 @kernel
-def _intersect(one: Array, other: Array) -> tuple[float, float, bool, bool]:
+def _make_empty(curves: Array, curve: int) -> None:
+    """Make the interval of t empty in which a curve may bound the cell: it then ends at minus infinity."""
+    curves[curve, _END] = -np.inf
+
+
+@kernel
+def _intersect(first: Array, second: Array) -> _Intersection:
     """Find where a curve enters and leaves the cell's side of another one.
 
-    The other curve is a |q|² + b q = c, and the cell is where a |q|² + b q <= c. With the point q(t) of the
+    The second curve is a |q|² + b q = c, and the cell is where a |q|² + b q <= c. With the point q(t) of the
     first curve inserted, this condition is quadratic in t, and its roots are the crossings. The curves meet
-    at an angle whose cosine is g = b b' + 2 (a c' + a' c), so that they intersect if 1 - g² > 0. Return both
-    values of t, nan if the curves do not intersect, and for each curve whether it is nowhere on the cell's
-    side of the other one.
+    at an angle whose cosine is g = b b' + 2 (a c' + a' c), so that they intersect if 1 - g² > 0.
     """
-    a1 = one[_COEFFICIENT]
-    b1x, b1y, c1 = _compute_b_and_c(one)
-    a2 = other[_COEFFICIENT]
-    b2x, b2y, c2 = _compute_b_and_c(other)
-    # The components of the second b along the normal of the first curve, and to the left of it.
-    normal_x = one[_NORMAL_X]
-    normal_y = one[_NORMAL_Y]
-    outward = b2x * normal_x + b2y * normal_y
-    leftward = b2y * normal_x - b2x * normal_y + 0.0  # The sum turns a negative zero into a positive one.
-    r1 = one[_DISTANCE]
-    k = 2.0 * a1
-    # On the first curve, |q|² = r² + (2 - r k)² t² / (1 + k² t²). Multiplied by this divisor, the condition
-    # of the other curve is quadratic t² + 2 leftward t + constant <= 0.
-    factor = 2.0 - r1 * k
-    quadratic = a2 * factor * factor - k * outward * factor - c2 * k * k
-    constant = a2 * r1 * r1 + r1 * outward - c2
-    # 1 - g² as a sum of 2 x 2 determinants: at small angles, subtracting g² from 1 would leave only rounding
-    # errors.
-    b_cross = b1x * b2y - b1y * b2x
-    across = a1 * c2 - a2 * c1
-    squared_sine = b_cross * b_cross - 4.0 * across * across
-    squared_sine += 4.0 * (
-        (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
+    equation = _compute_equation(second)
+    # The components of b along the normal of the first curve, and to the left of it.
+    normal_x = first[_NORMAL_X]
+    normal_y = first[_NORMAL_Y]
+    b_outward = equation.bx * normal_x + equation.by * normal_y
+    # Adding 0 turns a negative zero into a positive one.
+    b_leftward = equation.by * normal_x - equation.bx * normal_y + 0.0
+    # On the first curve, at the distance r and with the curvature k, |q|² = r² + (2 - r k)² t² / (1 + k² t²).
+    # Multiplied by this divisor, the condition of the second curve is
+    # quadratic t² + 2 b_leftward t + constant <= 0.
+    distance = first[_DISTANCE]
+    curvature = 2.0 * first[_COEFFICIENT]
+    factor = 2.0 - distance * curvature
+    quadratic = (
+        equation.a * factor * factor - curvature * b_outward * factor - equation.c * curvature * curvature
     )
+    constant = equation.a * distance * distance + distance * b_outward - equation.c
+    cosine, squared_sine = _compute_angle(_compute_equation(first), equation)
     if squared_sine > _MIN_SQUARED_SINE:
-        # The two roots of the quadratic function, in the form that avoids cancellation. The curve enters at
-        # (-leftward - sqrt) / quadratic, where the function falls, and leaves where it rises.
-        large = -leftward - np.copysign(np.sqrt(squared_sine), leftward)
-        if leftward >= 0.0:
-            return large / quadratic, constant / large, False, False
-        return constant / large, large / quadratic, False, False
+        # The two roots of the quadratic function are numerator / quadratic and constant / numerator, a form
+        # that avoids cancellation. The curve enters at (-b_leftward - sqrt) / quadratic, where the function
+        # falls, and leaves where it rises.
+        numerator = -b_leftward - np.copysign(np.sqrt(squared_sine), b_leftward)
+        if b_leftward >= 0.0:
+            return _Intersection(numerator / quadratic, constant / numerator, False, False)
+        return _Intersection(constant / numerator, numerator / quadratic, False, False)
     # The curves do not intersect: the function has the same sign on the whole first curve. If g >= 1, one of
     # the curves is on the cell's side of the other one; if g <= -1, both are, or neither is.
-    is_one_outside = quadratic + constant > 0.0
-    g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
-    is_other_outside = is_one_outside if g < 0.0 else not is_one_outside
-    return np.nan, np.nan, is_one_outside, is_other_outside
+    is_first_outside = quadratic + constant > 0.0
+    is_second_outside = is_first_outside if cosine < 0.0 else not is_first_outside
+    return _Intersection(np.nan, np.nan, is_first_outside, is_second_outside)
 
 
 @kernel
-def _compute_b_and_c(curve: Array) -> tuple[float, float, float]:
-    """Return the components of b, and c, of a curve a |q|² + b q = c.
+def _compute_angle(first: _Equation, second: _Equation) -> tuple[float, float]:
+    """Return the cosine g = b b' + 2 (a c' + a' c) of the angle at which two curves meet, and its sin².
 
-    They follow from b² + 4 a c = 1, and from a r² + |b| r = c at the point nearest to the generator, which is
-    at the distance r in the direction of b.
+    sin² = 1 - g² is a sum of 2 x 2 determinants: at small angles, subtracting g² from 1 would leave only
+    rounding errors.
+    """
+    b_cross = first.bx * second.by - first.by * second.bx
+    ac_cross = first.a * second.c - second.a * first.c
+    ab_cross_x = first.bx * second.a - second.bx * first.a
+    ab_cross_y = first.by * second.a - second.by * first.a
+    bc_cross_x = first.bx * second.c - second.bx * first.c
+    bc_cross_y = first.by * second.c - second.by * first.c
+    squared_sine = b_cross * b_cross - 4.0 * ac_cross * ac_cross
+    squared_sine += 4.0 * (ab_cross_x * bc_cross_x + ab_cross_y * bc_cross_y)
+    cosine = first.bx * second.bx + first.by * second.by + 2.0 * (first.a * second.c + second.a * first.c)
+    return cosine, squared_sine
+
+
+@kernel
+def _compute_equation(curve: Array) -> _Equation:
+    """Return the coefficients of the equation a |q|² + b q = c of a curve.
+
+    b and c follow from b² + 4 a c = 1, and from a r² + |b| r = c at the point nearest to the generator, which
+    is at the distance r in the direction of b.
     """
     a = curve[_COEFFICIENT]
     r = curve[_DISTANCE]
-    length = 1.0 - 2.0 * a * r
-    return curve[_NORMAL_X] * length, curve[_NORMAL_Y] * length, r * (1.0 - a * r)
+    b_length = 1.0 - 2.0 * a * r
+    return _Equation(a, curve[_NORMAL_X] * b_length, curve[_NORMAL_Y] * b_length, r * (1.0 - a * r))
 
 
 @kernel
-def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
-    """Add the parts of a curve on the cell's side of all other curves; return the new number of pieces.
+def _add_boundary(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
+    """Add the sections of a curve on the cell's side of all other curves; return the new number of pieces.
 
     `crossings`, (k, 2), are the values of the parameter t at which the curve enters and leaves the cell's
     side of each other curve. If it enters first, it is on that side between the two. If it leaves first, it
-    is on that side everywhere except between the two: there is a gap. The parts are what remains of the
-    intersection of the intervals without the gaps. `crossings` is overwritten.
+    is on that side everywhere except between the two: there is a gap. The sections are the intersection of
+    the intervals without the gaps. `crossings` is overwritten.
     """
     # The crossings with curves that do not intersect this one are nan. Comparisons with nan are false, so
     # these curves neither limit the interval nor add a gap.
-    start = curve[_BEGIN]
+    start = curve[_START]
     end = curve[_END]
-    for other in range(len(crossings)):
-        if crossings[other, _ENTER] <= crossings[other, _LEAVE]:
-            start = max(start, crossings[other, _ENTER])
-            end = min(end, crossings[other, _LEAVE])
+    for k in range(len(crossings)):
+        if crossings[k, _ENTER] <= crossings[k, _LEAVE]:
+            start = max(start, crossings[k, _ENTER])
+            end = min(end, crossings[k, _LEAVE])
     # The gaps within the interval are sorted by their start. They overwrite crossings that were already read.
     gap_count = 0
-    for other in range(len(crossings)):
-        enter = crossings[other, _ENTER]
-        leave = crossings[other, _LEAVE]
+    for k in range(len(crossings)):
+        enter = crossings[k, _ENTER]
+        leave = crossings[k, _LEAVE]
         if leave < enter and leave < end and enter > start:
             _insert_gap(crossings, gap_count, enter, leave)
             gap_count += 1
-    for k in range(gap_count):
-        piece_count = _add_pieces(curve, start, min(crossings[k, _LEAVE], end), pieces, piece_count)
-        start = max(start, crossings[k, _ENTER])
+    for gap in range(gap_count):
+        piece_count = _add_pieces(curve, start, min(crossings[gap, _LEAVE], end), pieces, piece_count)
+        start = max(start, crossings[gap, _ENTER])
     return _add_pieces(curve, start, end, pieces, piece_count)
 
 
@@ -432,22 +476,26 @@ def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None
 
 @kernel
 def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_count: int) -> int:
-    """Append the part of a curve from t = start to t = end to the pieces; return their new number.
+    """Append the section of a curve from t = start to t = end to the pieces; return their new number.
 
     The point q(t) of a circle of curvature k is at the angle 2 atan(k t), seen from the center of the circle
     and measured from the point nearest to the generator, where t = 0. The half angle of a piece is therefore
-    a difference of arctangents. A piece must not exceed half a circle, so that a part on both sides of t = 0
-    is cut there.
+    a difference of arctangents. A piece must not exceed half a circle, so that a section on both sides of
+    t = 0 is cut there.
     """
-    k = 2.0 * curve[_COEFFICIENT]
+    curvature = 2.0 * curve[_COEFFICIENT]
     while start < end:
-        stop = 0.0 if start < 0.0 < end and k != 0.0 else end
+        must_cut = start < 0.0 < end and curvature != 0.0
+        piece_end = 0.0 if must_cut else end
+        half_angle = 0.0
+        if curvature != 0.0:
+            half_angle = np.arctan(curvature * piece_end) - np.arctan(curvature * start)
         pieces[piece_count, START_X], pieces[piece_count, START_Y] = _evaluate(curve, start)
-        pieces[piece_count, END_X], pieces[piece_count, END_Y] = _evaluate(curve, stop)
-        pieces[piece_count, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * start)
+        pieces[piece_count, END_X], pieces[piece_count, END_Y] = _evaluate(curve, piece_end)
+        pieces[piece_count, HALF_ANGLE] = half_angle
         pieces[piece_count, CELL] = curve[_CURVE_CELL]
         pieces[piece_count, OTHER_CELL] = curve[_CURVE_OTHER_CELL]
-        start = stop
+        start = piece_end
         piece_count += 1
     return piece_count
 
@@ -460,16 +508,16 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
     q(t) = r n + (2 t m - 2 k t² n) / (1 + k² t²). For large t, the fraction is divided by t², so that nothing
     overflows.
     """
-    k = 2.0 * curve[_COEFFICIENT]
-    if abs(k * t) <= 1.0:
-        divisor = 1.0 + (k * t) ** 2
+    curvature = 2.0 * curve[_COEFFICIENT]
+    if abs(curvature * t) <= 1.0:
+        divisor = 1.0 + (curvature * t) ** 2
         leftward = 2.0 * t / divisor
-        outward = curve[_DISTANCE] - 2.0 * k * t * t / divisor
+        outward = curve[_DISTANCE] - 2.0 * curvature * t * t / divisor
     else:
         inverse = 1.0 / t
-        divisor = inverse * inverse + k * k
+        divisor = inverse * inverse + curvature * curvature
         leftward = 2.0 * inverse / divisor
-        outward = curve[_DISTANCE] - 2.0 * k / divisor
+        outward = curve[_DISTANCE] - 2.0 * curvature / divisor
     x = outward * curve[_NORMAL_X] - leftward * curve[_NORMAL_Y]
     y = outward * curve[_NORMAL_Y] + leftward * curve[_NORMAL_X]
     return x, y
@@ -482,9 +530,9 @@ def _find_parameter(curve: Array, x: float, y: float) -> float:
     The point may be beside the curve by rounding.
     """
     # With the formula of q(t), both quotients below are equal to t. The larger divisor is more accurate.
-    k = 2.0 * curve[_COEFFICIENT]
+    curvature = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]
-    divisor = 2.0 + k * outward
-    t: float = leftward / divisor if divisor > 1.0 else -outward / (k * leftward)
+    divisor = 2.0 + curvature * outward
+    t: float = leftward / divisor if divisor > 1.0 else -outward / (curvature * leftward)
     return t

@@ -1,7 +1,7 @@
 """Clipping of one cell: the region is cut by the bisectors between a robot and its neighbors.
 
-The polygon of a cell is stored in one of two rings, and each cut writes the other one. All coordinates are
-relative to the generator of the cell, so that a tiny cell far from the origin keeps its full precision.
+All coordinates are relative to the generator of the cell, so that a tiny cell far from the origin keeps its
+full precision.
 """
 
 from typing import NamedTuple
@@ -57,20 +57,20 @@ _SORTED_NEIGHBORS = 6
 class Workspace(NamedTuple):
     """Working memory for the computation of one cell after another."""
 
-    rings: Array
-    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
+    polygon: Array
+    """(k, 4) Vertices of the cell; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
+    cut_polygon: Array
+    """(k, 4) Vertices that remain after a cut; the columns are the same."""
     neighbors: Array
     """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
 
 class CellPolygon(NamedTuple):
-    """The polygon of a cell in a `Workspace`."""
+    """The vertices of a cell in the `polygon` of a `Workspace`."""
 
-    ring: int
-    """Index of the ring."""
     vertex_count: int
     start: int
-    """Index of the first vertex in the ring."""
+    """Index of the first vertex."""
 
 
 class CellArrays(NamedTuple):
@@ -101,7 +101,8 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
     # A cut adds at most one vertex. Two more are spare.
     max_vertices = side_count + robot_count + 2
     return Workspace(
-        rings=np.empty((2, max_vertices, _VERTEX_COLUMNS)),
+        polygon=np.empty((max_vertices, _VERTEX_COLUMNS)),
+        cut_polygon=np.empty((max_vertices, _VERTEX_COLUMNS)),
         neighbors=np.empty((robot_count, _NEIGHBOR_COLUMNS)),
     )
 
@@ -128,11 +129,28 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     int
         New number of neighbors.
     """
-    neighbors[count, DX] = dx
-    neighbors[count, DY] = dy
-    neighbors[count, SQUARED_DISTANCE] = dx * dx + dy * dy
-    neighbors[count, ROBOT] = robot
+    write_neighbor(neighbors, count, dx, dy, robot)
     return count + 1 if neighbors[count, SQUARED_DISTANCE] > 0.0 else count
+
+
+@inlined_kernel
+def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int) -> None:
+    """Write a neighbor to a row of the list of those that may bound a cell.
+
+    Parameters
+    ----------
+    neighbors : (n, 4) array
+        Changed in place; see `Workspace`.
+    row : int
+    dx, dy : float, m
+        Offset of the neighbor from the generator.
+    robot : int
+        Number of the neighbor.
+    """
+    neighbors[row, DX] = dx
+    neighbors[row, DY] = dy
+    neighbors[row, SQUARED_DISTANCE] = dx * dx + dy * dy
+    neighbors[row, ROBOT] = robot
 
 
 @inlined_kernel
@@ -155,35 +173,43 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     -------
     CellPolygon
     """
-    rings = workspace.rings
+    polygon = workspace.polygon
+    cut_polygon = workspace.cut_polygon
     neighbor_rows = workspace.neighbors
     # At first the polygon is the region. The nearest neighbors cut it first, so that few of the others can
     # still cut it.
-    ring = 0
     count = len(sides)
     for k in range(count):
-        rings[ring, k, X] = sides[k, SIDE_X] - points[i, 0]
-        rings[ring, k, Y] = sides[k, SIDE_Y] - points[i, 1]
-        rings[ring, k, OTHER_CELL] = REGION
-    squared_range = _compute_squared_range(rings, ring, count)
+        polygon[k, X] = sides[k, SIDE_X] - points[i, 0]
+        polygon[k, Y] = sides[k, SIDE_Y] - points[i, 1]
+        polygon[k, OTHER_CELL] = REGION
+    squared_range = _compute_squared_range(polygon, count)
     for row in range(neighbor_count):
         is_sorted = row < _SORTED_NEIGHBORS
         if is_sorted:
             _move_nearest(neighbor_rows, row, neighbor_count)
         if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
-            new_count = _cut_polygon(rings, ring, count, neighbor_rows, row)
+            new_count = _cut_polygon(polygon, cut_polygon, count, neighbor_rows, row)
             if new_count != _NOT_CUT:
-                ring = 1 - ring
                 count = new_count
-                squared_range = _compute_squared_range(rings, ring, count)
+                _copy_vertices(cut_polygon, polygon, count)
+                squared_range = _compute_squared_range(polygon, count)
         elif is_sorted:
             # This is the nearest of the remaining neighbors, so none of them can cut the cell.
             break
-    return CellPolygon(ring=ring, vertex_count=count, start=0)
+    return CellPolygon(vertex_count=count, start=0)
 
 
 @inlined_kernel
-def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
+def _copy_vertices(source: Array, target: Array, count: int) -> None:
+    """Copy the first `count` vertices of a polygon to another one."""
+    for k in range(count):
+        for column in range(_VERTEX_COLUMNS):
+            target[k, column] = source[k, column]
+
+
+@inlined_kernel
+def _compute_squared_range(polygon: Array, count: int) -> float:
     """Return the square of the largest distance at which a neighbor can cut the polygon, m².
 
     The bisector is half as far away as the neighbor. It therefore misses the polygon if the neighbor is more
@@ -191,8 +217,8 @@ def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
     """
     squared_range = 0.0
     for k in range(count):
-        x = rings[ring, k, X]
-        y = rings[ring, k, Y]
+        x = polygon[k, X]
+        y = polygon[k, Y]
         squared_range = max(squared_range, 2.0**2 * (x * x + y * y))
     return squared_range
 
@@ -212,21 +238,21 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 
 @inlined_kernel
-def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
-    """Cut the polygon in a ring by the bisector to a neighbor; write what remains to the other ring.
+def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
+    """Cut a polygon by the bisector to a neighbor; write what remains to `cut_polygon`.
 
-    What remains is the part nearer to the generator than to the neighbor. The vertices beyond the bisector
+    The points nearer to the generator than to the neighbor remain. The vertices beyond the bisector
     are replaced by the two points where the outline of the polygon crosses it. Return the new number of
     vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the bisector.
     """
-    farthest = _compute_excess(rings, ring, count, neighbor_rows, row)
+    farthest = _compute_excess(polygon, count, neighbor_rows, row)
     if farthest == _NO_VERTEX:
         return _NOT_CUT
     # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
     # are those from `first_cut` to `last_cut`; `after` is the vertex after them, and `before` the one before.
     last_cut = farthest
     after = _get_next_vertex(last_cut, count)
-    while after != farthest and rings[ring, after, _EXCESS] > 0.0:
+    while after != farthest and polygon[after, _EXCESS] > 0.0:
         last_cut = after
         after = _get_next_vertex(last_cut, count)
     if after == farthest:
@@ -234,28 +260,27 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
         return 0
     first_cut = farthest
     before = _get_previous_vertex(first_cut, count)
-    while rings[ring, before, _EXCESS] > 0.0:
+    while polygon[before, _EXCESS] > 0.0:
         first_cut = before
         before = _get_previous_vertex(first_cut, count)
-    # Copy the vertices that remain, from `after` to `before`, and close the ring along the bisector.
-    other_ring = 1 - ring
+    # Copy the vertices that remain, from `after` to `before`, and close the outline along the bisector.
     new_count = 0
     k = after
     while k != first_cut:
         for column in (X, Y, OTHER_CELL):
-            rings[other_ring, new_count, column] = rings[ring, k, column]
+            cut_polygon[new_count, column] = polygon[k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
     robot = neighbor_rows[row, ROBOT]
-    if rings[ring, before, _EXCESS] == 0.0:
+    if polygon[before, _EXCESS] == 0.0:
         # The bisector passes through `before`, where the new edge begins.
-        rings[other_ring, new_count - 1, OTHER_CELL] = robot
+        cut_polygon[new_count - 1, OTHER_CELL] = robot
     else:
-        _add_crossing(rings, ring, new_count, before, first_cut, robot)
+        _add_crossing(polygon, cut_polygon, new_count, before, first_cut, robot)
         new_count += 1
-    if rings[ring, after, _EXCESS] < 0.0:
+    if polygon[after, _EXCESS] < 0.0:
         # The rest of the edge from `last_cut` to `after` still borders on the same cell.
-        _add_crossing(rings, ring, new_count, after, last_cut, rings[ring, last_cut, OTHER_CELL])
+        _add_crossing(polygon, cut_polygon, new_count, after, last_cut, polygon[last_cut, OTHER_CELL])
         new_count += 1
     return new_count
 
@@ -273,7 +298,7 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 
 @inlined_kernel
-def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
+def _compute_excess(polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
     """Compute how far each vertex of a polygon is beyond a bisector, and write it to the column `_EXCESS`.
 
     The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
@@ -282,12 +307,12 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
     """
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
-    level = 0.5 * neighbor_rows[row, SQUARED_DISTANCE]
+    half_squared_distance = 0.5 * neighbor_rows[row, SQUARED_DISTANCE]
     farthest = _NO_VERTEX
     max_excess = 0.0
     for k in range(count):
-        excess = rings[ring, k, X] * dx + rings[ring, k, Y] * dy - level
-        rings[ring, k, _EXCESS] = excess
+        excess = polygon[k, X] * dx + polygon[k, Y] * dy - half_squared_distance
+        polygon[k, _EXCESS] = excess
         if excess > max_excess:
             farthest = k
             max_excess = excess
@@ -296,23 +321,21 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
 
 @inlined_kernel
 def _add_crossing(
-    rings: Array, ring: int, new_vertex: int, inner: int, outer: int, other_cell: float
+    polygon: Array, cut_polygon: Array, new_vertex: int, inner: int, outer: int, other_cell: float
 ) -> None:
-    """Add a vertex at the point where an edge of the polygon crosses the current bisector.
+    """Add a vertex to `cut_polygon` at the point where an edge of `polygon` crosses the current bisector.
 
-    The edge belongs to the polygon in `ring`, and connects the vertex `inner`, on the generator's side of the
-    bisector, with the vertex `outer` on the other side. The crossing follows by linear interpolation from
-    their excesses, which are proportional to their distances from the bisector. It becomes vertex
-    `new_vertex` of the polygon in the other ring. `other_cell` is the cell on the other side of the edge that
-    begins there.
+    The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
+    the other side. The crossing follows by linear interpolation from their excesses, which are proportional
+    to their distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`. `other_cell` is the
+    cell on the other side of the edge that begins there.
     """
-    other_ring = 1 - ring
-    inner_excess = rings[ring, inner, _EXCESS]
-    fraction = inner_excess / (inner_excess - rings[ring, outer, _EXCESS])
+    inner_excess = polygon[inner, _EXCESS]
+    fraction = inner_excess / (inner_excess - polygon[outer, _EXCESS])
     for column in (X, Y):
-        step = rings[ring, outer, column] - rings[ring, inner, column]
-        rings[other_ring, new_vertex, column] = rings[ring, inner, column] + fraction * step
-    rings[other_ring, new_vertex, OTHER_CELL] = other_cell
+        step = polygon[outer, column] - polygon[inner, column]
+        cut_polygon[new_vertex, column] = polygon[inner, column] + fraction * step
+    cut_polygon[new_vertex, OTHER_CELL] = other_cell
 
 
 @inlined_kernel
@@ -339,7 +362,7 @@ def write_cell(
     int
         Number of edges of all cells so far.
     """
-    rings = workspace.rings
+    vertices = workspace.polygon
     edges = cells.edges
     # Twice the area, and six times the first moments: sums over the triangles between edges and generator.
     doubled_area = 0.0
@@ -348,10 +371,10 @@ def write_cell(
     k = polygon.start
     for edge in range(edge_count, edge_count + polygon.vertex_count):
         after = _get_next_vertex(k, polygon.vertex_count)
-        start_x = rings[polygon.ring, k, X]
-        start_y = rings[polygon.ring, k, Y]
-        end_x = rings[polygon.ring, after, X]
-        end_y = rings[polygon.ring, after, Y]
+        start_x = vertices[k, X]
+        start_y = vertices[k, Y]
+        end_x = vertices[after, X]
+        end_y = vertices[after, Y]
         cross = start_x * end_y - end_x * start_y
         doubled_area += cross
         moment_sum_x += cross * (start_x + end_x)
@@ -362,7 +385,7 @@ def write_cell(
             edges[edge, EDGE_END_X] = end_x
             edges[edge, EDGE_END_Y] = end_y
             edges[edge, EDGE_CELL] = i
-            edges[edge, EDGE_OTHER_CELL] = rings[polygon.ring, k, OTHER_CELL]
+            edges[edge, EDGE_OTHER_CELL] = vertices[k, OTHER_CELL]
         k = after
     factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
     cells.mass[i] = max(0.5 * doubled_area, 0.0)

@@ -260,10 +260,10 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) ->
 @inlined_kernel
 def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
     """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
-    own = cotangents[h]
-    opposite = cotangents[mesh[TWIN, h]]
+    cotangent = cotangents[h]
+    twin_cotangent = cotangents[mesh[TWIN, h]]
     # This is also true if a cotangent is nan.
-    return not own + opposite >= -_TOLERANCE * (abs(own) + abs(opposite))
+    return not cotangent + twin_cotangent >= -_TOLERANCE * (abs(cotangent) + abs(twin_cotangent))
 
 
 @kernel
@@ -301,43 +301,44 @@ def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: f
 
 @inlined_kernel
 def _flip_from(
-    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flip_count: int
+    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, first_half_edge: int, flip_count: int
 ) -> tuple[int, bool]:
-    """Flip the edge of half-edge h if it is not Delaunay, then the edges around it, until all of them are.
+    """Flip the edge of a half-edge if it is not Delaunay, then the edges around it, until all of them are.
 
     A flip replaces the edge between two triangles by the other diagonal of the quadrilateral that they form.
     Afterwards, the four sides of the quadrilateral may have to be flipped; the stack contains the edges that
     are still to be tested. Return the number of flips so far, or `_FAILED`, and whether all new triangles are
     counter-clockwise.
     """
-    stack[0] = h
+    stack[0] = first_half_edge
     stack_size = 1
     is_ccw = True
     while stack_size > 0:
         stack_size -= 1
-        a = stack[stack_size]
-        b = mesh[TWIN, a]
-        if b == NO_TWIN or not _must_flip(mesh, cotangents, a):
+        half_edge = stack[stack_size]
+        twin = mesh[TWIN, half_edge]
+        if twin == NO_TWIN or not _must_flip(mesh, cotangents, half_edge):
             continue
-        # a and b are the two half-edges of the old edge. The new edge connects the two corners opposite to
-        # it. Its half-edges are `before_a` and `before_b`, which precede a and b in their triangles.
-        # Half-edge a now runs along the edge where `before_b` was, and b along the edge where `before_a` was.
-        before_a = get_previous_half_edge(a)
-        before_b = get_previous_half_edge(b)
-        mesh[CORNER, a] = mesh[CORNER, before_b]
-        mesh[CORNER, b] = mesh[CORNER, before_a]
-        _link(mesh, a, mesh[TWIN, before_b])
-        _link(mesh, b, mesh[TWIN, before_a])
-        _link(mesh, before_a, before_b)
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(a))
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(b))
+        # The new edge connects the two corners opposite to the old edge. Its half-edges are
+        # `before_half_edge` and `before_twin`, which precede those of the old edge in their triangles. The
+        # half-edges of the old edge move to two sides of the quadrilateral: `half_edge` to the place of
+        # `before_twin`, and `twin` to that of `before_half_edge`.
+        before_half_edge = get_previous_half_edge(half_edge)
+        before_twin = get_previous_half_edge(twin)
+        mesh[CORNER, half_edge] = mesh[CORNER, before_twin]
+        mesh[CORNER, twin] = mesh[CORNER, before_half_edge]
+        _link(mesh, half_edge, mesh[TWIN, before_twin])
+        _link(mesh, twin, mesh[TWIN, before_half_edge])
+        _link(mesh, before_half_edge, before_twin)
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(half_edge))
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first_half_edge(twin))
         flip_count += 1
         if flip_count > _MAX_FLIPS_PER_POINT * len(points) or stack_size + 4 > len(stack):
             return _FAILED, False
         # The outline of the quadrilateral: edges that the flip may have made non-Delaunay.
-        stack[stack_size] = a
-        stack[stack_size + 1] = get_next_half_edge(a)
-        stack[stack_size + 2] = b
-        stack[stack_size + 3] = get_next_half_edge(b)
+        stack[stack_size] = half_edge
+        stack[stack_size + 1] = get_next_half_edge(half_edge)
+        stack[stack_size + 2] = twin
+        stack[stack_size + 3] = get_next_half_edge(twin)
         stack_size += 4
     return flip_count, is_ccw

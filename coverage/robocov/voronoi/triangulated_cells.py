@@ -8,11 +8,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET, SIDE_X, SIDE_Y
 from robocov.voronoi.clipping import (
-    DX,
-    DY,
     OTHER_CELL,
-    ROBOT,
-    SQUARED_DISTANCE,
     CellArrays,
     CellPolygon,
     Workspace,
@@ -21,6 +17,7 @@ from robocov.voronoi.clipping import (
     clip_cell,
     create_workspace,
     write_cell,
+    write_neighbor,
 )
 from robocov.voronoi.delaunay import (
     CORNER,
@@ -190,22 +187,25 @@ def _find_cell(
     their circumcenters. If the cell may reach beyond the region, the region is clipped by the bisectors to
     these neighbors instead.
     """
-    # Clearance is the distance of the robot from the nearest side of the region.
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
-    clearance = np.inf
-    for k in range(len(sides)):
-        clearance = min(
-            clearance,
-            sides[k, SIDE_OFFSET]
-            - (sides[k, SIDE_NORMAL_X] * points[i, 0] + sides[k, SIDE_NORMAL_Y] * points[i, 1]),
-        )
+    clearance = _compute_clearance(sides, points[i, 0], points[i, 1])
     # If all vertices of the cell are nearer than the sides of the region, no side cuts it. In any case, the
     # cell starts at the neighbor with the lowest number, so that it does not depend on the order of the
     # triangles.
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
-        return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest_index)
+        return CellPolygon(vertex_count=fan.neighbor_count, start=fan.lowest_index)
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
+
+
+@inlined_kernel
+def _compute_clearance(sides: Array, x: float, y: float) -> float:
+    """Return the distance of (x, y) from the nearest side of the region, negative outside, m."""
+    clearance = np.inf
+    for k in range(len(sides)):
+        distance = sides[k, SIDE_OFFSET] - (sides[k, SIDE_NORMAL_X] * x + sides[k, SIDE_NORMAL_Y] * y)
+        clearance = min(clearance, distance)
+    return clearance
 
 
 @inlined_kernel
@@ -219,9 +219,7 @@ def _walk_around(
     number n on are sentinels, which are no neighbors.
     """
     mesh = triangulation.mesh
-    cotangents = triangulation.cotangents
-    neighbor_rows = workspace.neighbors
-    rings = workspace.rings
+    polygon = workspace.polygon
     n = len(points)
     # The neighbor with the lowest number is remembered: cells start there, whichever triangle comes first.
     count = 0
@@ -240,19 +238,13 @@ def _walk_around(
                 lowest_index = count
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
-            # The Voronoi vertex lies on the bisector. Its offset to the left of the line from i to j is half
-            # their distance times the cotangent of the triangle's angle opposite to that line.
-            x = 0.5 * (dx - cotangents[h] * dy)
-            y = 0.5 * (dy + cotangents[h] * dx)
+            x, y = _compute_voronoi_vertex(dx, dy, triangulation.cotangents[h])
             squared_reach = max(squared_reach, x * x + y * y)
-            neighbor_rows[count, DX] = dx
-            neighbor_rows[count, DY] = dy
-            neighbor_rows[count, SQUARED_DISTANCE] = dx * dx + dy * dy
-            neighbor_rows[count, ROBOT] = j
-            rings[0, count, X] = x
-            rings[0, count, Y] = y
-            # The edge from here to the next Voronoi vertex borders on the third corner of the triangle.
-            rings[0, count, OTHER_CELL] = mesh[CORNER, previous]
+            polygon[count, X] = x
+            polygon[count, Y] = y
+            # The edge from this Voronoi vertex to the next borders on the third corner of the triangle.
+            polygon[count, OTHER_CELL] = mesh[CORNER, previous]
+            write_neighbor(workspace.neighbors, count, dx, dy, j)
             count += 1
         else:
             # Robot i is connected to a sentinel: its cell is not bounded by robots alone.
@@ -266,3 +258,14 @@ def _walk_around(
                 lowest_index=lowest_index,
                 squared_reach=squared_reach,
             )
+
+
+@inlined_kernel
+def _compute_voronoi_vertex(dx: float, dy: float, cotangent: float) -> tuple[float, float]:
+    """Return the circumcenter of a triangle relative to one of its corners, m.
+
+    (dx, dy) leads from that corner to the next one, counter-clockwise, and `cotangent` is that of the angle
+    opposite to this edge. The circumcenter lies on the bisector of the edge. Its offset to the left is half
+    the length of the edge times the cotangent.
+    """
+    return 0.5 * (dx - cotangent * dy), 0.5 * (dy + cotangent * dx)

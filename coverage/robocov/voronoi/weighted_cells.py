@@ -216,24 +216,24 @@ def _compute_weighted_cells(
     The cells among equally fast robots have straight edges. The circles of Apollonius between robots of
     different speeds then cut parts off.
     """
-    robot, other = neighbors.list_pairs()
-    other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
-    is_equal = speeds[robot] == speeds[other]
+    robot, neighbor = neighbors.list_pairs()
+    neighbor_positions = points[neighbor] if reported_positions is None else np.asarray(reported_positions)
+    is_equal = speeds[robot] == speeds[neighbor]
     equal_cells = partition(
         points,
         region,
-        Neighbors.from_pairs(len(points), robot[is_equal], other[is_equal]),
-        reported_positions=None if reported_positions is None else other_positions[is_equal],
+        Neighbors.from_pairs(len(points), robot[is_equal], neighbor[is_equal]),
+        reported_positions=None if reported_positions is None else neighbor_positions[is_equal],
     )
     edges = equal_cells.edges
-    offsets = other_positions - points[robot]
+    offsets = neighbor_positions - points[robot]
     is_straight = np.empty(len(points), dtype=bool)
     # When the kernel runs as Python, NumPy would warn of infinite and undefined numbers.
     with np.errstate(all="ignore"):
         pieces = trace_boundaries(
             points=points,
             sides=region.sides,
-            pairs=np.column_stack([robot, other, offsets, speeds[robot], speeds[other]]),
+            pairs=np.column_stack([robot, neighbor, offsets, speeds[robot], speeds[neighbor]]),
             edges=np.column_stack([edges.start, edges.end, edges.cell, edges.other_cell]),
             is_straight=is_straight,
         )
