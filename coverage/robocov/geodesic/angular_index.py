@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.geodesic.box_tree import (
     END_OF_TREE,
     HIGH_X,
@@ -37,8 +37,11 @@ from robocov.geodesic.walls import (
     get_relative_ends,
 )
 
-_PADDING = 1e-9
-"""Margin added to the angles that a wall spans and subtracted from its distance, far larger than rounding."""
+_ANGLE_PADDING = 1e-9
+"""Margin by which the pseudo-angles that a wall or a box spans are widened, far larger than rounding."""
+
+_DISTANCE_PADDING = 1e-9
+"""Relative margin by which squared distances are lowered or raised, far larger than rounding."""
 
 _MAX_CHAIN = 16
 """Maximum number of consecutive walls that are examined together."""
@@ -162,7 +165,7 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    squared_distance = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
+    squared_distance = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _DISTANCE_PADDING)
     if squared_distance == 0.0:
         return False
     bin_count = index.squared_horizon.shape[1]
@@ -173,7 +176,7 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
     # divided by the distance to the center. A pseudo-angle grows at most as fast as the angle.
     squared_sine = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
-    half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _PADDING
+    half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _ANGLE_PADDING
     angle = compute_pseudo_angle(dx, dy)
     bins_per_unit = bin_count / _FULL_TURN
     first_bin = int(np.floor((angle - half_angle) * bins_per_unit))
@@ -251,7 +254,7 @@ def add_walls(
             # A wall may need an entry in every bin.
             if entry_count + bin_count > len(index.entry_wall):
                 return NO_SPACE
-            if walls.can_hide[wall]:
+            if walls.can_hide_free_space[wall]:
                 entry_count = _add_wall(walls, wall, index, source, entry_count)
     # At a vertex, some directions lead into the obstacle: no clear distance may skip that test.
     if find_vertex(walls.vertices, x, y) != NO_VERTEX:
@@ -310,43 +313,54 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
     # A wall in line with the source hides nothing, unless the source is in its interior.
     if not _faces(walls.ends, wall, x, y):
         return entry_count
-    squared_near = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _PADDING)
-    if squared_near >= index.squared_reach[source]:
+    min_squared_distance = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _DISTANCE_PADDING)
+    if min_squared_distance >= index.squared_reach[source]:
         return entry_count
-    squared_far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
+    max_squared_distance = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _DISTANCE_PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
     bin_count = index.head.shape[1]
     bins_per_unit = bin_count / _FULL_TURN
-    start = compute_pseudo_angle(ax, ay)
-    stop = compute_pseudo_angle(bx, by)
-    if stop < start:
-        stop += _FULL_TURN
-    first_bin = int(np.floor((start - _PADDING) * bins_per_unit))
-    last_bin = int(np.floor((stop + _PADDING) * bins_per_unit))
+    start_angle = compute_pseudo_angle(ax, ay)
+    end_angle = compute_pseudo_angle(bx, by)
+    if end_angle < start_angle:
+        end_angle += _FULL_TURN
+    first_bin = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
+    last_bin = int(np.floor((end_angle + _ANGLE_PADDING) * bins_per_unit))
     # The wall covers the bins from `covered_first` up to `covered_end` completely.
-    covered_first = int(np.ceil((start + _PADDING) * bins_per_unit))
-    covered_end = int(np.floor((stop - _PADDING) * bins_per_unit))
+    covered_first = int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit))
+    covered_end = int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit))
     # Bins beyond a full turn wrap around. No bin is visited twice.
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
         k = unwrapped_bin & (bin_count - 1)
-        if squared_near > index.squared_horizon[source, k]:
+        if min_squared_distance > index.squared_horizon[source, k]:
             continue
-        index.squared_clear_distance[source, k] = min(index.squared_clear_distance[source, k], squared_near)
-        index.entry_wall[entry_count] = wall
-        index.entry_before[entry_count] = index.head[source, k]
-        index.head[source, k] = entry_count
+        _add_to_bin(index, source, k, wall, min_squared_distance, entry_count)
         entry_count += 1
         if covered_first <= unwrapped_bin < covered_end:
-            index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_far)
+            index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_distance)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
     k = covered_end & (bin_count - 1)
     has_partial_bin = covered_first <= covered_end < first_bin + bin_count
-    if has_partial_bin and squared_far < index.squared_horizon[source, k]:
-        squared_chain_far = _compute_max_squared_chain_distance(
-            walls, wall, x, y, stop, (covered_end + 1) / bins_per_unit, squared_far
+    if has_partial_bin and max_squared_distance < index.squared_horizon[source, k]:
+        bin_end_angle = (covered_end + 1) / bins_per_unit
+        max_squared_chain_distance = _compute_max_squared_chain_distance(
+            walls, wall, x, y, end_angle, bin_end_angle, max_squared_distance
         )
-        index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
+        index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_chain_distance)
     return entry_count
+
+
+@inlined_kernel
+def _add_to_bin(
+    index: AngularWallIndex, source: int, k: int, wall: int, min_squared_distance: float, entry: int
+) -> None:
+    """Add a wall to bin k of a source as a new entry, and limit the clear distance of the bin."""
+    index.entry_wall[entry] = wall
+    index.entry_before[entry] = index.head[source, k]
+    index.head[source, k] = entry
+    index.squared_clear_distance[source, k] = min(
+        index.squared_clear_distance[source, k], min_squared_distance
+    )
 
 
 @kernel
@@ -362,15 +376,21 @@ def _compute_squared_segment_distance(ax: float, ay: float, bx: float, by: float
 
 @kernel
 def _compute_max_squared_chain_distance(
-    walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, squared_far: float
+    walls: Walls,
+    wall: int,
+    x: float,
+    y: float,
+    end_angle: float,
+    bin_end_angle: float,
+    max_squared_distance: float,
 ) -> float:
     """Return the largest squared distance from (x, y) to a chain of consecutive walls.
 
     Where one wall ends within an angular bin, the next one usually continues, and the two together hide
-    everything behind them. The chain starts with `wall`, which ends in the direction `angle`, and whose
-    largest squared distance is `squared_far`. The walls that follow are added, as long as they face (x, y),
-    until one ends at or beyond `last_angle`, where the bin ends. The result is inf if none does. Directions
-    are given as pseudo-angles, which grow with the angle; see `compute_pseudo_angle`.
+    everything behind them. The chain starts with `wall`, which ends in the direction `end_angle`; its largest
+    squared distance is `max_squared_distance`. The walls that follow are added, as long as they face (x, y),
+    until one ends at or beyond the end of the bin, at `bin_end_angle`. The result is inf if none does.
+    Directions are given as pseudo-angles, which grow with the angle; see `compute_pseudo_angle`.
     """
     for _ in range(_MAX_CHAIN):
         # The next wall leads from (ax, ay), where this one ends, to (bx, by), relative to the point.
@@ -384,14 +404,14 @@ def _compute_max_squared_chain_distance(
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
         # The direction in which the wall ends, at or after the end of the wall before.
-        stop = compute_pseudo_angle(bx, by)
-        while stop < angle - _PADDING:
-            stop += _FULL_TURN
-        angle = stop
+        previous_end_angle = end_angle
+        end_angle = compute_pseudo_angle(bx, by)
+        while end_angle < previous_end_angle - _ANGLE_PADDING:
+            end_angle += _FULL_TURN
         # The point of a wall that is farthest away is one of its ends.
-        squared_far = max(squared_far, (bx * bx + by * by) * (1.0 + _PADDING))
-        if angle - _PADDING >= last_angle:
-            return squared_far
+        max_squared_distance = max(max_squared_distance, (bx * bx + by * by) * (1.0 + _DISTANCE_PADDING))
+        if end_angle - _ANGLE_PADDING >= bin_end_angle:
+            return max_squared_distance
     return np.inf
 
 
@@ -536,7 +556,7 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
             first_wall = (node - first_leaf) * LEAF_SIZE
             for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                 if (
-                    walls.can_hide[wall]
+                    walls.can_hide_free_space[wall]
                     and _faces(walls.ends, wall, x, y)
                     and _hides(walls.ends, wall, x, y, dx, dy)
                 ):
@@ -561,5 +581,5 @@ def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, 
     # multiplied by the length of the segment.
     side = dx * (boxes[node, LOW_Y] + half_height - y) - dy * (boxes[node, LOW_X] + half_width - x)
     half_extent: float = abs(dx) * half_height + abs(dy) * half_width
-    distance: float = abs(side) * (1.0 - _PADDING)
-    return distance > half_extent * (1.0 + _PADDING) + _MAX_SIDE_ERROR
+    distance: float = abs(side) * (1.0 - _DISTANCE_PADDING)
+    return distance > half_extent * (1.0 + _DISTANCE_PADDING) + _MAX_SIDE_ERROR

@@ -67,7 +67,7 @@ class Walls(NamedTuple):
     """(w,) The wall that starts where this one ends, or `NO_WALL` if several do."""
     component: IntArray
     """(w,) Component of the free space that the wall bounds."""
-    can_hide: BoolArray
+    can_hide_free_space: BoolArray
     """(w,) Whether free space can be behind the wall; false for walls on the convex hull of the map."""
     boxes: Array
     """The box tree of the walls."""
@@ -106,9 +106,9 @@ class _Sectors(NamedTuple):
 
     vertex: IntArray
     """(s,) The vertex of each sector."""
-    before: IntArray
+    incoming_start: IntArray
     """(s,) The vertex where the incoming wall starts."""
-    after: IntArray
+    outgoing_end: IntArray
     """(s,) The vertex where the outgoing wall ends."""
 
 
@@ -129,13 +129,11 @@ def build_walls(free: MultiPolygon) -> Walls:
     -------
     Walls
     """
-    # Sectors are built from the vertex `before`, where the incoming wall starts, and the vertex `after`,
-    # where the outgoing wall ends.
     segments = _list_segments(free)
     vertices = segments.vertices
     sectors = _find_sectors(segments)
-    incoming = vertices[sectors.vertex] - vertices[sectors.before]
-    outgoing = vertices[sectors.after] - vertices[sectors.vertex]
+    incoming = vertices[sectors.vertex] - vertices[sectors.incoming_start]
+    outgoing = vertices[sectors.outgoing_end] - vertices[sectors.vertex]
     sector_walls = np.hstack([incoming, outgoing])
     is_corner = _find_corners(sectors.vertex, incoming, outgoing)
     corners = vertices[sectors.vertex][is_corner]
@@ -150,7 +148,7 @@ def build_walls(free: MultiPolygon) -> Walls:
         following=_find_following(segments),
         component=segments.component,
         # There is no free space behind a wall on the convex hull of the map, so that it hides nothing.
-        can_hide=~_find_hull_walls(segments),
+        can_hide_free_space=~_find_hull_walls(segments),
         boxes=build_box_tree(np.minimum(starts, ends), np.maximum(starts, ends)),
         vertices=vertices,
         first_sector=np.searchsorted(sectors.vertex, np.arange(len(vertices) + 1)),
@@ -208,18 +206,18 @@ def _find_sectors(segments: _Segments) -> _Sectors:
     leaving = np.argsort(segments.start, kind="stable")
     arriving = np.argsort(segments.end, kind="stable")
     vertex = segments.start[leaving]
-    after = segments.end[leaving]
-    before = segments.start[arriving].copy()
+    outgoing_end = segments.end[leaving]
+    incoming_start = segments.start[arriving].copy()
     count = np.bincount(vertex, minlength=len(vertices))
     first = np.cumsum(count) - count
     for pinch in np.flatnonzero(count > 1):
         rows = slice(first[pinch], first[pinch] + count[pinch])
-        outgoing_angle = _compute_angles(vertices[after[rows]] - vertices[pinch])
-        incoming_angle = _compute_angles(vertices[before[rows]] - vertices[pinch])
+        outgoing_angle = _compute_angles(vertices[outgoing_end[rows]] - vertices[pinch])
+        incoming_angle = _compute_angles(vertices[incoming_start[rows]] - vertices[pinch])
         # The angle from each outgoing wall, counter-clockwise, to each incoming one.
         turns = (incoming_angle - outgoing_angle[:, None]) % (2.0 * np.pi)
-        before[rows] = before[rows][turns.argmin(axis=1)]
-    return _Sectors(vertex, before, after)
+        incoming_start[rows] = incoming_start[rows][turns.argmin(axis=1)]
+    return _Sectors(vertex, incoming_start, outgoing_end)
 
 
 def _compute_angles(vectors: Array) -> Array:

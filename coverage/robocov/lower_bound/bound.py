@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from robocov.arrays import Array, BoolArray, IntArray, freeze
@@ -18,7 +19,7 @@ from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import GRID_M, Environment
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic.angular_index import AngularWallIndex
-from robocov.geodesic.geodesics import SOURCE_BINS
+from robocov.geodesic.geodesics import SOURCE_BINS, Geodesics
 from robocov.lower_bound.price_table import PriceTable, add_paid_shares
 from robocov.lower_bound.profit_bounds import (
     CENTER_PROFIT,
@@ -190,7 +191,7 @@ def compute_lower_bound(
     cost = CoverageCost(
         environment, lattice, progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction)
     )
-    dual = _Dual(cost, np.asarray(positions, dtype=float), radius)
+    dual = _Dual.build(cost, np.asarray(positions, dtype=float), radius)
     best = _search_best_prices(dual, precision, report)
     report(1.0)
     mean_distance = max(best.bound, 0.0) / dual.total_weight
@@ -214,6 +215,17 @@ class _Proof(NamedTuple):
     """(m,) m, prices of the sites that prove the bound."""
     better_candidates: Array
     """(p, 2) grid steps, positions with a higher profit than any in the table."""
+
+
+class _ProfitBounds(NamedTuple):
+    """Profits in t triangles."""
+
+    centers: Array
+    """(t, 2) grid steps, a point of the free space in each triangle."""
+    center_profits: Array
+    """(t,) m, profits of these points."""
+    bounds: Array
+    """(t,) m, an upper bound on the profit of every point of each triangle."""
 
 
 def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
@@ -244,6 +256,7 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
     return best
 
 
+@dataclass(eq=False)
 class _Dual:
     """The dual problem of one map and team. Costs are weighted sums over the sites, not means.
 
@@ -255,20 +268,44 @@ class _Dual:
 
     Attributes
     ----------
+    geodesics : Geodesics
+        Distances on the map.
+    robot_count : int
     is_covered : (c,) bool array
         Whether each component of the free space contains robots.
     site_numbers : (m,) int array
         The sites in these components, as indices into the points of the cost.
-    total_weight : float
-        Sum of their weights.
+    site_data : SiteData
+        The same sites for kernels.
     placement_cost : float, m
         Cost of the given placement.
+    max_prices : (m,) array, m
+        Largest prices of the searches, which limit the number of entries in the table.
     first_prices : (m,) array, m
         Prices with which the search starts.
+    candidate_spacing : float, grid steps
+        Spacing of the candidates among the sites.
+    triangles : (t, 3, 2) array, grid steps
+        Triangles that cover all positions. A proof replaces them by those that it ends with.
+    table : PriceTable
+        Distances from the candidates to the sites.
     """
 
-    def __init__(self, cost: CoverageCost, positions: Array, radius: float) -> None:
-        """Set up the sites, the triangles, the first prices and the table.
+    geodesics: Geodesics
+    robot_count: int
+    is_covered: BoolArray
+    site_numbers: IntArray
+    site_data: SiteData
+    placement_cost: float
+    max_prices: Array
+    first_prices: Array
+    candidate_spacing: float
+    triangles: Array
+    table: PriceTable
+
+    @classmethod
+    def build(cls, cost: CoverageCost, positions: Array, radius: float) -> _Dual:
+        """Build the sites, the triangles, the first prices and the table.
 
         Parameters
         ----------
@@ -277,99 +314,62 @@ class _Dual:
             The given placement.
         radius : float, m
             Radius of the robots.
+
+        Returns
+        -------
+        _Dual
         """
         geodesics = cost.geodesics
-        self._geodesics = geodesics
-        self._unit = geodesics.grid.unit
-        self._robot_count = len(positions)
         result = cost(positions)
         # The positions of the robots, (n, 2) grid steps, and whether each robot is in each component of the
         # free space, (n, c).
         robots, is_inside = geodesics.snap_to_free_space(positions)
-        self.is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
-        self.site_numbers: IntArray = np.flatnonzero(result.owner >= 0)
-        weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
-        self._weights = weights[self.site_numbers]
-        self.total_weight = float(self._weights.sum())
-        if not self.total_weight > 0.0:
-            raise ParameterError(
-                f"lattice: expected sites with a weight above 0 in the components that contain robots, got "
-                f"none with {cost.lattice} cells along a side"
-            )
-        self.placement_cost = float(self._weights @ result.distances[self.site_numbers])
-
-        site_positions = cost.points[self.site_numbers]
-        self._site_data = self._build_site_data(site_positions)
-        configuration_space = self._build_configuration_space(cost.environment, radius)
-        self._triangles = self._triangulate(configuration_space)
-        # The searches are limited to prices up to the maximum, which limits the number of entries in the
-        # table.
-        self._max_prices, self.first_prices = self._compute_first_prices(robots)
-
-        # The table starts with the robots and some of the sites where a robot can be.
-        self._table = PriceTable.build_empty()
-        self._candidate_spacing = self._choose_candidate_spacing(cost.spacing)
-        is_candidate = shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])
-        candidates = self._thin_out(self._site_data.sites[is_candidate])
-        self.add_candidates(np.concatenate([robots, candidates]))
-
-    def _build_site_data(self, positions: Array) -> SiteData:
-        """Return the data of the sites, whose positions are (m, 2) m."""
-        geodesics = self._geodesics
-        sites, _ = geodesics.snap_to_free_space(positions)
-        from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
-        return SiteData(
-            walls=geodesics.walls,
-            sites=sites,
-            weights=self._weights,
-            from_corners=np.ascontiguousarray(from_corners.T),
+        is_covered = np.asarray(is_inside.any(axis=0))
+        site_numbers = np.flatnonzero(result.owner >= 0)
+        site_positions = cost.points[site_numbers]
+        site_data = _build_site_data(cost, site_numbers)
+        placement_cost = float(site_data.weights @ result.distances[site_numbers])
+        components = np.array(cost.environment.free.geoms)[is_covered]
+        configuration_space = _build_configuration_space(components, radius)
+        max_prices, first_prices = _compute_first_prices(geodesics, robots, site_data.sites)
+        stride = _choose_candidate_stride(len(site_numbers), len(positions))
+        dual = cls(
+            geodesics=geodesics,
+            robot_count=len(positions),
+            is_covered=is_covered,
+            site_numbers=site_numbers,
+            site_data=site_data,
+            placement_cost=placement_cost,
+            max_prices=max_prices,
+            first_prices=first_prices,
+            candidate_spacing=stride * cost.spacing / geodesics.grid.unit,
+            triangles=geodesics.grid.snap(_triangulate(configuration_space)),
+            table=PriceTable.build_empty(),
         )
+        # The table starts with the robots and some of the sites where a robot can be.
+        is_candidate = shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])
+        candidates = dual._thin_out(site_data.sites[is_candidate])
+        dual.add_candidates(np.concatenate([robots, candidates]))
+        return dual
 
-    def _choose_candidate_spacing(self, site_spacing: float) -> float:
-        """Return a multiple of the spacing of the sites that leaves enough candidates, grid steps."""
-        min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self._robot_count)
-        stride = max(1, int(math.sqrt(len(self.site_numbers) / min_candidates)))
-        return stride * site_spacing / self._unit
+    @property
+    def unit(self) -> float:
+        """Length of a grid step, m."""
+        return self.geodesics.grid.unit
 
-    def _build_configuration_space(self, environment: Environment, radius: float) -> shapely.Geometry:
-        """Return the area in which the center of a robot may be, with coordinates in meters.
+    @property
+    def weights(self) -> Array:
+        """Weights of the sites, (m,)."""
+        return self.site_data.weights
 
-        It may be slightly too large, but never too small, so that the bound holds for every placement.
-        """
-        components = np.array(environment.free.geoms)[self.is_covered]
-        # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which
-        # makes the area larger.
-        area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
-        if area.is_empty:
-            raise ParameterError(
-                f"radius: expected a disc that fits in the free space around the positions, got {radius:g} m"
-            )
-        return area
-
-    def _triangulate(self, area: shapely.Geometry) -> Array:
-        """Return triangles that cover an area, (t, 3, 2) grid steps."""
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
-        assert math.isclose(shapely.area(triangles).sum(), area.area, rel_tol=1e-9)
-        rings = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-        return self._geodesics.grid.snap(rings[:, :3])
-
-    def _compute_first_prices(self, robots: Array) -> tuple[Array, Array]:
-        """Return maximum and initial prices, (m,) m each, for the positions of robots, (n, 2) grid steps."""
-        sites = self._site_data.sites
-        distances = self._geodesics.compute_grid_distances(robots, sites) * self._unit
-        missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
-        distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
-        nearest = distances[0]
-        second = distances[1]
-        # An initial price is halfway between the distances of the nearest robot and the next one. If there is
-        # only one robot, it exceeds the distances of all sites.
-        single_robot_prices = nearest + nearest.max()
-        first_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
-        return distances[_MAX_PRICE_RANK - 1], first_prices
+    @cached_property
+    def total_weight(self) -> float:
+        """Sum of the weights of the sites."""
+        return float(self.weights.sum())
 
     def _thin_out(self, candidates: Array) -> Array:
-        """Return the first position in each square of a grid with half the spacing `_candidate_spacing`."""
-        squares = np.floor(candidates * 2.0 / self._candidate_spacing)
+        """Return the first position in each square of a grid with half the spacing `candidate_spacing`."""
+        squares = np.floor(candidates * 2.0 / self.candidate_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
         return candidates[np.sort(first)]
 
@@ -377,8 +377,8 @@ class _Dual:
         """Add positions, (p, 2) grid steps, to the table."""
         for first in range(0, len(candidates), _CANDIDATES_PER_BLOCK):
             block = candidates[first : first + _CANDIDATES_PER_BLOCK]
-            distances = self._geodesics.compute_grid_distances(block, self._site_data.sites) * self._unit
-            self._table = self._table.append(distances, self._max_prices)
+            distances = self.geodesics.compute_grid_distances(block, self.site_data.sites) * self.unit
+            self.table = self.table.append(distances, self.max_prices)
 
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
         """Search for prices, (m,) m, that increase the dual over the positions in the table.
@@ -388,9 +388,9 @@ class _Dual:
         `smoothing` is s as a fraction of the cost per robot. The gradient of that function is the mean of the
         gradients of the profits, weighted by the shares exp(profit / s).
         """
-        weights = self._weights
-        scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self._geodesics.size)
-        s = smoothing * scale / self._robot_count
+        weights = self.weights
+        scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self.geodesics.size)
+        s = smoothing * scale / self.robot_count
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
             """Return minus the smoothed dual at given prices, and its gradient, both divided by `scale`.
@@ -398,18 +398,18 @@ class _Dual:
             The smoothing s is that of `improve_prices`.
             """
             heartbeat()
-            profits = self._table.compute_profits(prices, weights)
+            profits = self.table.compute_profits(prices, weights)
             # Subtracting the maximum prevents an overflow of the exponential function.
             max_profit = profits.max()
             shares = np.exp((profits - max_profit) / s)
             smooth_max = max_profit + s * math.log(shares.sum())
-            dual = float(weights @ prices) - self._robot_count * smooth_max
+            dual = float(weights @ prices) - self.robot_count * smooth_max
             # In the gradient, the n robots are divided among the positions in proportion to the shares.
             # Raising the price of a site by 1 adds its weight to the dual once, and subtracts it once for
             # each robot that the site pays for, that is, each robot that is nearer than its price.
-            robot_shares = shares * (self._robot_count / shares.sum())
+            robot_shares = shares * (self.robot_count / shares.sum())
             paid_shares = np.zeros(len(prices))
-            add_paid_shares(self._table, prices, robot_shares, paid_shares)
+            add_paid_shares(self.table, prices, robot_shares, paid_shares)
             return -dual / scale, weights * (paid_shares - 1.0) / scale
 
         solution = minimize(
@@ -417,13 +417,13 @@ class _Dual:
             prices,
             jac=True,
             method="L-BFGS-B",
-            bounds=Bounds(0.0, self._max_prices),
+            bounds=Bounds(0.0, self.max_prices),
             options={"maxiter": _MAX_ITERATIONS},
         )
         return np.asarray(solution.x)
 
-    def bound_profits(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
-        """Compute upper bounds on the profits of all points of triangles, by the kernel of the same name.
+    def bound_triangle_profits(self, prices: Array, triangles: Array) -> _ProfitBounds:
+        """Compute upper bounds on the profits of all points of triangles.
 
         Parameters
         ----------
@@ -432,33 +432,31 @@ class _Dual:
 
         Returns
         -------
-        centers : (t, 2) array, grid steps
-            A point in each triangle.
-        profits : (t,) array, m
-            Profits of these points.
-        bounds : (t,) array, m
-            Upper bound on the profit of every point of each triangle.
+        _ProfitBounds
         """
-        # The middle of a triangle may be outside the free space by rounding. Its center is not.
-        middles = self._geodesics.grid.to_meters(triangles.mean(axis=1))
-        centers, _ = self._geodesics.snap_to_free_space(middles)
-        scratch = TriangleScratch.allocate(len(self._geodesics.corners))
-        grid_prices = prices / self._unit
+        # The centroid of a triangle may be outside the free space by rounding. The center is the point of the
+        # free space that is nearest to it.
+        centroids = self.geodesics.grid.to_meters(triangles.mean(axis=1))
+        centers, _ = self.geodesics.snap_to_free_space(centroids)
+        scratch = TriangleScratch.allocate(len(self.geodesics.corners))
+        grid_prices = prices / self.unit
 
-        def compute_profits(wall_index: AngularWallIndex) -> Array | None:
+        def run_kernel(wall_index: AngularWallIndex) -> Array | None:
             """Return the profits and their bounds, (2, t); None if the wall index is too small."""
             profits = np.empty((2, len(triangles)))
             has_space = bound_profits(
-                self._site_data, wall_index, grid_prices, triangles, centers, scratch, profits
+                self.site_data, wall_index, grid_prices, triangles, centers, scratch, profits
             )
             return profits if has_space else None
 
         # The index of the walls around a center is enlarged until it is large enough.
-        grid_profits = self._geodesics.run_with_index(
-            source_count=1, bin_count=SOURCE_BINS, compute=compute_profits
+        grid_profits = self.geodesics.run_with_index(
+            source_count=1, bin_count=SOURCE_BINS, compute=run_kernel
         )
-        profits = grid_profits * self._unit
-        return centers, profits[CENTER_PROFIT], profits[PROFIT_BOUND]
+        profits = grid_profits * self.unit
+        return _ProfitBounds(
+            centers=centers, center_profits=profits[CENTER_PROFIT], bounds=profits[PROFIT_BOUND]
+        )
 
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost by branch and bound over triangles.
@@ -469,31 +467,31 @@ class _Dual:
         earn much more than one at the best position found so far. All other triangles are halved.
         """
         # n times the slack is the allowed fraction of the cost.
-        slack = tolerance * self.placement_cost / self._robot_count
-        best_table_profit = self._table.compute_profits(prices, self._weights).max()
+        slack = tolerance * self.placement_cost / self.robot_count
+        best_table_profit = self.table.compute_profits(prices, self.weights).max()
         profit_bound = 0.0
         best_profit = 0.0
         triangle_count = 0
-        triangles = self._triangles
+        triangles = self.triangles
         leaves = []
         better_candidates = [np.empty((0, 2))]
         better_profits = [np.empty(0)]
         while len(triangles):
             heartbeat()
-            centers, profits, bounds = self.bound_profits(prices, triangles)
-            best_profit = max(best_profit, float(profits.max()))
+            centers, center_profits, bounds = self.bound_triangle_profits(prices, triangles)
+            best_profit = max(best_profit, float(center_profits.max()))
             triangle_count += len(triangles)
-            is_better = profits > best_table_profit
+            is_better = center_profits > best_table_profit
             better_candidates.append(centers[is_better])
-            better_profits.append(profits[is_better])
+            better_profits.append(center_profits[is_better])
             is_leaf = (bounds <= best_profit + slack) | (triangle_count >= _MAX_TRIANGLES)
             profit_bound = max(profit_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
             triangles = halve_triangles(triangles[~is_leaf])
         # The next proof starts with these triangles.
-        self._triangles = np.concatenate(leaves)
-        rounding_allowance = _ROUNDING * self._geodesics.size * self.total_weight * self._robot_count
-        bound = float(self._weights @ prices) - self._robot_count * profit_bound - rounding_allowance
+        self.triangles = np.concatenate(leaves)
+        rounding_allowance = _ROUNDING * self.geodesics.size * self.total_weight * self.robot_count
+        bound = float(self.weights @ prices) - self.robot_count * profit_bound - rounding_allowance
         # The highest profits come first, because `_thin_out` keeps the first candidate in each square.
         by_profit = np.argsort(-np.concatenate(better_profits), kind="stable")
         return _Proof(
@@ -501,3 +499,66 @@ class _Dual:
             prices=prices,
             better_candidates=self._thin_out(np.concatenate(better_candidates)[by_profit]),
         )
+
+
+def _build_site_data(cost: CoverageCost, site_numbers: IntArray) -> SiteData:
+    """Return the data of the sites with the given numbers; raise ParameterError if none has a weight."""
+    geodesics = cost.geodesics
+    weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
+    weights = weights[site_numbers]
+    if not weights.sum() > 0.0:
+        raise ParameterError(
+            f"lattice: expected sites with a weight above 0 in the components that contain robots, got "
+            f"none with {cost.lattice} cells along a side"
+        )
+    sites, _ = geodesics.snap_to_free_space(cost.points[site_numbers])
+    from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
+    return SiteData(
+        walls=geodesics.walls,
+        sites=sites,
+        weights=weights,
+        from_corners=np.ascontiguousarray(from_corners.T),
+    )
+
+
+def _choose_candidate_stride(site_count: int, robot_count: int) -> int:
+    """Return the spacing of the candidates, in spacings of the sites, that leaves enough of them."""
+    min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robot_count)
+    return max(1, int(math.sqrt(site_count / min_candidates)))
+
+
+def _build_configuration_space(components: NDArray[np.object_], radius: float) -> shapely.Geometry:
+    """Return the area of some components where the center of a robot may be, with coordinates in meters.
+
+    It may be slightly too large, but never too small, so that the bound holds for every placement.
+    """
+    # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which makes
+    # the area larger.
+    area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
+    if area.is_empty:
+        raise ParameterError(
+            f"radius: expected a disc that fits in the free space around the positions, got {radius:g} m"
+        )
+    return area
+
+
+def _triangulate(area: shapely.Geometry) -> Array:
+    """Return triangles that cover an area, (t, 3, 2) m."""
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
+    assert math.isclose(shapely.area(triangles).sum(), area.area, rel_tol=1e-9)
+    rings = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
+    return np.asarray(rings[:, :3])
+
+
+def _compute_first_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
+    """Return maximum and initial prices, (m,) m each, for robots and sites in grid steps."""
+    distances = geodesics.compute_grid_distances(robots, sites) * geodesics.grid.unit
+    missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
+    distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
+    nearest = distances[0]
+    second = distances[1]
+    # An initial price is halfway between the distances of the nearest robot and the next one. If there is
+    # only one robot, it exceeds the distances of all sites.
+    single_robot_prices = nearest + nearest.max()
+    first_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
+    return distances[_MAX_PRICE_RANK - 1], first_prices

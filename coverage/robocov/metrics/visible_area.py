@@ -138,7 +138,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     components = shapely.orient_polygons(shapely.get_parts(free))
     walls = build_walls(shapely.transform(shapely.multipolygons(components), grid.snap))
     # The map's outer hull hides no free space, but it bounds the view.
-    walls.can_hide[:] = True
+    walls.can_hide_free_space[:] = True
     index = AngularWallIndex.allocate(1, _BINS, _INITIAL_ENTRIES_PER_BIN * _BINS)
     for position in grid.snap(positions):
         index, entries = _index_walls(walls, index, position)

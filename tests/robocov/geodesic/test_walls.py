@@ -37,7 +37,7 @@ def list_corners(walls):
 
 
 def count_hiding_walls(walls):
-    return int(walls.can_hide.sum())
+    return int(walls.can_hide_free_space.sum())
 
 
 def test_an_empty_square_has_neither_corners_nor_hiding_walls():

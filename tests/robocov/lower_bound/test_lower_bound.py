@@ -89,14 +89,14 @@ def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvi
         return
     rng = np.random.default_rng(seed)
     cost = CoverageCost(environment, 8)
-    dual = _Dual(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
+    dual = _Dual.build(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
     # With prices for few sites, an error at one of them is not hidden by the slack of the others.
     has_price = rng.random(len(dual.site_numbers)) < rng.choice([0.04, 1.0])
     prices = np.where(has_price, rng.uniform(2.0, 12.0, len(dual.site_numbers)), 0.0)
-    triangles = dual._triangles
+    triangles = dual.triangles
     for _ in range(halvings):
         triangles = halve_triangles(rng.permutation(triangles)[:30])
-    _, profit, bound = dual.bound_profits(prices, triangles)
+    _, profit, bound = dual.bound_triangle_profits(prices, triangles)
     barycentric = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
     barycentric[:, :3] = np.eye(3)
     grid_points = np.einsum("tpk,tkd->tpd", barycentric, triangles).reshape(-1, 2)
@@ -138,7 +138,7 @@ def test_triangles_cover_all_free_positions_near_walls():
     environment = load_map("cave")
     cost = CoverageCost(environment, 16)
     radius = 0.3
-    triangles = _Dual(cost, cost.points[[0]], radius)._triangles
+    triangles = _Dual.build(cost, cost.points[[0]], radius).triangles
     polygons = shapely.polygons(cost.geodesics.grid.to_meters(triangles))
     low_x, low_y, high_x, high_y = environment.free.bounds
     positions = np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2))
