@@ -247,23 +247,25 @@ def _add_jumps(
 
     Edges run from `start` to `end`, relative to the origin of their cell; horizontal ones span no area.
     """
-    for e in range(len(cell)):
-        c = cell[e]
+    for k in range(len(cell)):
+        cell_index = cell[k]
+        origin_x = origins[cell_index, 0]
+        origin_y = origins[cell_index, 1]
         # A falling edge is reversed, and its integrals are subtracted.
-        if start[e, 1] < end[e, 1]:
+        if start[k, 1] < end[k, 1]:
             sign = 1.0
-            edge = _Segment(start[e, 0], start[e, 1], end[e, 0], end[e, 1])
-        elif start[e, 1] > end[e, 1]:
+            edge = _Segment(start[k, 0], start[k, 1], end[k, 0], end[k, 1])
+        elif start[k, 1] > end[k, 1]:
             sign = -1.0
-            edge = _Segment(end[e, 0], end[e, 1], start[e, 0], start[e, 1])
+            edge = _Segment(end[k, 0], end[k, 1], start[k, 0], start[k, 1])
         else:
             continue
-        for f in range(len(jumps)):
+        for jump_index in range(len(jumps)):
             jump = _Segment(
-                jumps[f, _LOW_X] - origins[c, 0],
-                jumps[f, _LOW_Y] - origins[c, 1],
-                jumps[f, _HIGH_X] - origins[c, 0],
-                jumps[f, _HIGH_Y] - origins[c, 1],
+                jumps[jump_index, _LOW_X] - origin_x,
+                jumps[jump_index, _LOW_Y] - origin_y,
+                jumps[jump_index, _HIGH_X] - origin_x,
+                jumps[jump_index, _HIGH_Y] - origin_y,
             )
             # Skip pairs without a common height, and edges that are entirely to the left of the jump.
             bottom = max(edge.low_y, jump.low_y)
@@ -278,12 +280,12 @@ def _add_jumps(
                 right_bottom=_find_x(edge, bottom),
                 right_top=_find_x(edge, top),
             )
-            _add_strip(moments, c, strip, sign * jumps[f, _STEP])
+            _add_strip(moments, cell_index, strip, sign * jumps[jump_index, _STEP])
 
 
 @inlined_kernel
-def _add_strip(moments: Array, c: int, strip: _Strip, weight: float) -> None:
-    """Add the integrals of a weight over a strip to the moments of cell c.
+def _add_strip(moments: Array, cell_index: int, strip: _Strip, weight: float) -> None:
+    """Add the integrals of a weight over a strip to the moments of a cell.
 
     A strip is the area between a jump of the density, on its left, and an edge of the cell, on its right. The
     part where the jump is to the right of the edge is left out. At a height y, the strip extends from `left`
@@ -310,10 +312,10 @@ def _add_strip(moments: Array, c: int, strip: _Strip, weight: float) -> None:
             mass = node_weight * (right - left)
             height = strip.bottom + t * (strip.top - strip.bottom)
             mean_square = (right * right + right * left + left * left) / 3.0
-            moments[c, MASS] += mass
-            moments[c, MOMENT_X] += 0.5 * mass * (right + left)
-            moments[c, MOMENT_Y] += height * mass
-            moments[c, POLAR_MOMENT] += mass * (mean_square + height * height)
+            moments[cell_index, MASS] += mass
+            moments[cell_index, MOMENT_X] += 0.5 * mass * (right + left)
+            moments[cell_index, MOMENT_Y] += height * mass
+            moments[cell_index, POLAR_MOMENT] += mass * (mean_square + height * height)
 
 
 @kernel

@@ -31,6 +31,9 @@ change, but only the last few are still in use."""
 _ONE, _U, _V, _UU, _VV = range(5)
 """Columns of the integrals of φ times 1, u, v, u² and v² over cells."""
 
+_CONSTANT, _SLOPE_X, _SLOPE_Y, _TWIST = range(4)
+"""Rows of the coefficients of a grid; see `_Grid`."""
+
 _GAUSS_NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of the Gauss rule with three points on [0, 1] from the middle one."""
 _MIDDLE_NODE = 1
@@ -145,13 +148,13 @@ class Raster(Density):
         rows, columns = grid.coefficients.shape[1:]
         column = np.clip(np.floor(u), 0, columns - 1).astype(np.intp)
         row = np.clip(np.floor(v), 0, rows - 1).astype(np.intp)
-        # In a square of the grid, the density is a + b ξ + c η + d ξ η, with ξ and η the offsets from its
-        # lower left corner. Outside the grid, the coefficients of the nearest square hold: they make the
+        # In a square of the grid, the density is a polynomial in ξ and η, the offsets from its lower left
+        # corner; see `_Grid`. Outside the grid, the coefficients of the nearest square hold: they make the
         # density constant outwards, so that ξ and η need no limits.
-        a, b, c, d = grid.coefficients[:, row, column]
+        constant, slope_x, slope_y, twist = grid.coefficients[:, row, column]
         xi = u - column
         eta = v - row
-        return np.asarray(a + b * xi + (c + d * xi) * eta)
+        return np.asarray(constant + slope_x * xi + (slope_y + twist * xi) * eta)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         """Compute mass, first moments and polar moment of cells exactly.
@@ -215,14 +218,15 @@ class _Grid(NamedTuple):
     """A density that is bilinear in each square of a grid, and integrals of it.
 
     u and v are coordinates in steps of the grid, from its lower left corner. In the square of column i and
-    row j, the density is ``a + b ξ + c η + d ξ η``, with ξ = u - i and η = v - j from 0 to 1. The outermost
-    squares extend to infinity; their b, c and d are chosen so that the density is constant outwards.
+    row j, the density is ``constant + slope_x ξ + slope_y η + twist ξ η``, with ξ = u - i and η = v - j from
+    0 to 1. The outermost squares extend to infinity; their slopes and twists are chosen so that the density
+    is constant outwards.
 
     Attributes
     ----------
     origin, step : (2,) arrays, m
     coefficients : (4, rows, columns) array
-        a, b, c and d.
+        Constants, slopes in x, slopes in y, and twists; see `_CONSTANT` and the following constants.
     left : (3, 2, rows, columns) array
         Integrals of φ, u φ and u² φ along the part of a row to the left of each square, at η = 0, and
         their increase to η = 1.
@@ -248,8 +252,7 @@ def _build_grid(raster: Raster) -> _Grid:
     """Build the grid of a raster, in whose squares the density is a polynomial.
 
     For the interpolation "cells", the squares are the pixels, and the density is constant in each. For
-    "bilinear", they lie between the centers of four pixels, and the density is a + b ξ + c η + d ξ η, with ξ
-    and η from 0 to 1; d is called the twist.
+    "bilinear", they lie between the centers of four pixels.
     """
     values = raster.values
     origin = np.array(raster.extent[:2])
@@ -276,18 +279,19 @@ def _build_grid(raster: Raster) -> _Grid:
 def _integrate_rows(coefficients: Array) -> Array:
     """Return the integrals of φ, u φ and u² φ along a row from the left side of the grid to each square.
 
-    In a square, φ = a + b ξ + c η + d ξ η, with u = i + ξ in column i. The result, (3, 2, rows, columns),
-    contains the integrals at η = 0, and their increase to η = 1; see `_Grid.left`.
+    In a square, φ is the polynomial of `_Grid`, with u = i + ξ in column i. The result contains the integrals
+    at η = 0, and their increase to η = 1, (3, 2, rows, columns); see `_Grid.left`.
     """
-    a, b, c, d = coefficients
-    i = np.arange(a.shape[1])
-    # φ along a row is constant + slope ξ. The first entry of each is that at η = 0, the second its increase.
-    constant = np.stack([a, c])
-    slope = np.stack([b, d])
+    constant, slope_x, slope_y, twist = coefficients
+    i = np.arange(constant.shape[1])
+    # Along a row, φ is start + slope ξ. The first entry of each is that at η = 0, the second its increase to
+    # η = 1.
+    start = np.stack([constant, slope_y])
+    slope = np.stack([slope_x, twist])
     # Integrals over ξ from 0 to 1 of φ, ξ φ and ξ² φ.
-    zeroth = constant + slope / 2
-    first = constant / 2 + slope / 3
-    second = constant / 3 + slope / 4
+    zeroth = start + slope / 2
+    first = start / 2 + slope / 3
+    second = start / 3 + slope / 4
     squares = np.stack([zeroth, i * zeroth + first, i * i * zeroth + 2 * i * first + second])
     left = np.zeros_like(squares)
     np.cumsum(squares[..., :-1], axis=-1, out=left[..., 1:])
@@ -301,7 +305,7 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
     With P(u, v) the integral of φ at height v from the left side of the image to u, the integral of φ over a
     polygon is that of P dv along its edges. P is a prefix sum over squares and a polynomial within a square.
     Each edge is therefore split where it crosses into another square, and the Gauss rule is exact on each
-    part.
+    section.
     """
     _, rows, columns = grid.coefficients.shape
     sums = np.zeros((cell_count, 5))
@@ -316,60 +320,60 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
         while t < 1.0:
             next_u = _find_crossing(line_u, edge.u, edge.du, columns)
             next_v = _find_crossing(line_v, edge.v, edge.dv, rows)
-            # The part ends where the edge crosses the next grid line, or at its end.
-            stop = max(min(next_u, next_v, 1.0), t)
-            if next_u <= stop:
+            # The section ends where the edge crosses the next grid line, or at its end.
+            section_end = max(min(next_u, next_v, 1.0), t)
+            if next_u <= section_end:
                 line_u += 1 if edge.du > 0.0 else -1
-            if next_v <= stop:
+            if next_v <= section_end:
                 line_v += 1 if edge.dv > 0.0 else -1
-            _add_part(sums, cell[e], grid, edge, t, stop)
-            t = stop
+            _add_section(sums, cell[e], grid, edge, t, section_end)
+            t = section_end
     return sums
 
 
 @inlined_kernel
-def _add_part(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, stop: float) -> None:
-    """Add the contribution of a part of an edge, which lies in one square of the grid, to the sums of cell k.
+def _add_section(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, end: float) -> None:
+    """Add the contribution of a section of an edge, within one square of the grid, to the sums of cell k.
 
-    The part runs from t = start to t = stop, where t goes from 0 to 1 along the edge. By Green's theorem, the
-    integral of φ over a cell is that of P dv along its edges, with P the integral of φ along the row at
+    The section runs from t = start to t = end, where t goes from 0 to 1 along the edge. By Green's theorem,
+    the integral of φ over a cell is that of P dv along its edges, with P the integral of φ along the row at
     height v, from the left side of the image to the edge. P is a sum over the squares to the left, in
-    `grid.left`, plus an integral within the square, where φ = a + b ξ + c η + d ξ η. The same holds for φ
-    times u and u²; v is constant along a row. The Gauss rule with three nodes is exact for these polynomials.
+    `grid.left`, plus an integral within the square. The same holds for φ times u and u²; v is constant along
+    a row. The Gauss rule with three nodes is exact for these polynomials.
     """
     coefficients = grid.coefficients
     left = grid.left
     _, rows, columns = coefficients.shape
-    middle = 0.5 * (start + stop)
+    middle = 0.5 * (start + end)
     i = min(max(int(np.floor(edge.u + middle * edge.du)), 0), columns - 1)
     j = min(max(int(np.floor(edge.v + middle * edge.dv)), 0), rows - 1)
-    a = coefficients[0, j, i]
-    b = coefficients[1, j, i]
-    c = coefficients[2, j, i]
-    d = coefficients[3, j, i]
+    constant = coefficients[_CONSTANT, j, i]
+    slope_x = coefficients[_SLOPE_X, j, i]
+    slope_y = coefficients[_SLOPE_Y, j, i]
+    twist = coefficients[_TWIST, j, i]
     for node in range(3):
-        t = start + (0.5 + _GAUSS_NODE * (node - _MIDDLE_NODE)) * (stop - start)
+        t = start + (0.5 + _GAUSS_NODE * (node - _MIDDLE_NODE)) * (end - start)
         node_weight = _MIDDLE_WEIGHT if node == _MIDDLE_NODE else _OUTER_WEIGHT
-        weight = node_weight * (stop - start) * edge.dv
+        weight = node_weight * (end - start) * edge.dv
         v = edge.v + t * edge.dv
         xi = edge.u + t * edge.du - i
         eta = v - j
-        # Along the row, at the given η, φ is p + q ξ. Its integrals times 1, ξ and ξ² start at the left side
-        # of the square.
-        p = a + c * eta
-        q = b + d * eta
-        zeroth = xi * (p + xi * q / 2.0)
-        first = xi * xi * (p / 2.0 + xi * q / 3.0)
-        second = xi * xi * xi * (p / 3.0 + xi * q / 4.0)
+        # Along the row, at the given η, φ is row_start + row_slope ξ. The integrals of φ times 1, ξ and ξ²
+        # start at the left side of the square.
+        row_start = constant + slope_y * eta
+        row_slope = slope_x + twist * eta
+        zeroth = xi * (row_start + xi * row_slope / 2.0)
+        first = xi * xi * (row_start / 2.0 + xi * row_slope / 3.0)
+        second = xi * xi * xi * (row_start / 3.0 + xi * row_slope / 4.0)
         # The integrals of φ times 1, u and u² start at the left side of the image.
-        row_0 = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
-        row_1 = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
-        row_2 = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
-        sums[k, _ONE] += weight * row_0
-        sums[k, _U] += weight * row_1
-        sums[k, _V] += weight * v * row_0
-        sums[k, _UU] += weight * row_2
-        sums[k, _VV] += weight * v * v * row_0
+        row_one = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
+        row_u = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
+        row_uu = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
+        sums[k, _ONE] += weight * row_one
+        sums[k, _U] += weight * row_u
+        sums[k, _V] += weight * v * row_one
+        sums[k, _UU] += weight * row_uu
+        sums[k, _VV] += weight * v * v * row_one
 
 
 @kernel

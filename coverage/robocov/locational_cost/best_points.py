@@ -243,20 +243,27 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, toleran
         is_unconfined = search.clearance[i] == np.inf or (is_first and clearance <= 0.0)
         if is_unconfined:
             clearance = np.inf
-        slope = sign * (derivatives.x[i] * search.step_x[i] + derivatives.y[i] * search.step_y[i])
+        trial_slope = sign * (derivatives.x[i] * search.step_x[i] + derivatives.y[i] * search.step_y[i])
         # The slope at the start of the step is negative, so that this limit is positive.
-        max_slope = -_MAX_RISE * search.slope[i]
-        if is_first or (clearance >= 0.0 and slope <= max_slope):
+        max_trial_slope = -_MAX_RISE * search.slope[i]
+        is_in_cell = clearance >= 0.0
+        if is_first or (is_in_cell and trial_slope <= max_trial_slope):
             _accept_trial(search, derivatives, i, sign, clearance)
-        elif clearance >= 0.0:
-            # The trial is in the cell, but the cost rises too steeply there. Shorten the step to where the
-            # slope would be zero if it changed linearly, within limits.
-            zero_slope = search.slope[i] / min(search.slope[i] - slope, -_MIN_SLOPE_CHANGE)
-            search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
+        elif is_in_cell:
+            _shorten_to_zero_slope(search, i, trial_slope)
         else:
-            # The trial is outside the cell.
             search.fraction[i] *= _MAX_SHORTENING
         _choose_next_trial(search, i, derivatives.half_perimeter[i], tolerance)
+
+
+@kernel
+def _shorten_to_zero_slope(search: _Search, i: int, trial_slope: float) -> None:
+    """Shorten the step in cell i, because the cost rises too steeply at its trial point.
+
+    The next trial is where the slope would be zero if it changed linearly along the step, within limits.
+    """
+    factor = search.slope[i] / min(search.slope[i] - trial_slope, -_MIN_SLOPE_CHANGE)
+    search.fraction[i] *= min(max(factor, _MIN_SHORTENING), _MAX_SHORTENING)
 
 
 @kernel
