@@ -155,7 +155,7 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
     outline = [(half_width, half_width), (right, half_width), (right, top), (half_width, top)]
     whole_map = [Edge(x, y, setback=half_width, widening_share=_MIN_WIDENING_SHARE / 2.0) for x, y in outline]
     # Cells to divide, and the number of blocks in each.
-    waiting = [(whole_map, int(request.obstacles))]
+    waiting = [(whole_map, int(request.count))]
     cells = []
     while waiting:
         cell, count = waiting.pop()
@@ -174,7 +174,7 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         street = _Street(
             normal=(math.cos(angle), math.sin(angle)),
             width=street_width,
-            widening_share=_compute_widening_share(count, request.obstacles),
+            widening_share=_compute_widening_share(count, request.count),
         )
         first, second = _divide_cell(cell, fraction, street)
         waiting.append((first, first_count))

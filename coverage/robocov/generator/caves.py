@@ -38,8 +38,9 @@ _HALL_DEPTH = 1.5
 _MAX_TOLERANCE_UNITS = 0.008
 _MAX_TOLERANCE_SIDES = 0.0027
 """Tolerance with which walls are simplified."""
-_MIN_CHAMBER_AREA_UNITS2 = 0.03
-_MIN_PILLAR_AREA_UNITS2 = 0.02
+_MIN_CHAMBER_UNIT_AREAS = 0.03
+_MIN_PILLAR_UNIT_AREAS = 0.02
+"""Smallest area of a chamber and of a pillar, in areas of a square whose side is a unit."""
 _SPIKE_UNITS = 0.05
 """Half of the maximum thickness of the spikes of rock that are removed."""
 _MAX_BEND = 0.25
@@ -97,7 +98,7 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         narrow_gaps = [gap for gap in gaps if gap.width < request.gap]
         if not narrow_gaps:
             return _build_obstacles(request, outline, pillars)
-        count = math.ceil(_WINDOWS_PER_CHAMBER * request.obstacles)
+        count = math.ceil(_WINDOWS_PER_CHAMBER * request.count)
         tunnels = [build_window_tunnel(gap, core, radius) for gap in narrow_gaps[:count]]
         core = shapely.union_all([core, *tunnels])
     return None
@@ -127,14 +128,14 @@ class _CaveBuilder:
         Tolerance with which walls are simplified.
     min_radius : float, m
         Smallest dilation of the core: half the gap, plus an allowance for simplification and rounding.
-    start : geometry
+    start_area : geometry
         Area that stays free around the start.
     """
 
     request: Request
     tolerance: float
     min_radius: float
-    start: BaseGeometry
+    start_area: BaseGeometry
 
     def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
         """Build the core of a cave: the area where the center of a robot may be, in one piece.
@@ -142,17 +143,15 @@ class _CaveBuilder:
         It consists of the areas where a random field on a mesh is below 0 (the chambers), of the area around
         the start (the hall), and of tunnels that join them.
         """
-        unit = self.request.unit
         low_area = shapely.simplify(extract_area_below_zero(points, values), self.tolerance)
         low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
-        chambers = [
-            part for part in shapely.get_parts(low_area) if part.area >= _MIN_CHAMBER_AREA_UNITS2 * unit**2
-        ]
+        min_area = _MIN_CHAMBER_UNIT_AREAS * self.request.unit**2
+        chambers = [chamber for chamber in shapely.get_parts(low_area) if chamber.area >= min_area]
         # The free space results later from dilating the core by at least `min_radius`. The start is eroded by
         # that radius now, so that it becomes free as a whole, but not much more.
-        hall = self.start.buffer(-self.min_radius)
+        hall = self.start_area.buffer(-self.min_radius)
         if hall.is_empty:
-            hall = self.start.centroid
+            hall = self.start_area.centroid
         separate_parts = shapely.union_all([*chambers, hall])
         tunnels = build_tunnels(shapely.get_parts(separate_parts), np.random.default_rng(seed))
         return shapely.union_all([separate_parts, *tunnels])
@@ -166,11 +165,10 @@ class _CaveBuilder:
         spike = _SPIKE_UNITS * unit
         inner_rectangle = _build_inner_rectangle(self.request, 0.0)
         # Dilating too far, then eroding by the difference, removes spikes of rock.
-        space = core.buffer(radius + spike).buffer(-spike).intersection(inner_rectangle) | self.start
-        largest = max(shapely.get_parts(space), key=lambda part: float(part.area))
-        pillars = [
-            ring for ring in largest.interiors if Polygon(ring).area >= _MIN_PILLAR_AREA_UNITS2 * unit**2
-        ]
+        space = core.buffer(radius + spike).buffer(-spike).intersection(inner_rectangle) | self.start_area
+        largest = max(shapely.get_parts(space), key=lambda polygon: float(polygon.area))
+        min_area = _MIN_PILLAR_UNIT_AREAS * unit**2
+        pillars = [ring for ring in largest.interiors if Polygon(ring).area >= min_area]
         return shapely.simplify(Polygon(largest.exterior, pillars), self.tolerance)
 
     def compute_excess(self, space: Polygon) -> float:
@@ -190,7 +188,7 @@ def _create_builder(request: Request, corner_disc: DiscStart) -> _CaveBuilder:
         request=request,
         tolerance=tolerance,
         min_radius=request.gap / 2.0 + max_error,
-        start=disc.intersection(_build_inner_rectangle(request, 0.0)),
+        start_area=disc.intersection(_build_inner_rectangle(request, 0.0)),
     )
 
 

@@ -73,8 +73,8 @@ class MapKind:
     layout : callable
         Builds the obstacles; see `Layout`.
     description : str
-    counted : str
-        What `obstacles` counts, in the plural, such as "rooms".
+    obstacle_name : str
+        Name of its obstacles in the plural, such as "rooms".
     obstacles : int
         Default number of obstacles.
     area : float
@@ -85,7 +85,7 @@ class MapKind:
 
     layout: Layout
     description: str
-    counted: str
+    obstacle_name: str
     obstacles: int
     area: float
     is_approximate: bool = False
@@ -95,28 +95,28 @@ GENERATORS: dict[str, MapKind] = {
     "polygons": MapKind(
         layout=scatter_polygons,
         description="scattered obstacles: convex polygons, L and U shapes",
-        counted="obstacles",
+        obstacle_name="obstacles",
         obstacles=6,
         area=0.2,
     ),
     "blocks": MapKind(
         layout=build_town,
         description="a town: blocks between streets",
-        counted="blocks",
+        obstacle_name="blocks",
         obstacles=12,
         area=0.4,
     ),
     "rooms": MapKind(
         layout=build_building,
         description="a building: rooms with doors, and some furniture",
-        counted="rooms",
+        obstacle_name="rooms",
         obstacles=6,
         area=0.12,
     ),
     "mazes": MapKind(
         layout=build_maze,
         description="a maze: corridors, some dead ends, some loops",
-        counted="cells",
+        obstacle_name="cells",
         obstacles=36,
         area=0.12,
         is_approximate=True,
@@ -124,7 +124,7 @@ GENERATORS: dict[str, MapKind] = {
     "caves": MapKind(
         layout=build_cave,
         description="a cave: chambers and tunnels with smooth walls, and pillars",
-        counted="chambers",
+        obstacle_name="chambers",
         obstacles=12,
         area=0.4,
         is_approximate=True,
@@ -195,7 +195,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     map_kind = GENERATORS[kind]
     side = require_number("side", side, MIN_SIDE_M, MAX_SIDE_M)
     request = Request(
-        obstacles=map_kind.obstacles if obstacles is None else obstacles,
+        count=map_kind.obstacles if obstacles is None else obstacles,
         area=map_kind.area if area is None else area,
         gap=gap,
         width=side if width is None else width,
@@ -211,9 +211,9 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         if environment is not None:
             return environment
     raise ParameterError(
-        f"area: no layout of {request.obstacles} {map_kind.counted} was found that blocks {request.area:g} "
+        f"area: no layout of {request.count} {map_kind.obstacle_name} was found that blocks {request.area:g} "
         f"of {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m. "
-        f"Try another area, a narrower gap or another number of {map_kind.counted}"
+        f"Try another area, a narrower gap or another number of {map_kind.obstacle_name}"
     )
 
 
@@ -235,21 +235,21 @@ def _build_environment(
     """Return the map with its starts; None if it is not valid, or does not fulfill the request."""
     width = float(request.width)
     height = float(request.height)
-    about = "about " if GENERATORS[kind].is_approximate else ""
+    qualifier = "about " if GENERATORS[kind].is_approximate else ""
     # Obstacles that overlap, or a start without room, make the map invalid: then another layout is tried.
     environment = Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         obstacles=tuple(obstacles),
         description=(
-            f"Generated with seed {seed}: {about}{request.obstacles} {GENERATORS[kind].counted}, "
+            f"Generated with seed {seed}: {qualifier}{request.count} {GENERATORS[kind].obstacle_name}, "
             f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
         ),
         extra={
             "generator": {
                 "kind": kind,
                 "seed": seed,
-                "obstacles": int(request.obstacles),
+                "obstacles": int(request.count),
                 "area": float(request.area),
                 "gap_m": float(request.gap),
                 "width_m": width,

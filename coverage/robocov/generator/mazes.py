@@ -13,7 +13,7 @@ import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -92,18 +92,15 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 
 def _choose_grid_shape(request: Request) -> GridShape:
-    """Return numbers of columns and rows for about as many nearly square cells as requested.
-
-    The number of cells of a maze is requested as `Request.obstacles`.
-    """
+    """Return numbers of columns and rows for about as many nearly square cells as requested."""
 
     def compute_mismatch(shape: GridShape) -> float:
         """Return how far a grid is from the requested number of cells, and its cells from squares."""
         columns, rows = shape
         elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
-        return abs(math.log(columns * rows / request.obstacles)) + _ELONGATION_WEIGHT * elongation
+        return abs(math.log(columns * rows / request.count)) + _ELONGATION_WEIGHT * elongation
 
-    count = int(request.obstacles)
+    count = int(request.count)
     shapes = []
     for columns in range(1, count + 1):
         # Shapes with more than twice the requested number of cells are not considered.
@@ -177,24 +174,53 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
 def _clear_disc(
     request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner_disc: DiscStart
 ) -> bool:
-    """Remove the walls that a disc touches; return whether there were any.
-
-    Each row of `indices` is a wall: the column and row of the post where it starts, and 1 if it is
-    horizontal, which leads to the right, or 0 if it is vertical, which leads upwards.
-    """
+    """Remove the walls that a disc touches; return whether there were any."""
     x = _compute_lines(request, request.width, shape[0], thickness)
     y = _compute_lines(request, request.height, shape[1], thickness)
-    indices = np.argwhere(walls)
-    columns, rows, is_horizontal = indices.T
-    starts = np.column_stack([np.take(x, columns), np.take(y, rows)])
-    ends = np.column_stack([np.take(x, columns + is_horizontal), np.take(y, rows + 1 - is_horizontal)])
-    half_widths = thickness / 2.0 * np.column_stack([1 - is_horizontal, is_horizontal])
-    low = starts - half_widths
-    high = ends + half_widths
-    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    segments = _list_segments(walls)
+    starts = np.column_stack([np.take(x, segments.columns), np.take(y, segments.rows)])
+    ends = np.column_stack([np.take(x, segments.end_columns), np.take(y, segments.end_rows)])
+    half_widths = thickness / 2.0 * np.column_stack([~segments.is_horizontal, segments.is_horizontal])
+    lower_left = starts - half_widths
+    upper_right = ends + half_widths
+    boxes = shapely.box(*lower_left.T, *upper_right.T)
     is_touched = shapely.intersects(boxes, shapely.Point(corner_disc.center).buffer(corner_disc.radius))
-    walls[tuple(indices[is_touched].T)] = False
+    for k in np.flatnonzero(is_touched).tolist():
+        segments.remove(walls, k)
     return bool(is_touched.any())
+
+
+class _Segments(NamedTuple):
+    """The walls of a maze, each from a post to the next one to the right or above."""
+
+    columns: IntArray
+    """(w,) Column of the post where each wall starts."""
+    rows: IntArray
+    """(w,) Row of that post."""
+    end_columns: IntArray
+    """(w,) Column of the post where each wall ends."""
+    end_rows: IntArray
+    """(w,) Row of that post."""
+    is_horizontal: BoolArray
+    """(w,) Whether each wall leads to the right. The others lead upwards."""
+
+    def remove(self, walls: BoolArray, k: int) -> None:
+        """Remove wall k of the list from an array of walls, which is changed in place."""
+        direction = _HORIZONTAL if self.is_horizontal[k] else _VERTICAL
+        walls[self.columns[k], self.rows[k], direction] = False
+
+
+def _list_segments(walls: BoolArray) -> _Segments:
+    """List the walls of a maze."""
+    columns, rows, directions = np.argwhere(walls).T
+    is_horizontal = directions == _HORIZONTAL
+    return _Segments(
+        columns=columns,
+        rows=rows,
+        end_columns=columns + is_horizontal,
+        end_rows=rows + ~is_horizontal,
+        is_horizontal=is_horizontal,
+    )
 
 
 def find_inner_walls(shape: GridShape) -> BoolArray:
@@ -260,13 +286,11 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
     """Remove a random wall, preferably one that is attached to other walls at both ends: that makes a loop.
 
-    With the probability `_DEAD_END_PROBABILITY`, it is one at a dead end, if there is any. A wall starts at a
-    post, the crossing of two lines of the grid, and leads to the post on the right if it is horizontal (1),
-    or above if it is vertical (0).
+    With the probability `_DEAD_END_PROBABILITY`, it is one at a dead end, if there is any.
     """
-    columns, rows, is_horizontal = np.argwhere(walls).T
-    starts = (columns, rows)
-    ends = (columns + is_horizontal, rows + 1 - is_horizontal)
+    segments = _list_segments(walls)
+    starts = (segments.columns, segments.rows)
+    ends = (segments.end_columns, segments.end_rows)
     wall_counts = np.zeros(walls.shape[:2], dtype=int)
     np.add.at(wall_counts, starts, 1)
     np.add.at(wall_counts, ends, 1)
@@ -279,16 +303,15 @@ def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
         is_candidate[:] = True
     if rng.random() < _DEAD_END_PROBABILITY:
         opening_counts = _count_openings(walls)
-        # A wall starts at the lower left post of one cell. The other cell is to the left of a vertical wall,
-        # or below a horizontal one.
-        is_vertical = 1 - is_horizontal
-        other_cells = (columns - is_vertical, rows - is_horizontal)
-        is_dead_end = (opening_counts[starts] == 1) | (opening_counts[other_cells] == 1)
+        # A wall starts at the lower left post of one cell. The opposite cell is to the left of a vertical
+        # wall, or below a horizontal one.
+        opposite_cells = (segments.columns - ~segments.is_horizontal, segments.rows - segments.is_horizontal)
+        is_dead_end = (opening_counts[starts] == 1) | (opening_counts[opposite_cells] == 1)
         if (is_candidate & is_dead_end).any():
             is_candidate &= is_dead_end
     candidates = np.flatnonzero(is_candidate)
     chosen = candidates[int(rng.integers(len(candidates)))]
-    walls[columns[chosen], rows[chosen], is_horizontal[chosen]] = False
+    segments.remove(walls, chosen)
 
 
 def _count_openings(walls: BoolArray) -> IntArray:
@@ -317,9 +340,10 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
         The posts at the ends and bends of a polyline.
     """
     neighbors: defaultdict[Post, set[Post]] = defaultdict(set)
-    for column, row, is_horizontal in np.argwhere(walls).tolist():
-        start = (column, row)
-        end = (column + is_horizontal, row + 1 - is_horizontal)
+    segments = _list_segments(walls)
+    starts = zip(segments.columns.tolist(), segments.rows.tolist(), strict=True)
+    ends = zip(segments.end_columns.tolist(), segments.end_rows.tolist(), strict=True)
+    for start, end in zip(starts, ends, strict=True):
         neighbors[start].add(end)
         neighbors[end].add(start)
     steps = sorted((post, neighbor) for post in neighbors for neighbor in neighbors[post])
@@ -349,11 +373,11 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
 
 def _find_next_post(neighbors: Mapping[Post, set[Post]], previous: Post, post: Post) -> Post | None:
     """Return the post to which a polyline continues from a post; None if it ends there."""
-    others = neighbors[post] - {previous}
+    candidates = neighbors[post] - {previous}
     straight = _step_straight(previous, post)
-    if straight in others:
+    if straight in candidates:
         return straight
-    return others.pop() if len(others) == 1 else None
+    return candidates.pop() if len(candidates) == 1 else None
 
 
 def _step_straight(previous: Post, post: Post) -> Post:

@@ -62,7 +62,7 @@ def scatter_polygons(
     list of Obstacle or None
         None if the obstacles do not fit.
     """
-    areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.obstacles)
+    areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.count)
     areas = np.sort(areas)[::-1]  # The largest is placed first.
     areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
@@ -70,7 +70,7 @@ def scatter_polygons(
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
     shapely.prepare(start_disc)
     names = list(SHAPE_PROBABILITIES)
-    shapes = rng.choice(names, size=request.obstacles, p=list(SHAPE_PROBABILITIES.values()))
+    shapes = rng.choice(names, size=request.count, p=list(SHAPE_PROBABILITIES.values()))
     # The last one is placed next.
     waiting = list(zip(shapes.tolist(), areas.tolist(), strict=True))[::-1]
     placed: list[tuple[str, float]] = []

@@ -35,7 +35,8 @@ class Request:
 
     Attributes
     ----------
-    obstacles : int
+    count : int
+        Number of obstacles, blocks, rooms, cells or chambers, depending on the kind of map.
     area : float
         Blocked fraction of the map's area.
     gap, width, height : float, m
@@ -46,14 +47,14 @@ class Request:
         If a parameter is out of range.
     """
 
-    obstacles: int
+    count: int
     area: float
     gap: float
     width: float
     height: float
 
     def __post_init__(self) -> None:
-        require_number("obstacles", self.obstacles, 1, MAX_OBSTACLES, whole=True)
+        require_number("obstacles", self.count, 1, MAX_OBSTACLES, whole=True)
         require_number("area", self.area, _MIN_AREA, _MAX_AREA)
         require_number("width", self.width, MIN_SIDE_M, MAX_SIDE_M)
         require_number("height", self.height, MIN_SIDE_M, MAX_SIDE_M)
@@ -71,8 +72,8 @@ class Request:
 
     @property
     def unit(self) -> float:
-        """Side of a square whose area is that of the map per obstacle, m."""
-        return math.sqrt(self.width * self.height / self.obstacles)
+        """Side of a square that would contain each obstacle if the map were divided evenly, m."""
+        return math.sqrt(self.width * self.height / self.count)
 
     @property
     def digits(self) -> int:

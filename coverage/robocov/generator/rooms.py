@@ -289,8 +289,8 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
     """
     plan = FloorPlan(thickness)
     # Rectangles to divide, and the number of rooms in each.
-    waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.obstacles))]
-    if request.obstacles >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
+    waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.count))]
+    if request.count >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
         box, count = waiting[0]
         waiting = _divide_by_corridor(request, plan, box, count, rng)
     while waiting:
@@ -562,38 +562,38 @@ def _place_piece(
     request: Request,
     piece: _Piece,
     room: Box,
-    others: list[Polygon],
+    occupied: list[Polygon],
     start_disc: Polygon,
     rng: np.random.Generator,
 ) -> CircleObstacle | PolygonObstacle | None:
     """Return a piece of furniture at the first free one of several random positions in a room.
 
-    `low`, `middle` and `high` are the lower left corners, centers and upper right corners of the piece at all
-    these positions, (k, 2) m each. A position is free if the piece does not touch the start disc, and keeps
-    the gap from the other pieces and from doors. None if no position is free.
+    A position is free if the piece does not touch the start disc, and keeps the gap from the other pieces and
+    from doors, whose polygons are `occupied`. None if no position is free.
     """
-    low = _sample_piece_corners(request, piece, room, rng)
-    if low is None:
+    # Lower left corners, upper right corners and centers of the piece at all positions, (k, 2) m each.
+    lower_left = _sample_piece_corners(request, piece, room, rng)
+    if lower_left is None:
         return None
-    high = request.round_points(low + piece.size)
-    middle = request.round_points(low + piece.size / 2.0)
+    upper_right = request.round_points(lower_left + piece.size)
+    centers = request.round_points(lower_left + piece.size / 2.0)
     # Distances to a circle are measured from its center, and must be larger by its radius.
     if piece.is_round:
-        shapes = shapely.points(middle)
+        shapes = shapely.points(centers)
         # Rounding moves the center by up to half a step.
         radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0)
     else:
-        shapes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+        shapes = shapely.box(*lower_left.T, *upper_right.T)
         radius = 0.0
     is_free = shapely.distance(shapes, start_disc) > radius
-    if others:
-        is_free &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius
+    if occupied:
+        is_free &= shapely.distance(shapes, shapely.MultiPolygon(occupied)) >= request.gap + radius
     if not is_free.any():
         return None
     chosen = int(is_free.argmax())
     if piece.is_round:
-        x, y = middle[chosen].tolist()
+        x, y = centers[chosen].tolist()
         return CircleObstacle((x, y), radius, piece.kind)
-    left, bottom = low[chosen].tolist()
-    right, top = high[chosen].tolist()
+    left, bottom = lower_left[chosen].tolist()
+    right, top = upper_right[chosen].tolist()
     return PolygonObstacle(((left, bottom), (right, bottom), (right, top), (left, top)), name=piece.kind)

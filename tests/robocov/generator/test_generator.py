@@ -291,8 +291,9 @@ def test_parameters_out_of_range_are_named(parameters, message):
 def test_impossible_requests_are_rejected(parameters):
     with pytest.raises(ParameterError) as caught:
         generate_map(0, **parameters)
+    obstacle_name = GENERATORS[parameters["kind"]].obstacle_name
     assert str(caught.value).startswith(
-        f"area: no layout of {parameters['obstacles']} {GENERATORS[parameters['kind']].counted} was found "
+        f"area: no layout of {parameters['obstacles']} {obstacle_name} was found "
         f"that blocks {parameters['area']:g} of "
     )
 
@@ -328,7 +329,7 @@ def test_layouts_of_registered_kinds_are_checked(layout, area, is_valid, monkeyp
         numbers.append(rng.random())
         return layout
 
-    custom_kind = replace(GENERATORS["polygons"], layout=build_layout, counted="blocks")
+    custom_kind = replace(GENERATORS["polygons"], layout=build_layout, obstacle_name="blocks")
     monkeypatch.setitem(generator.GENERATORS, "custom", custom_kind)
     if is_valid:
         environment = generate_map(0, kind="custom", area=area)
