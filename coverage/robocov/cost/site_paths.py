@@ -397,7 +397,7 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
             walls.corners[corner, 0],
             walls.corners[corner, 1],
         )
-        waiting_count = _try_straight_path(walls, search, corner, nearest, waiting_count)
+        waiting_count = _try_straight_path_to_corner(walls, search, corner, nearest, waiting_count)
     return waiting_count
 
 
@@ -424,7 +424,7 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
                 boxes, leaf, robots, max_length * max_length, search.all_robots, len(robots), leaf_robots
             )
         for k in range(candidate_count):
-            waiting_count = _try_straight_path(walls, search, corner, leaf_robots[k], waiting_count)
+            waiting_count = _try_straight_path_to_corner(walls, search, corner, leaf_robots[k], waiting_count)
     return waiting_count
 
 
@@ -446,7 +446,9 @@ def _find_nearest_candidate(
 
 
 @kernel
-def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting_count: int) -> int:
+def _try_straight_path_to_corner(
+    walls: Walls, search: Search, corner: int, robot: int, waiting_count: int
+) -> int:
     """Use the straight path from a robot to a corner if it is the shortest so far.
 
     The robot must see the corner, and a shortest path from the robot must be able to bend there. The corner
@@ -530,7 +532,7 @@ def _try_other_robots(
                 search.tile_robots,
             )
             for k in range(tile_robot_count):
-                _try_straight_paths(cost_map, search, tile, search.tile_robots[k])
+                _try_straight_paths_to_sites(cost_map, search, tile, search.tile_robots[k])
 
 
 @kernel
@@ -590,7 +592,7 @@ def _compute_max_hidden_length(search: Search, tile: int) -> float:
 
 
 @kernel
-def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
+def _try_straight_paths_to_sites(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
     """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest so far.
 
     Hidden sites are those that their nearest robot does not see. This robot may see them. The set of hidden

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -15,6 +16,24 @@ from robocov.cost.site_paths import NO_ROBOT
 
 _MAX_CACHED_MAPS = 64
 """Maximum number of maps whose costs are cached. The maps recur if obstacles move periodically."""
+
+
+class CostSummary(NamedTuple):
+    """The main results of a coverage cost.
+
+    Attributes
+    ----------
+    mean_distance : float, m
+        nan if no robot is available.
+    value : float, m³
+        The coverage cost, see `CoverageResult`; nan if no robot is available.
+    uncovered_area : float, m²
+        The entire free area if no robot is available.
+    """
+
+    mean_distance: float
+    value: float
+    uncovered_area: float
 
 
 class TimeVaryingCost:
@@ -42,7 +61,7 @@ class TimeVaryingCost:
     >>> square = rc.Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
     >>> cost = rc.TimeVaryingCost(rc.CoverageCost(square, 16))
     >>> positions = np.array([[0.5, 0.5], [0.25, 0.25]])
-    >>> result = cost(2.0, positions, working=np.array([True, False]))
+    >>> result = cost(2.0, positions, is_working=np.array([True, False]))
     >>> len(result.positions)
     1
     """
@@ -77,7 +96,7 @@ class TimeVaryingCost:
         return self._cost_by_map[key]
 
     def find_available_robots(
-        self, time: float, positions: Array, working: BoolArray | None = None
+        self, time: float, positions: Array, is_working: BoolArray | None = None
     ) -> BoolArray:
         """Find the available robots, which work and are not covered by a moving obstacle.
 
@@ -85,21 +104,21 @@ class TimeVaryingCost:
         ----------
         time : float, s
         positions : (n, 2) array, m
-        working : (n,) bool array, optional
+        is_working : (n,) bool array, optional
             False for robots that have failed. By default, no robot has.
 
         Returns
         -------
         (n,) bool array
         """
-        is_available = np.ones(len(positions), dtype=bool) if working is None else working.copy()
+        is_available = np.ones(len(positions), dtype=bool) if is_working is None else is_working.copy()
         if self._cost.environment.has_moving_obstacles:
             free = self.get_cost(time).environment.free
             is_available &= shapely.contains_properly(free, shapely.points(positions))
         return is_available
 
     def __call__(
-        self, time: float, positions: Array, working: BoolArray | None = None, speeds: Array | None = None
+        self, time: float, positions: Array, is_working: BoolArray | None = None, speeds: Array | None = None
     ) -> CoverageResult | None:
         """Compute the coverage cost at a given time.
 
@@ -107,7 +126,7 @@ class TimeVaryingCost:
         ----------
         time : float, s
         positions : (n, 2) array, m
-        working : (n,) bool array, optional
+        is_working : (n,) bool array, optional
             False for robots that have failed. By default, no robot has.
         speeds : (n,) array, m/s, optional
             See `CoverageCost`.
@@ -117,14 +136,14 @@ class TimeVaryingCost:
         CoverageResult or None
             The result for the available robots; None if there are none.
         """
-        is_available = self.find_available_robots(time, positions, working)
+        is_available = self.find_available_robots(time, positions, is_working)
         if not is_available.any():
             return None
         available_speeds = None if speeds is None else speeds[is_available]
         return self.get_cost(time)(positions[is_available], available_speeds)
 
     def evaluate_all_robots(
-        self, time: float, positions: Array, working: BoolArray | None = None
+        self, time: float, positions: Array, is_working: BoolArray | None = None
     ) -> CoverageResult | None:
         """Compute the coverage cost at a given time, with all robots in the result.
 
@@ -132,7 +151,7 @@ class TimeVaryingCost:
         ----------
         time : float, s
         positions : (n, 2) array, m
-        working : (n,) bool array, optional
+        is_working : (n,) bool array, optional
             False for robots that have failed. By default, no robot has.
 
         Returns
@@ -140,35 +159,30 @@ class TimeVaryingCost:
         CoverageResult or None
             Robots that are not available own no sites. None if no robot is available.
         """
-        result = self(time, positions, working)
+        result = self(time, positions, is_working)
         if result is None or len(result.positions) == len(positions):
             return result
-        available = np.flatnonzero(self.find_available_robots(time, positions, working))
+        available = np.flatnonzero(self.find_available_robots(time, positions, is_working))
         owner = np.where(result.owner != NO_ROBOT, available[result.owner], NO_ROBOT)
         return replace(result, positions=np.array(positions), owner=owner)
 
     def compute_summary(
-        self, time: float, positions: Array, working: BoolArray | None = None
-    ) -> tuple[float, float, float]:
+        self, time: float, positions: Array, is_working: BoolArray | None = None
+    ) -> CostSummary:
         """Compute mean distance, coverage cost (22) and uncovered area at a given time.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
-        working : (n,) bool array, optional
+        is_working : (n,) bool array, optional
             False for robots that have failed. By default, no robot has.
 
         Returns
         -------
-        mean_distance : float, m
-            nan if no robot is available.
-        value : float, m³
-            The coverage cost, see `CoverageResult`; nan if no robot is available.
-        uncovered_area : float, m²
-            The entire free area if no robot is available.
+        CostSummary
         """
-        result = self(time, positions, working)
+        result = self(time, positions, is_working)
         if result is None:
-            return np.nan, np.nan, self.get_cost(time).environment.free_area
-        return result.mean_distance, result.value, result.uncovered_area
+            return CostSummary(np.nan, np.nan, self.get_cost(time).environment.free_area)
+        return CostSummary(result.mean_distance, result.value, result.uncovered_area)

@@ -109,7 +109,9 @@ def compute_cost_history(
         positions = record.positions[moment]
         working = None if record.conditions is None else record.working[moment]
         summary = cost_at_time.compute_summary(time, positions, working)
-        mean_distance[sample], cost_values[sample], uncovered_area[sample] = summary
+        mean_distance[sample] = summary.mean_distance
+        cost_values[sample] = summary.value
+        uncovered_area[sample] = summary.uncovered_area
         if has_mixed_speeds:
             result = cost_at_time(time, positions, working, record.team.max_speed)
             if result is not None:

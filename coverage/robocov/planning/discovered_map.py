@@ -207,7 +207,7 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
 
 @kernel
 def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
-    """Count the cells that were walls before and are now free, with only free cells around them.
+    """Count the cells that were walls before and are now free, like their eight neighbors.
 
     Cells at the border of a wall do not count: they may be free or wall, depending on the point of view.
     """
@@ -215,13 +215,19 @@ def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> 
     rows, columns = before.shape
     for row in range(1, rows - 1):
         for column in range(1, columns - 1):
-            if before[row, column] >= WALL and after[row, column] == FREE:
-                is_open_around = True
-                for i in range(row - 1, row + 2):
-                    for j in range(column - 1, column + 2):
-                        is_open_around = is_open_around and after[i, j] == FREE
-                count += is_open_around
+            if before[row, column] >= WALL and _is_open(after, row, column):
+                count += 1
     return count
+
+
+@kernel
+def _is_open(state: NDArray[np.uint8], row: int, column: int) -> bool:
+    """Return whether a cell and its eight neighbors are free."""
+    for i in range(row - 1, row + 2):
+        for j in range(column - 1, column + 2):
+            if state[i, j] != FREE:
+                return False
+    return True
 
 
 @kernel

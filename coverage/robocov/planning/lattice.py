@@ -20,6 +20,8 @@ _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half of the moves; the others are their opposites."""
 _MAX_MOVE = 2
 """Maximum number of rows or columns in one move."""
+_MOVES_PER_AXIS = 2 * _MAX_MOVE + 1
+"""Number of different changes of the row, or of the column, in one move."""
 _UNKNOWN_DETOUR = 0.4
 """Assumed excess length of routes through unknown cells, as a fraction: walls may turn up there."""
 _SIGHT_STEP_CELLS = 0.5
@@ -140,19 +142,21 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
 @kernel
 def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
-    """Compute the lengths of all moves from all nodes, (node, 5, 5) in meters; infinite without an edge.
+    """Compute the lengths of all moves from all nodes, m; infinite without an edge.
 
-    A move leads from a node to a neighbor up to `_MAX_MOVE` rows and columns away. The entry [node, _MAX_MOVE
-    + up, _MAX_MOVE + right] belongs to the move by that many rows and columns. There is an edge if no cell on
-    the line between both nodes is tight, that is, too close to a wall. A move through unknown cells counts as
-    longer. `moves` contains only half of the moves; the others are their opposites.
+    A move leads from a node to a neighbor up to `_MAX_MOVE` rows and columns away. The result has the shape
+    (m, _MOVES_PER_AXIS, _MOVES_PER_AXIS). Its entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the
+    move by that many rows and columns. There is an edge if no cell on the line between both nodes is tight,
+    that is, too close to a wall. A move through unknown cells counts as longer. `moves` contains only half of
+    the moves; the others are their opposites.
     """
-    lengths = np.full((rows * columns, 2 * _MAX_MOVE + 1, 2 * _MAX_MOVE + 1), np.inf)
+    lengths = np.full((rows * columns, _MOVES_PER_AXIS, _MOVES_PER_AXIS), np.inf)
     for move in range(len(moves.lengths)):
         up = moves.rows[move]
         right = moves.columns[move]
-        first = moves.first_crossed[move]
-        stop = moves.first_crossed[move + 1]
+        first_crossed = moves.first_crossed[move]
+        end_crossed = moves.first_crossed[move + 1]
+        crossed_count = end_crossed - first_crossed
         for row in range(rows - up):
             for column in range(max(0, -right), columns - max(0, right)):
                 node_row = stride // 2 + row * stride
@@ -160,23 +164,23 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 is_passable = True
                 is_without_wall = True
                 unknown_count = 0
-                for k in range(first, stop):
+                for k in range(first_crossed, end_crossed):
                     i = node_row + moves.crossed_rows[k]
                     j = node_column + moves.crossed_columns[k]
                     is_passable = is_passable and not cells.is_tight[i, j]
                     is_without_wall = is_without_wall and not cells.is_blocked[i, j]
                     unknown_count += cells.is_unknown[i, j]
                 node = row * columns + column
-                other = (row + up) * columns + column + right
-                length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_count)
+                neighbor = (row + up) * columns + column + right
+                length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / crossed_count * unknown_count)
                 # A node without clearance lies in a tight cell. It can be reached from one with clearance,
                 # but not the other way around.
                 has_clearance = cells.has_clearance[node]
-                other_has_clearance = cells.has_clearance[other]
-                if is_passable or (is_without_wall and has_clearance and not other_has_clearance):
+                neighbor_has_clearance = cells.has_clearance[neighbor]
+                if is_passable or (is_without_wall and has_clearance and not neighbor_has_clearance):
                     lengths[node, _MAX_MOVE + up, _MAX_MOVE + right] = length
-                if is_passable or (is_without_wall and other_has_clearance and not has_clearance):
-                    lengths[other, _MAX_MOVE - up, _MAX_MOVE - right] = length
+                if is_passable or (is_without_wall and neighbor_has_clearance and not has_clearance):
+                    lengths[neighbor, _MAX_MOVE - up, _MAX_MOVE - right] = length
     return lengths
 
 
@@ -184,8 +188,8 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
 def _compress_edges(lengths: Array, columns: int) -> Edges:
     """Collect the edges of all nodes in compressed sparse rows.
 
-    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths`, (node, 5, 5), is the length in meters of
-    the move by that many rows and columns; moves of infinite length are no edges.
+    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths` is the length in meters of the move by
+    that many rows and columns; see `_compute_move_lengths`. Moves of infinite length are no edges.
     """
     count = 0
     edge_lengths = np.empty(lengths.size)

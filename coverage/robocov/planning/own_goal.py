@@ -13,15 +13,13 @@ from robocov.planning.grid_planner import NO_NODE, GridPlanner
 from robocov.planning.map_window import SIDES
 from robocov.planning.team_placement import UNREACHABLE_M
 
-_MAX_STEPS = 6
-"""Maximum number of steps of a search, each to a neighboring node."""
+_MAX_MOVES = 6
+"""Maximum number of moves of a search, each to a neighboring node."""
 _LIMIT_PER_CELL_RADIUS = 1.5
 """Limit of the distances of a search, divided by the radius of the robot's cell."""
-_LIMIT_MARGIN_STEPS = 4.0
+_LIMIT_MARGIN_SPACINGS = 4.0
 """Number of spacings of nodes that are added to this limit."""
-
-
-_MAX_SHIFT_STEPS = 0.5
+_MAX_SHIFT_SPACINGS = 0.5
 """Maximum distance of a goal from the nearest node, in x and in y, in spacings of nodes."""
 
 
@@ -68,13 +66,13 @@ def find_own_goal(
 
     Notes
     -----
-    The search moves to a neighboring node as long as one is better, for a few steps at most. The goal is the
+    The search moves to a neighboring node as long as one is better, a few times at most. The goal is the
     minimum of two parabolas, in x and in y, through the costs of the last node and its neighbors.
     """
     search = _NodeSearch(planner, weights, other_positions, first_node)
     node = first_node
     neighbors = search.evaluate_neighbors(node)
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_MOVES):
         candidates = [neighbor for neighbor in neighbors if neighbor != NO_NODE]
         best = min(candidates, key=search.costs.__getitem__, default=node)
         if not search.costs[best] < search.costs[node]:
@@ -103,8 +101,8 @@ class _NodeSearch:
         self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
         own_distances = distances[self.targets]
         cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
-        # Nodes beyond the limit cannot become part of the robot's cell within the few steps of the search.
-        self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_STEPS * planner.spacing
+        # Nodes beyond the limit cannot become part of the robot's cell within the few moves of the search.
+        self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_SPACINGS * planner.spacing
         self._node_count = len(weights)
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
@@ -165,7 +163,7 @@ def _refine_goal(
         slope = 0.5 * (costs[ahead] - costs[behind])
         curvature = costs[ahead] + costs[behind] - 2.0 * costs[node]
         if curvature > 0.0:
-            shift = min(max(-slope / curvature, -_MAX_SHIFT_STEPS), _MAX_SHIFT_STEPS)
+            shift = min(max(-slope / curvature, -_MAX_SHIFT_SPACINGS), _MAX_SHIFT_SPACINGS)
             goal[axis] += shift * planner.spacing
             previous_cost = slope * offset + 0.5 * curvature * offset * offset
             min_cost = slope * shift + 0.5 * curvature * shift * shift

@@ -111,18 +111,18 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
         return team.previous_goals
     distances = planner.source_distances[is_usable]
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
-    # All other robots together are one more source, the last one, which is fixed.
-    # Row q of the table contains the weighted distances of a target q from all sources.
+    # The robots outside the plan together are one more source, the last one, which is fixed. Row q contains
+    # the weighted distances of a target q from all sources.
     target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
-    table = np.ascontiguousarray((target_distances * weights[is_target]).T)
+    weighted_distances = np.ascontiguousarray((target_distances * weights[is_target]).T)
 
     chosen = _choose_previous_sources(planner.nodes[sources], team)
-    chosen = _improve_sources(table, chosen, team, min_savings.relocation)
+    chosen = _improve_sources(weighted_distances, chosen, team, min_savings.relocation)
     if team.is_fixed[1:].all():
         # Distances from each source to the goal of each robot, and to the nearest robot outside the plan.
         from_team = np.column_stack([distances[:, sources[chosen]], other_distances[sources]])
         is_in_own_cell = from_team.argmin(axis=1) == 0
-        chosen = _move_first_source(table, chosen, is_in_own_cell, min_savings.own_cell)
+        chosen = _move_first_source(weighted_distances, chosen, is_in_own_cell, min_savings.own_cell)
     return _assign_goals(
         planner.nodes[sources], distances[:, sources[chosen]], chosen, team, min_savings.swap
     )
@@ -143,19 +143,21 @@ def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> In
     return chosen
 
 
-def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
+def _improve_sources(
+    weighted_distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
+) -> IntArray:
     """Return goals for the robots of the plan, as sources, (k,), with a lower cost than the chosen ones.
 
-    Sources are the possible goals. Row q of `table` contains the weighted distances of a target q to all of
-    them. Its last column does not belong to a source, but to the nearest robot outside the plan. That column
-    is always chosen, like the goals of fixed robots.
+    Sources are the possible goals. Row q of `weighted_distances` contains those of a target q to all of them.
+    Its last column does not belong to a source, but to the nearest robot outside the plan. That column is
+    always chosen, like the goals of fixed robots.
     """
     # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
     order = np.lexsort(team.previous_goals.T)
-    others_source = table.shape[1] - 1
+    outside_source = weighted_distances.shape[1] - 1
     improved_sources = improve_sources(
-        table,
-        np.append(chosen[order], others_source),
+        weighted_distances,
+        np.append(chosen[order], outside_source),
         np.append(team.is_fixed[order], True),
         min_saving,
         removals=len(chosen) <= _MAX_ROBOTS_FOR_THOROUGH_SEARCH,
@@ -166,18 +168,21 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
 
 
 def _move_first_source(
-    table: Array, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
+    weighted_distances: Array, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
 ) -> IntArray:
     """Return sources, (k,), with that of the first robot moved to the best position in its own cell.
 
     Sources are the possible goals, and `chosen` those of the robots of the plan. `is_in_own_cell` says for
-    each source whether no other robot is nearer to it. Row q of `table` contains the weighted distances of a
+    each source whether no other robot is nearer to it. Row q of `weighted_distances` contains those of a
     target q to all sources. Its last column belongs to the nearest robot outside the plan, which serves its
     targets where it is.
     """
-    others_source = table.shape[1] - 1
+    outside_source = weighted_distances.shape[1] - 1
     moved_sources = move_first_source(
-        table, np.append(chosen, others_source), np.append(is_in_own_cell, False), min_saving
+        weighted_distances,
+        np.append(chosen, outside_source),
+        np.append(is_in_own_cell, False),
+        min_saving,
     )
     return moved_sources[:-1]
 

@@ -11,7 +11,7 @@ from robocov.planning.map_window import SIDES
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
 _ADDED_LENGTH_M = 1.0
-"""Length that is added to paths, so that very short ones do not outweigh the stake."""
+"""Length that is added to paths, so that very short ones do not outweigh the expected cost."""
 
 
 def find_viewpoint(
@@ -33,7 +33,7 @@ def find_viewpoint(
     path_lengths : (m,) array, m
         Distances from the robot to all nodes.
     min_stake : float
-        Stake (see Notes) up to which a patch is not worth a visit: a number of cells times their mean
+        Expected cost (see Notes) up to which a patch is not worth a visit: a number of cells times their mean
         distance in meters.
     previous_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
@@ -43,44 +43,47 @@ def find_viewpoint(
     (2,) array or None, m
         Center of a free cell at the border of the patch. None if no patch is worth a visit.
 
-    Notes ----- The stake of a patch is what it is expected to contribute to the coverage cost: the sum, over
-    its cells, of the probability that the cell is free times the distance from the robot's goal. It is close
-    to zero for the inside of an obstacle. The viewpoint maximizes the stake of the patch, divided by (1 m +
-    path length).
+    Notes
+    -----
+    The expected cost of a patch is its contribution to the coverage cost: the sum, over its cells, of the
+    probability that the cell is free times the distance from the robot's goal. It is close to zero for the
+    inside of an obstacle. The viewpoint maximizes the expected cost of the patch, divided by (1 m + path
+    length).
     """
     window = planner.window
     raster = planner.known_map.raster
     frontier = planner.frontier
     unknown = planner.unknown_area
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
-    stakes = np.bincount(
+    patch_costs = np.bincount(
         unknown.patches,
         cell_distances[unknown.nodes] * unknown.expected_free_counts,
         minlength=1 + unknown.patches.max(initial=0),
     )
-    frontier_stakes = stakes[frontier.patches]
-    is_worth_visiting = frontier_stakes > min_stake
+    frontier_costs = patch_costs[frontier.patches]
+    is_worth_visiting = frontier_costs > min_stake
     if not is_worth_visiting.any():
         return None
     # The frontier consists of the unknown cells that have a free one on at least one of their four sides. The
     # cells on these sides, (b, 4), are possible viewpoints if they are marked in `frontier.is_side_free`.
     rows_up, columns_right = np.array(SIDES).T
-    row = frontier.rows[is_worth_visiting, None] + rows_up
-    column = frontier.columns[is_worth_visiting, None] + columns_right
-    node = row // window.stride * window.columns + column // window.stride
+    side_rows = frontier.rows[is_worth_visiting, None] + rows_up
+    side_columns = frontier.columns[is_worth_visiting, None] + columns_right
+    side_nodes = side_rows // window.stride * window.columns + side_columns // window.stride
     # A cell beyond the window is not free: its node does not matter, but must exist.
-    node = np.clip(node, 0, len(path_lengths) - 1)
-    stake_per_length = frontier_stakes[is_worth_visiting, None] / (_ADDED_LENGTH_M + path_lengths[node])
-    value = frontier.is_side_free[is_worth_visiting] * stake_per_length
+    side_nodes = np.clip(side_nodes, 0, len(path_lengths) - 1)
+    increased_lengths = _ADDED_LENGTH_M + path_lengths[side_nodes]
+    cost_per_length = frontier_costs[is_worth_visiting, None] / increased_lengths
+    values = frontier.is_side_free[is_worth_visiting] * cost_per_length
     first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
     # Previous viewpoints in units of cells, from the center of the first cell of the window.
     previous_cells = (np.array(previous_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
     for previous_column, previous_row in previous_cells:
-        squared_distances = (previous_column - column) ** 2 + (previous_row - row) ** 2
-        value[squared_distances < min_distance**2] = 0.0
-    best = value.argmax()
-    if not value.flat[best] > 0.0:
+        squared_distances = (previous_column - side_columns) ** 2 + (previous_row - side_rows) ** 2
+        values[squared_distances < min_distance**2] = 0.0
+    best = values.argmax()
+    if not values.flat[best] > 0.0:
         return None
-    cell = np.array([column.flat[best], row.flat[best]])
+    cell = np.array([side_columns.flat[best], side_rows.flat[best]])
     return np.asarray(first_center + cell * raster.cell_size)

@@ -39,7 +39,7 @@ def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
     assert set(result.owner.tolist()) == {1}
     assert (
         result.mean_distance
-        == time_varying_cost.compute_summary(0.0, ROBOTS, working)[0]
+        == time_varying_cost.compute_summary(0.0, ROBOTS, working).mean_distance
         == cost(ROBOTS[1:2]).mean_distance
     )
     later = time_varying_cost.evaluate_all_robots(2.0, ROBOTS)
