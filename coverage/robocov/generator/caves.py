@@ -329,31 +329,31 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     return shapely.build_area(shapely.multilinestrings(shapely.linestrings(segments)))
 
 
-def build_tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
-    """Build lines that join all parts, along a minimum spanning tree, each with a bend in its middle.
+def build_tunnels(components: Array, rng: np.random.Generator) -> list[LineString]:
+    """Build lines that join all components, along a minimum spanning tree, each with a bend in its middle.
 
     Parameters
     ----------
-    parts : array of geometries
+    components : array of geometries
     rng : numpy.random.Generator
 
     Returns
     -------
     list of LineString
-        One fewer than the number of parts.
+        One fewer than the number of components.
     """
     tunnels: list[LineString] = []
-    index = shapely.STRtree(parts)
-    joined = DisjointSet(range(len(parts)))
-    # Kruskal's algorithm for the pairs within a distance, which is doubled until all parts are joined.
-    extent = np.ptp(shapely.total_bounds(parts).reshape(2, 2), axis=0)
-    distance = float(extent.max()) / len(parts)
+    index = shapely.STRtree(components)
+    joined = DisjointSet(range(len(components)))
+    # Kruskal's algorithm for the pairs within a distance, which is doubled until all components are joined.
+    extent = np.ptp(shapely.total_bounds(components).reshape(2, 2), axis=0)
+    distance = float(extent.max()) / len(components)
     while joined.n_subsets > 1:
-        i, j = index.query(parts, "dwithin", distance)
+        i, j = index.query(components, "dwithin", distance)
         is_ordered = i < j
         i = i[is_ordered]
         j = j[is_ordered]
-        lines = shapely.shortest_line(parts[i], parts[j])
+        lines = shapely.shortest_line(components[i], components[j])
         by_length = np.lexsort((j, i, shapely.length(lines)))
         for k in by_length.tolist():
             were_separate = joined.merge(i[k], j[k])

@@ -78,17 +78,16 @@ def scatter_polygons(
     moves = 0
     while waiting:
         shape, area = waiting[-1]
-        others = np.array(outlines, dtype=object)
-        outline = _place_shape(request, shape, area, others, start_disc, rng)
+        outline = _place_shape(request, shape, area, np.array(outlines, dtype=object), start_disc, rng)
         if outline is not None:
             outlines.append(outline)
             placed.append(waiting.pop())
         elif moves < _MAX_MOVES and placed:
             # Another obstacle makes room, and is placed again after this one.
             moves += 1
-            other = int(rng.integers(len(placed)))
-            waiting.insert(-1, placed.pop(other))
-            outlines.pop(other)
+            removed = int(rng.integers(len(placed)))
+            waiting.insert(-1, placed.pop(removed))
+            outlines.pop(removed)
         else:
             return None
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
@@ -106,18 +105,18 @@ def _place_shape(
     request: Request,
     shape: str,
     area: float,
-    others: Array,
+    placed_outlines: Array,
     start_disc: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
     """Return a random outline of a shape at a free position; None if none is found.
 
     For each of several outlines, many random positions are tested at once: the outline must keep the gap from
-    the boundary and from other obstacles, and must not touch the start disc.
+    the boundary and from the outlines placed before, and must not touch the start disc.
     """
     gap = request.gap
     size = request.size
-    tree = shapely.STRtree(others)
+    tree = shapely.STRtree(placed_outlines)
     for _ in range(_MAX_OUTLINES):
         outline = _draw_shape(request, shape, area, rng)
         free_size = size - 2.0 * gap - np.ptp(outline, axis=0)
@@ -130,8 +129,9 @@ def _place_shape(
         is_free = shapely.disjoint(candidates, start_disc) & shapely.is_valid(candidates)
         is_free &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
         search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
-        candidate_indices, other_indices = tree.query(search_boxes)
-        is_too_close = shapely.distance(candidates[candidate_indices], others[other_indices]) < gap
+        candidate_indices, placed_indices = tree.query(search_boxes)
+        distances = shapely.distance(candidates[candidate_indices], placed_outlines[placed_indices])
+        is_too_close = distances < gap
         is_free[candidate_indices[is_too_close]] = False
         if is_free.any():
             return candidates[int(is_free.argmax())]

@@ -127,9 +127,9 @@ class Box(NamedTuple):
         -------
         Box
         """
-        own_low, own_high = self.get_range(axis)
-        new_low = own_low if low is None else low
-        new_high = own_high if high is None else high
+        default_low, default_high = self.get_range(axis)
+        new_low = default_low if low is None else low
+        new_high = default_high if high is None else high
         if axis == 0:
             return self._replace(left=new_low, right=new_high)
         return self._replace(bottom=new_low, top=new_high)
@@ -298,10 +298,10 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
         if count == 1:
             plan.rooms.append(box)
             continue
-        parts = _divide_by_wall(request, plan, box, count, rng)
-        if parts is None:
+        halves = _divide_by_wall(request, plan, box, count, rng)
+        if halves is None:
             return None
-        waiting += parts
+        waiting += halves
     return plan if _add_doors(request, plan, rng) else None
 
 
@@ -367,8 +367,8 @@ def _divide_by_corridor(
     ]
 
 
-class _DoorPlace(NamedTuple):
-    """A place where a door may be: the part of a wall between two rooms.
+class _SharedWall(NamedTuple):
+    """The section of a wall between two rooms, where a door may be.
 
     Attributes
     ----------
@@ -376,7 +376,7 @@ class _DoorPlace(NamedTuple):
     rooms : pair of int
         Indices of the rooms on its two sides.
     low, high : float, m
-        Ends of the part; `high` is below `low` if the wall does not separate these rooms.
+        Ends of the section; `high` is below `low` if the wall does not separate these rooms.
     """
 
     wall: Wall
@@ -388,37 +388,38 @@ class _DoorPlace(NamedTuple):
 def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
     """Add doors that connect all rooms, and some more; return whether all rooms are connected.
 
-    The places between two rooms where a door may be are visited in random order, but those to the corridor
-    first. A door is added if it connects rooms that are not connected yet, directly or via others. At random,
-    some more are added, which make loops. A piece of wall remains on both sides of each door.
+    The walls between two rooms are visited in random order, but those of the corridor first. A door is added
+    if it connects rooms that are not connected yet, directly or via others. At random, some more are added,
+    which make loops. A piece of wall remains on both sides of each door.
     """
     room_groups = DisjointSet(range(len(plan.rooms)))
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
-    places = _find_door_places(plan)
-    order_keys, loop_draws, relative_positions = rng.random((3, len(places)))
-    widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(places))
+    shared_walls = _find_shared_walls(plan)
+    order_keys, loop_draws, relative_positions = rng.random((3, len(shared_walls)))
+    widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(shared_walls))
 
     def compute_sort_key(k: int) -> tuple[bool, float]:
         """Return a key that puts doors to the corridor first, and is random otherwise."""
-        return plan.corridor not in places[k].rooms, float(order_keys[k])
+        return plan.corridor not in shared_walls[k].rooms, float(order_keys[k])
 
-    for k in sorted(range(len(places)), key=compute_sort_key):
-        place = places[k]
-        max_width = place.high - place.low - 2.0 * min_piece
+    for k in sorted(range(len(shared_walls)), key=compute_sort_key):
+        shared_wall = shared_walls[k]
+        max_width = shared_wall.high - shared_wall.low - 2.0 * min_piece
         width = request.round_down(min(float(widths[k]), max_width))
-        is_unneeded = room_groups.connected(*place.rooms) and loop_draws[k] > _LOOP_PROBABILITY
+        is_unneeded = room_groups.connected(*shared_wall.rooms) and loop_draws[k] > _LOOP_PROBABILITY
         if width < request.gap + request.step or is_unneeded:
             continue
         free_length = max_width - width
-        start = round(place.low + min_piece + free_length * float(relative_positions[k]), request.digits)
+        start = shared_wall.low + min_piece + free_length * float(relative_positions[k])
+        start = round(start, request.digits)
         end = round(start + width, request.digits)
-        plan.doors.append(Door(place.wall, start, end, place.rooms))
-        room_groups.merge(*place.rooms)
+        plan.doors.append(Door(shared_wall.wall, start, end, shared_wall.rooms))
+        room_groups.merge(*shared_wall.rooms)
     return room_groups.n_subsets == 1
 
 
-def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
-    """Return a place for each wall and each pair of rooms on its two sides.
+def _find_shared_walls(plan: FloorPlan) -> list[_SharedWall]:
+    """Return the section of each wall between each pair of rooms on its two sides.
 
     `axis` is the axis that a wall crosses. A room on its lower side ends at the position of the wall on this
     axis, and a room on its upper side begins there.
@@ -431,7 +432,7 @@ def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
             low, high = room.get_range(axis)
             rooms_by_low[axis, low].append(index)
             rooms_by_high[axis, high].append(index)
-    places = []
+    shared_walls = []
     for wall in plan.walls:
         before = rooms_by_high[wall.axis, wall.position]
         after = rooms_by_low[wall.axis, wall.position]
@@ -440,8 +441,8 @@ def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
             second_low, second_high = plan.rooms[second].get_range(1 - wall.axis)
             low = max(wall.start, first_low, second_low)
             high = min(wall.end, first_high, second_high)
-            places.append(_DoorPlace(wall, (first, second), low, high))
-    return places
+            shared_walls.append(_SharedWall(wall, (first, second), low, high))
+    return shared_walls
 
 
 def _place_furniture(

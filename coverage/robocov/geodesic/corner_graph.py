@@ -207,12 +207,12 @@ def find_links(
         if link_count + count > len(pairs):
             return NO_SPACE
         for k in range(count):
-            other_x = corners[visible[k], 0]
-            other_y = corners[visible[k], 1]
+            visible_x = corners[visible[k], 0]
+            visible_y = corners[visible[k], 1]
             # A shortest path must be able to bend at both ends of the link.
-            if can_bend_at_corner(corners, walls.corner_walls, corner, other_x, other_y):
-                dx = other_x - x
-                dy = other_y - y
+            if can_bend_at_corner(corners, walls.corner_walls, corner, visible_x, visible_y):
+                dx = visible_x - x
+                dy = visible_y - y
                 pairs[link_count, 0] = corner
                 pairs[link_count, 1] = visible[k]
                 lengths[link_count, 0] = np.sqrt(dx * dx + dy * dy)
@@ -245,15 +245,15 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
         head = head + 1 if head + 1 < size else 0
         queue.is_waiting[corner] = False
         for link in range(graph.first_link[corner], graph.first_link[corner + 1]):
-            other = graph.neighbor[link]
+            neighbor = graph.neighbor[link]
             length = paths.length[corner] + graph.length[link]
-            is_tie = length == paths.length[other]
-            if length < paths.length[other] or (is_tie and paths.source[corner] < paths.source[other]):
-                paths.length[other] = length
-                paths.source[other] = paths.source[corner]
-                paths.first_corner[other] = paths.first_corner[corner]
-                paths.previous_corner[other] = corner
-                if not queue.is_waiting[other]:
-                    queue.is_waiting[other] = True
-                    queue.corners[tail] = other
+            is_tie = length == paths.length[neighbor]
+            if length < paths.length[neighbor] or (is_tie and paths.source[corner] < paths.source[neighbor]):
+                paths.length[neighbor] = length
+                paths.source[neighbor] = paths.source[corner]
+                paths.first_corner[neighbor] = paths.first_corner[corner]
+                paths.previous_corner[neighbor] = corner
+                if not queue.is_waiting[neighbor]:
+                    queue.is_waiting[neighbor] = True
+                    queue.corners[tail] = neighbor
                     tail = tail + 1 if tail + 1 < size else 0

@@ -351,10 +351,10 @@ class _Search:
         Since the table only approximates the cost, the result of an earlier stage is used if its exact cost
         is lower.
         """
-        drawn = seed_sources(self.table, self.robot_count, rng)
-        moved = run_lloyd(self.table, drawn, heartbeat=heartbeat)
-        swapped = apply_best_swaps(self.table, moved, heartbeat)
-        stages = [np.sort(sources) for sources in (swapped, moved, drawn)]
+        first_sources = seed_sources(self.table, self.robot_count, rng)
+        lloyd_sources = run_lloyd(self.table, first_sources, heartbeat=heartbeat)
+        swapped_sources = apply_best_swaps(self.table, lloyd_sources, heartbeat)
+        stages = [np.sort(sources) for sources in (swapped_sources, lloyd_sources, first_sources)]
         return min(stages, key=lambda sources: _get_rank(self.cost(self.candidates[sources])))
 
 

@@ -128,24 +128,24 @@ class DiscoveredMap:
         _mark_robots(state, self.raster.grid, positions, radius)
         return self._replace_state(state)
 
-    def merge(self, others: Iterable[DiscoveredMap]) -> DiscoveredMap:
+    def merge(self, other_maps: Iterable[DiscoveredMap]) -> DiscoveredMap:
         """Fill in cells that are unseen in this map from other maps of the same raster.
 
         Parameters
         ----------
-        others : iterable of DiscoveredMap
+        other_maps : iterable of DiscoveredMap
             In order of precedence.
 
         Returns
         -------
         DiscoveredMap
-            This map itself if the others add nothing to it.
+            This map itself if the other maps add nothing to it.
         """
         state = self.state
-        for other in others:
+        for other_map in other_maps:
             # An observation by any robot replaces a presumption; this robot's own observations stay.
-            is_unseen = (state == UNKNOWN) | ((state == PRESUMED_WALL) & (other.state != UNKNOWN))
-            state = np.where(is_unseen, other.state, state)
+            is_unseen = (state == UNKNOWN) | ((state == PRESUMED_WALL) & (other_map.state != UNKNOWN))
+            state = np.where(is_unseen, other_map.state, state)
         return self._replace_state(state)
 
     def count_changed_walls(self, earlier: DiscoveredMap) -> int:

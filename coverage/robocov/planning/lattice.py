@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half of the moves; the others are their opposites."""
@@ -154,22 +154,14 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
     for move in range(len(moves.lengths)):
         up = moves.rows[move]
         right = moves.columns[move]
-        first_crossed = moves.first_crossed[move]
-        end_crossed = moves.first_crossed[move + 1]
-        crossed_count = end_crossed - first_crossed
+        crossed_count = moves.first_crossed[move + 1] - moves.first_crossed[move]
         for row in range(rows - up):
             for column in range(max(0, -right), columns - max(0, right)):
                 node_row = stride // 2 + row * stride
                 node_column = stride // 2 + column * stride
-                is_passable = True
-                is_without_wall = True
-                unknown_count = 0
-                for k in range(first_crossed, end_crossed):
-                    i = node_row + moves.crossed_rows[k]
-                    j = node_column + moves.crossed_columns[k]
-                    is_passable = is_passable and not cells.is_tight[i, j]
-                    is_without_wall = is_without_wall and not cells.is_blocked[i, j]
-                    unknown_count += cells.is_unknown[i, j]
+                is_passable, is_without_wall, unknown_count = _examine_crossed_cells(
+                    cells, moves, move, node_row, node_column
+                )
                 node = row * columns + column
                 neighbor = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / crossed_count * unknown_count)
@@ -182,6 +174,26 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 if is_passable or (is_without_wall and neighbor_has_clearance and not has_clearance):
                     lengths[neighbor, _MAX_MOVE - up, _MAX_MOVE - right] = length
     return lengths
+
+
+@inlined_kernel
+def _examine_crossed_cells(
+    cells: LatticeCells, moves: _Moves, move: int, node_row: int, node_column: int
+) -> tuple[bool, bool, int]:
+    """Return whether a move from a node crosses no tight cell, and no wall, and the number of unknown cells.
+
+    The cell of the node is in row `node_row` and column `node_column`.
+    """
+    is_passable = True
+    is_without_wall = True
+    unknown_count = 0
+    for k in range(moves.first_crossed[move], moves.first_crossed[move + 1]):
+        i = node_row + moves.crossed_rows[k]
+        j = node_column + moves.crossed_columns[k]
+        is_passable = is_passable and not cells.is_tight[i, j]
+        is_without_wall = is_without_wall and not cells.is_blocked[i, j]
+        unknown_count += cells.is_unknown[i, j]
+    return is_passable, is_without_wall, unknown_count
 
 
 @kernel
