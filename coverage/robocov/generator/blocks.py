@@ -110,6 +110,7 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     trims = _draw_trims(cells, feasible_widening, corner_disc, rng)
 
     def build_blocks(widening: float) -> list[Polygon]:
+        """Return the blocks between streets of the given widening, m."""
         return [
             _build_block(cell, widening, corner_disc, trim) for cell, trim in zip(cells, trims, strict=True)
         ]

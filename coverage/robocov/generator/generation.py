@@ -207,9 +207,10 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         layout_obstacles = map_kind.layout(request, corner_disc, rng)
         if layout_obstacles is None:
             continue
-        environment = _build_environment(int(seed), kind, request, layout_obstacles, corner_disc)
-        if environment is not None:
-            return environment
+        environment = _build_environment(int(seed), kind, request, layout_obstacles)
+        complete_environment = _add_starts(environment, request, corner_disc)
+        if complete_environment is not None:
+            return complete_environment
     raise ParameterError(
         f"area: no layout of {request.count} {map_kind.obstacle_name} was found that blocks {request.area:g} "
         f"of {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m. "
@@ -229,20 +230,18 @@ def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart
     return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
 
 
-def _build_environment(
-    seed: int, kind: str, request: Request, obstacles: list[Obstacle], corner_disc: DiscStart
-) -> Environment | None:
-    """Return the map with its starts; None if it is not valid, or does not fulfill the request."""
+def _build_environment(seed: int, kind: str, request: Request, obstacles: list[Obstacle]) -> Environment:
+    """Return the map without starts."""
     width = float(request.width)
     height = float(request.height)
-    qualifier = "about " if GENERATORS[kind].is_approximate else ""
-    # Obstacles that overlap, or a start without room, make the map invalid: then another layout is tried.
-    environment = Environment(
+    map_kind = GENERATORS[kind]
+    qualifier = "about " if map_kind.is_approximate else ""
+    return Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         obstacles=tuple(obstacles),
         description=(
-            f"Generated with seed {seed}: {qualifier}{request.count} {GENERATORS[kind].obstacle_name}, "
+            f"Generated with seed {seed}: {qualifier}{request.count} {map_kind.obstacle_name}, "
             f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
         ),
         extra={
@@ -257,6 +256,10 @@ def _build_environment(
             }
         },
     )
+
+
+def _add_starts(environment: Environment, request: Request, corner_disc: DiscStart) -> Environment | None:
+    """Return a map with its starts; None if it is not valid, or does not fulfill the request."""
     try:
         if not _fulfills_request(environment, request):
             return None
@@ -266,6 +269,7 @@ def _build_environment(
         environment = replace(environment, starts=starts)
         check_rules(environment, environment.name)
     except (MapError, shapely.GEOSException):
+        # Obstacles overlap, or a start has too little space.
         return None
     return environment
 
@@ -273,7 +277,7 @@ def _build_environment(
 def _choose_starts(
     environment: Environment, request: Request, corner_disc: DiscStart
 ) -> dict[str, DiscStart | UniformStart] | None:
-    """Return the starts of a map by name; None if there is not enough room for the discs."""
+    """Return the starts of a map by name; None if there is not enough space for the discs."""
     start_disc = _shrink_corner_disc(environment, request, corner_disc)
     center_disc = _choose_center_disc(environment, request, corner_disc)
     if start_disc is None or center_disc is None:

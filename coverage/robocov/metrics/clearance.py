@@ -100,10 +100,10 @@ def count_contacts(record: Record, clearances: Array) -> int:
     -------
     int
     """
-    touches = clearances <= MAX_CONTACT_GAP_M
-    touches_at_start = touches[0].sum()
-    begins_to_touch = touches[1:] & ~touches[:-1]
-    return int(touches_at_start + begins_to_touch.sum()) + measure_robot_gaps(record).contacts
+    is_touching = clearances <= MAX_CONTACT_GAP_M
+    is_new_contact = is_touching[1:] & ~is_touching[:-1]
+    wall_contacts = int(is_touching[0].sum() + is_new_contact.sum())
+    return wall_contacts + measure_robot_gaps(record).contacts
 
 
 def measure_robot_gaps(record: Record) -> RobotGaps:

@@ -98,7 +98,7 @@ class ConfigurationSpace:
         length = np.where(is_coincident, 1.0, distance)
         fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / length
         push = offset * fraction[:, None]
-        pushed = positions.copy()
-        np.subtract.at(pushed, first, push)
-        np.add.at(pushed, second, push)
-        return pushed
+        new_positions = positions.copy()
+        np.subtract.at(new_positions, first, push)
+        np.add.at(new_positions, second, push)
+        return new_positions

@@ -92,7 +92,17 @@ class _NodeSearch:
     """Coverage costs with the robot at different nodes, computed when the search gets close to them."""
 
     def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
-        """Start a search at a node, with weights (m,) of all nodes, and (k, 2) positions of the others, m."""
+        """Start a search at a node.
+
+        Parameters
+        ----------
+        planner : GridPlanner
+        weights : (m,) array
+            Weights of all nodes.
+        other_positions : (k, 2) array, m
+            Positions of all other robots.
+        first_node : int
+        """
         self._planner = planner
         distances = planner.get_distances(first_node)
         self.targets: IntArray = np.flatnonzero(np.isfinite(distances) & (weights > 0.0))

@@ -318,7 +318,7 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 @kernel
 def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
-    """For each pair of curves, find the part of the first one that is on the cell's side of the second one.
+    """For each pair of curves, find the section of the first one on the cell's side of the second one.
 
     A point of a curve can bound the cell only where it is on the cell's side of all other curves. Entry
     [first, second] of `crossings`, (k, k, 2), receives the values of the parameter t of the first curve at

@@ -180,10 +180,10 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
         second = ENTRIES_PER_TRIANGLE * triangle_count
         third = second + ENTRIES_PER_TRIANGLE
         _split_triangle(mesh, triangle, second, third, i)
-        for h in (triangle, second, third):
-            _compute_cotangents(mesh, points, cotangents, h)
-        for h in (triangle, second, third):
-            flip_count, _ = _flip_from(mesh, points, cotangents, stack, h, flip_count)
+        for first_half_edge in (triangle, second, third):
+            _compute_cotangents(mesh, points, cotangents, first_half_edge)
+        for first_half_edge in (triangle, second, third):
+            flip_count, _ = _flip_from(mesh, points, cotangents, stack, first_half_edge, flip_count)
             if flip_count == _FAILED:
                 return False
     return _compute_all_cotangents(mesh, points, cotangents)
@@ -229,30 +229,31 @@ def _link(mesh: Mesh, h: int, twin: int) -> None:
 def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
     """Compute the cotangents in all triangles; return whether all triangles are counter-clockwise."""
     is_ccw = True
-    for h in range(0, mesh.shape[1], ENTRIES_PER_TRIANGLE):
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, h)
+    for first_half_edge in range(0, mesh.shape[1], ENTRIES_PER_TRIANGLE):
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, first_half_edge)
     return is_ccw
 
 
 @inlined_kernel
-def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) -> bool:
-    """Compute the cotangents in a triangle with first half-edge h; return whether it is counter-clockwise.
+def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, first_half_edge: int) -> bool:
+    """Compute the cotangents in a triangle; return whether it is counter-clockwise.
 
-    The cotangent of a half-edge is that of the angle opposite to it, at the apex of the triangle. It is
-    computed from there, so that its last bit does not depend on how the triangle is stored. In a clockwise
-    triangle the sign of the cross product is ignored, so that flips can correct it.
+    The triangle is given by its first half-edge. The cotangent of a half-edge is that of the angle opposite
+    to it, at the apex of the triangle. It is computed from there, so that its last bit does not depend on how
+    the triangle is stored. In a clockwise triangle the sign of the cross product is ignored, so that flips
+    can correct it.
     """
     is_ccw = True
     for k in range(3):
-        i = mesh[CORNER, h + k]
-        j = mesh[CORNER, h + (k + 1) % 3]
-        apex = mesh[CORNER, h + (k + 2) % 3]
+        i = mesh[CORNER, first_half_edge + k]
+        j = mesh[CORNER, first_half_edge + (k + 1) % 3]
+        apex = mesh[CORNER, first_half_edge + (k + 2) % 3]
         ax = points[i, 0] - points[apex, 0]
         ay = points[i, 1] - points[apex, 1]
         bx = points[j, 0] - points[apex, 0]
         by = points[j, 1] - points[apex, 1]
         cross = ax * by - ay * bx
-        cotangents[h + k] = (ax * bx + ay * by) / max(abs(cross), _MIN_CROSS)
+        cotangents[first_half_edge + k] = (ax * bx + ay * by) / max(abs(cross), _MIN_CROSS)
         is_ccw &= cross > 0.0
     return is_ccw
 
