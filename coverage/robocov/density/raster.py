@@ -271,7 +271,9 @@ def _build_grid(raster: Raster) -> _Grid:
         origin = origin - 0.5 * step
     else:
         constant = values
-        slope_x = slope_y = twist = np.zeros_like(values)
+        slope_x = np.zeros_like(values)
+        slope_y = np.zeros_like(values)
+        twist = np.zeros_like(values)
     coefficients = np.stack([constant, slope_x, slope_y, twist])
     return _Grid(origin, step, coefficients, _integrate_rows(coefficients))
 

@@ -88,24 +88,29 @@ def find_trembling(record: Record) -> IntArray:
     (k,) int array
         Indices of the robots, ascending.
     """
-    steps = round(TREMBLE_WINDOW_S / record.dt)
-    if steps < 2 or len(record) <= steps:
+    step_count = round(TREMBLE_WINDOW_S / record.dt)
+    if step_count < 2 or len(record) <= step_count:
         return np.zeros(0, dtype=np.intp)
-    if not np.allclose(np.diff(record.time[-steps - 1 :]), record.dt, rtol=0.01, atol=0.0):
+    if not np.allclose(np.diff(record.time[-step_count - 1 :]), record.dt, rtol=0.01, atol=0.0):
         return np.zeros(0, dtype=np.intp)
-    positions = record.positions[-steps - 1 :]
+    positions = record.positions[-step_count - 1 :]
     displacements = np.diff(positions, axis=0)
     step_lengths = compute_point_distances(positions[1:], positions[:-1])
     net_displacement = compute_point_distances(positions[-1], positions[0])
-    before = displacements[:-1]
-    after = displacements[1:]
-    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    turning_angles = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
-    trembles = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
-    trembles &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN
-    trembles &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
-    trembles &= record.traveled[-steps:].all(axis=0) & record.working[-steps:].all(axis=0)
-    return np.flatnonzero(trembles)
+    turning_angles = _compute_turning_angles(displacements)
+    is_trembling = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
+    is_trembling &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN
+    is_trembling &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
+    is_trembling &= record.traveled[-step_count:].all(axis=0) & record.working[-step_count:].all(axis=0)
+    return np.flatnonzero(is_trembling)
+
+
+def _compute_turning_angles(displacements: Array) -> Array:
+    """Return the magnitudes of the angles between consecutive displacements, (k - 1, n) rad."""
+    incoming = displacements[:-1]
+    outgoing = displacements[1:]
+    cross = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
+    return np.asarray(np.abs(np.arctan2(cross, (incoming * outgoing).sum(axis=-1))))
 
 
 def count_zigzags(record: Record, clearances: Array) -> IntArray:
@@ -121,31 +126,33 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     -------
     (n,) int array
     """
-    touches = clearances <= MAX_CONTACT_GAP_M
-    begins_to_touch = touches.copy()
-    begins_to_touch[1:] &= ~touches[:-1]
+    is_touching = clearances <= MAX_CONTACT_GAP_M
+    is_new_contact = is_touching.copy()
+    is_new_contact[1:] &= ~is_touching[:-1]
     counts = np.zeros(len(record.team), dtype=np.intp)
-    for robot in np.flatnonzero(begins_to_touch.any(axis=0)).tolist():
-        moments = np.flatnonzero(begins_to_touch[:, robot])
-        away = record.positions[moments, robot] - record.obstacle_points[moments, robot]
-        away /= np.maximum(compute_point_distances(away, np.zeros(2)), _MIN_DISTANCE_M)[:, None]
+    for robot in np.flatnonzero(is_new_contact.any(axis=0)).tolist():
+        moments = np.flatnonzero(is_new_contact[:, robot])
+        normals = record.positions[moments, robot] - record.obstacle_points[moments, robot]
+        normals /= np.maximum(compute_point_distances(normals, np.zeros(2)), _MIN_DISTANCE_M)[:, None]
         # The cosine is nan, and the walls are not opposite, if a robot sensed nothing.
-        is_opposite = (away[:-1] * away[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
+        is_opposite = (normals[:-1] * normals[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
         is_soon = np.diff(record.time[moments]) <= MAX_ZIGZAG_PERIOD_S
         counts[robot] = int((is_opposite & is_soon).sum())
     return counts
 
 
 def _describe_trembling(record: Record, robots: IntArray) -> str:
-    steps = round(TREMBLE_WINDOW_S / record.dt)
-    positions = record.positions[-steps - 1 :, robots]
+    """Return the advice for a control period that is too long."""
+    step_count = round(TREMBLE_WINDOW_S / record.dt)
+    positions = record.positions[-step_count - 1 :, robots]
     step_lengths_cm = 100.0 * compute_point_distances(positions[1:], positions[:-1]).mean(axis=0)
-    moving = f"{_format_robots(record, robots)} by up to {float(step_lengths_cm.max()):.0f} cm a step"
+    extent = f"{_format_robots(record, robots)} by up to {float(step_lengths_cm.max()):.0f} cm a step"
     cause = f"the control period of {record.dt:.3g} s is too long for the forces of {record.label}"
-    return f"The team trembles: {moving}; {cause}. Try a shorter one (--dt), such as 1/60 s."
+    return f"The team trembles: {extent}; {cause}. Try a shorter one (--dt), such as 1/60 s."
 
 
 def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
+    """Return the advice for an acceleration limit that is too low."""
     robots = np.flatnonzero(zigzags >= MIN_ZIGZAGS)
     limit = float(record.team.max_acceleration[robots].min())
     crossings = int(zigzags.sum())
@@ -157,6 +164,7 @@ def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
 
 
 def _format_robots(record: Record, robots: IntArray) -> str:
+    """Return a phrase that names robots, such as "robots 2 and 5" or "all 6 robots"."""
     if len(robots) == len(record.team) > 1:
         return f"all {format_count(len(robots), 'robot')}"
     names = [str(record.robot_numbers[robot]) for robot in robots.tolist()]

@@ -25,7 +25,7 @@ _REACH_FACTOR = 4.0
 class RobotGaps(NamedTuple):
     """Gaps between the rims of robots along a run."""
 
-    smallest: Array
+    min_gaps: Array
     """(T,) m, the smallest gap between two working robots at each moment; inf if fewer than two work."""
     contacts: int
     """Number of times that two robots came into contact."""
@@ -118,19 +118,19 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
     RobotGaps
     """
     positions = np.where(record.working[:, :, None], record.positions, np.nan)
-    smallest = np.full(len(positions), np.inf)
+    min_gaps = np.full(len(positions), np.inf)
     contacts = _measure_gaps(
         positions=positions,
         radius=np.array(record.team.radius),
         order=positions[:, :, 0].argsort(axis=1),
-        smallest=smallest,
+        min_gaps=min_gaps,
     )
-    return RobotGaps(smallest, contacts)
+    return RobotGaps(min_gaps, contacts)
 
 
 @kernel
-def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Array) -> int:
-    """Write the smallest gap of each moment to `smallest`, (T,) m; return the number of contacts.
+def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Array) -> int:
+    """Write the smallest gap of each moment to `min_gaps`, (T,) m; return the number of contacts.
 
     `order`, (T, n), lists the robots by x. Those that do not work, whose positions are nan, come last.
     """
@@ -139,18 +139,19 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Ar
         max_diameter = max(max_diameter, 2.0 * radius[i])
     contacts = 0
     for t in range(len(positions)):
-        for a in range(len(radius)):
-            i = order[t, a]
-            for b in range(a + 1, len(radius)):
-                j = order[t, b]
-                min_gap = positions[t, j, 0] - positions[t, i, 0] - max_diameter
-                # Robots farther along x are not closer; the comparison is false for nan.
-                if not min_gap <= max(smallest[t], MAX_CONTACT_GAP_M):
+        for first in range(len(radius)):
+            i = order[t, first]
+            for second in range(first + 1, len(radius)):
+                j = order[t, second]
+                # The gap is at least as wide as in x. Robots farther along x are not closer. The comparison
+                # is false for nan.
+                gap_bound = positions[t, j, 0] - positions[t, i, 0] - max_diameter
+                if not gap_bound <= max(min_gaps[t], MAX_CONTACT_GAP_M):
                     break
                 radii = radius[i] + radius[j]
                 contact_distance = radii + MAX_CONTACT_GAP_M
                 distance = _compute_distance(positions, t, i, j)
-                smallest[t] = min(smallest[t], distance - radii)
+                min_gaps[t] = min(min_gaps[t], distance - radii)
                 if distance <= contact_distance:
                     was_in_contact = t > 0 and _compute_distance(positions, t - 1, i, j) <= contact_distance
                     if not was_in_contact:
@@ -160,6 +161,7 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Ar
 
 @kernel
 def _compute_distance(positions: Array, t: int, i: int, j: int) -> float:
+    """Return the distance between the centers of robots i and j at moment t, m."""
     return math.sqrt(
         (positions[t, i, 0] - positions[t, j, 0]) ** 2 + (positions[t, i, 1] - positions[t, j, 1]) ** 2
     )

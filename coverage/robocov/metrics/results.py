@@ -215,6 +215,7 @@ class Results:
         return _COLUMN_KINDS | study_kinds
 
     def _find_run_folder(self, run: str | int | Mapping[str, Any]) -> Path:
+        """Find the folder of a run; raise InputError if there is none, or the run failed."""
         name = self._find_run_name(run)
         folder = self.folder / RUNS_FOLDER / name
         # A name with a separator could lead out of the folder of the sweep.

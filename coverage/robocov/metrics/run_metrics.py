@@ -190,7 +190,7 @@ def compute_run_metrics(
     integrals = _integrate(record)
     interval_starts = np.concatenate([[0], moments[:-1] + 1])
     wall_gaps = compute_clearances(record).min(axis=1)
-    robot_gaps = measure_robot_gaps(record).smallest
+    robot_gaps = measure_robot_gaps(record).min_gaps
     return RunMetrics(
         time=record.time[moments],
         sensed_area=np.array([area.sensed for area in areas]),

@@ -87,12 +87,12 @@ def descend(
     decreases: deque[float] = deque(maxlen=_STALL_STEPS)
     for _ in range(_MAX_STEPS):
         heartbeat()
-        before = descent.result.mean_distance
+        previous_distance = descent.result.mean_distance
         if not descent.step():
             break
-        after = descent.result.mean_distance
-        decreases.append(before - after)
-        if len(decreases) == _STALL_STEPS and sum(decreases) < _STALL_DECREASE * after:
+        mean_distance = descent.result.mean_distance
+        decreases.append(previous_distance - mean_distance)
+        if len(decreases) == _STALL_STEPS and sum(decreases) < _STALL_DECREASE * mean_distance:
             break
     return descent.result
 

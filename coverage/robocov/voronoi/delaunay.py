@@ -291,11 +291,13 @@ def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, tr
 def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: float) -> int:
     """Return a half-edge of a triangle with (x, y) on its right; `_NO_HALF_EDGE` if (x, y) is inside."""
     for h in range(triangle, triangle + 3):
-        a = mesh[CORNER, h]
-        b = mesh[CORNER, get_next_half_edge(h)]
-        ax = points[a, 0]
-        ay = points[a, 1]
-        if (points[b, 0] - ax) * (y - ay) - (points[b, 1] - ay) * (x - ax) < 0.0:
+        start = mesh[CORNER, h]
+        end = mesh[CORNER, get_next_half_edge(h)]
+        start_x = points[start, 0]
+        start_y = points[start, 1]
+        edge_x = points[end, 0] - start_x
+        edge_y = points[end, 1] - start_y
+        if edge_x * (y - start_y) - edge_y * (x - start_x) < 0.0:
             return h
     return _NO_HALF_EDGE
 

@@ -108,7 +108,7 @@ def test_gaps_between_robots_of_different_size(record: Record) -> None:
     positions = np.array([[[0.0, 0.0], [0.0001, 0.25], [0.62, 0.0]]])
     team = replace(record.team[:3], radius=np.array([0.1, 0.1, 0.5]))
     three_robots = replace(record, team=team, positions=positions, time=np.zeros(1))
-    assert measure_robot_gaps(three_robots).smallest == pytest.approx([0.02])
+    assert measure_robot_gaps(three_robots).min_gaps == pytest.approx([0.02])
 
 
 @pytest.mark.slow
