@@ -336,6 +336,7 @@ def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim
 
 
 def _to_polygon(cell: Cell) -> Polygon:
+    """Convert a cell to a polygon."""
     return Polygon([(edge.x, edge.y) for edge in cell])
 
 
@@ -392,4 +393,5 @@ def _is_thick(block: shapely.Geometry) -> bool:
 
 
 def _sum_areas(blocks: list[Polygon]) -> float:
+    """Return the total area of blocks, m²."""
     return float(sum(block.area for block in blocks))

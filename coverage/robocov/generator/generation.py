@@ -308,8 +308,9 @@ def _choose_center_disc(
 ) -> DiscStart | None:
     """Return a disc near the middle with as much clearance as possible; None if nothing is free there.
 
-    The free one of a grid of points around the middle is chosen that has the best score: its distance from
-    the nearest wall, as far as the disc can make use of it, minus a part of its distance from the middle.
+    Its center is the free point with the best score, from a grid of points around the middle. The score is
+    the distance from the nearest wall, as far as the disc can make use of it, minus a fraction of the
+    distance from the middle.
     """
     max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
     steps = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)

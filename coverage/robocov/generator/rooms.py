@@ -434,9 +434,9 @@ def _find_shared_walls(plan: FloorPlan) -> list[_SharedWall]:
             rooms_by_high[axis, high].append(index)
     shared_walls = []
     for wall in plan.walls:
-        before = rooms_by_high[wall.axis, wall.position]
-        after = rooms_by_low[wall.axis, wall.position]
-        for first, second in itertools.product(before, after):
+        lower_rooms = rooms_by_high[wall.axis, wall.position]
+        upper_rooms = rooms_by_low[wall.axis, wall.position]
+        for first, second in itertools.product(lower_rooms, upper_rooms):
             first_low, first_high = plan.rooms[first].get_range(1 - wall.axis)
             second_low, second_high = plan.rooms[second].get_range(1 - wall.axis)
             low = max(wall.start, first_low, second_low)

@@ -173,6 +173,7 @@ class Geodesics:
         """
 
         def compute_rows(index: AngularWallIndex) -> tuple[IntArray, Array] | None:
+            """Return the indices and lengths; None if there is not enough space."""
             max_rows = len(index.entry_wall)
             indices = np.empty((max_rows, index_columns), np.int64)
             lengths = np.empty((max_rows, length_columns))

@@ -221,6 +221,7 @@ def _find_sectors(segments: _Segments) -> _Sectors:
 
 
 def _compute_angles(vectors: Array) -> Array:
+    """Return the angles of (n, 2) vectors, (n,) rad."""
     return np.asarray(np.arctan2(vectors[:, 1], vectors[:, 0]))
 
 

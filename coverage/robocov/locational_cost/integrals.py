@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost.performance import DISTANCE, SQUARED_DISTANCE, Performance
 
@@ -195,25 +195,31 @@ def _sum_derivatives(
         clearance = np.inf
         for k in range(first_edge, end_edge):
             edge = _compute_relative_edge(start, end, k, x, y)
-            nx = edge.normal_x
-            ny = edge.normal_y
             integral = _integrate_edge(kind, height, edge, half_perimeter)
-            sums.x[i] -= nx * integral.total
-            sums.y[i] -= ny * integral.total
-            # The two mixed derivatives differ for one edge, but not in the sum over all edges of the cell.
-            # The contribution to xy is the mean of both.
-            mixed = integral.along * nx * ny
-            half_difference = 0.5 * (nx - ny) * (nx + ny)
-            sums.xx[i] += integral.across * nx * nx - mixed
-            sums.xy[i] += integral.across * nx * ny + integral.along * half_difference
-            sums.yy[i] += integral.across * ny * ny + mixed
-            sums.area[i] += 0.5 * edge.length * (edge.distance + x * nx + y * ny)
+            _add_edge(sums, i, edge, integral)
+            sums.area[i] += 0.5 * edge.length * (edge.distance + x * edge.normal_x + y * edge.normal_y)
             # If an edge is as short as a rounding error, its direction is meaningless.
             if edge.length > _MIN_RELATIVE_LENGTH * half_perimeter:
                 clearance = min(clearance, edge.distance)
         sums.clearance[i] = clearance if first_edge < end_edge else 0.0
         sums.half_perimeter[i] = half_perimeter
     return sums
+
+
+@inlined_kernel
+def _add_edge(sums: CellDerivatives, i: int, edge: _RelativeEdge, integral: _EdgeIntegral) -> None:
+    """Add the contribution of an edge to the gradient and the Hessian of cell i."""
+    nx = edge.normal_x
+    ny = edge.normal_y
+    sums.x[i] -= nx * integral.total
+    sums.y[i] -= ny * integral.total
+    # The two mixed derivatives differ for one edge, but not in the sum over all edges of the cell. The
+    # contribution to xy is the mean of both.
+    mixed = integral.along * nx * ny
+    half_difference = 0.5 * (nx - ny) * (nx + ny)
+    sums.xx[i] += integral.across * nx * nx - mixed
+    sums.xy[i] += integral.across * nx * ny + integral.along * half_difference
+    sums.yy[i] += integral.across * ny * ny + mixed
 
 
 @kernel
@@ -236,7 +242,7 @@ def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float)
 
 @kernel
 def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimeter: float) -> _EdgeIntegral:
-    """Return the integrals over an edge."""
+    """Return the integrals over an edge, for the performance function of the given kind."""
     if kind == SQUARED_DISTANCE:
         return _integrate_squared_distance(edge)
     if kind == DISTANCE:

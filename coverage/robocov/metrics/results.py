@@ -228,6 +228,7 @@ class Results:
         return folder
 
     def _find_run_name(self, run: str | int | Mapping[str, Any]) -> str:
+        """Return the name of a run, which is given by its name, its row, or the number of its row."""
         if isinstance(run, str):
             return run
         if not isinstance(run, int | np.integer):
@@ -410,6 +411,7 @@ def _read_error(path: Path) -> str:
 
 
 def _format_cell(value: object) -> str:
+    """Format a value of a table for HTML: numbers with four digits, missing values empty."""
     if value is None:
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

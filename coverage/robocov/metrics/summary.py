@@ -82,5 +82,6 @@ def _describe_moved_joins(record: Record) -> list[str]:
 
 
 def _format_point(point: tuple[float, float]) -> str:
+    """Format a point for a note, in meters."""
     x, y = point
     return f"[{x:.4g}, {y:.4g}]"

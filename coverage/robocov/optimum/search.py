@@ -234,6 +234,7 @@ class _Outcome(NamedTuple):
 
 
 def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> None:
+    """Raise ParameterError if a parameter of `find_optimum` is out of range."""
     require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
     require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
     if not (is_number(seed, Integral) and seed >= 0):

@@ -152,7 +152,8 @@ def _improve_sources(
     Its last column does not belong to a source, but to the nearest robot outside the plan. That column is
     always chosen, like the goals of fixed robots.
     """
-    # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
+    # The order does not depend on the robot that plans, so that all robots choose the same of two equally
+    # good plans.
     order = np.lexsort(team.previous_goals.T)
     outside_source = weighted_distances.shape[1] - 1
     improved_sources = improve_sources(
