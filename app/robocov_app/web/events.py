@@ -11,6 +11,8 @@ from pygame.event import Event
 from robocov_app.toolkit.window.clipboard import Clipboard
 
 MIN_PAGE_SIDE_PX = 200
+NARROW_PAGE_PX = 700
+"""Page width below which a page is narrow, in CSS pixels."""
 MAX_PAGE_SIDE_PX = 7680
 MAX_PAGE_PIXELS = 4096 * 2304
 MAX_UPLOAD_BYTES = 1 << 24
@@ -132,6 +134,11 @@ class PageChanged(_Message):
     height: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
     ratio: float = Field(ge=0.25, le=8.0)
     dark: bool
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether the page is that of a phone held upright, for example."""
+        return self.width < NARROW_PAGE_PX * self.ratio
 
 
 class FrameShown(_Message):

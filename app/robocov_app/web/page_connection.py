@@ -43,7 +43,8 @@ class SharedWindow:
     file_executor : Executor
         Runs the reading and writing of files in a thread.
     state : dict
-        State of the window that pages get in addition to its frames: cursor, title, saved files, clipboard.
+        State of the window that pages get in addition to its frames: cursor, title, status, saved files,
+        clipboard.
     uploads : dict
         Modification time of each uploaded file by its name, s since the epoch.
     """
@@ -54,7 +55,7 @@ class SharedWindow:
     folder: Path
     file_executor: Executor
     state: dict[str, Any] = field(
-        default_factory=lambda: {"cursor": "default", "title": "robocov", "saved": ()}
+        default_factory=lambda: {"cursor": "default", "title": "robocov", "saved": (), "status": ""}
     )
     uploads: dict[str, float] = field(default_factory=dict)
 
@@ -172,8 +173,7 @@ class PageConnection:
         if message.width * message.height > events.MAX_PAGE_PIXELS:
             raise ValueError("page too large")
         self._page.settings = message
-        if self._is_controlling:
-            self._shared.window_input.set_page(message)
+        self._shared.window_input.set_page(self._shared.pages.display_settings)
 
     # Files from the page.
 

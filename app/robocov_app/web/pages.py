@@ -220,6 +220,22 @@ class Pages:
             self._on_control_change(previous, page)
         self._update_participants()
 
+    @property
+    def display_settings(self) -> PageChanged | None:
+        """Size and color scheme of the window, which are those of a page; None if none has reported them.
+
+        They are those of the controlling page. A phone, however, does not shrink the window that others see
+        on a projector: while a wide page is open, a narrow one gets a scaled picture.
+        """
+        controlling = self.controlling
+        if controlling is None or controlling.settings is None:
+            return None
+        wide = [page for page in self._pages if page.settings is not None and not page.settings.is_narrow]
+        if not controlling.settings.is_narrow or not wide:
+            return controlling.settings
+        # A page that may control is that of the projector rather than that of a spectator.
+        return min(wide, key=lambda page: (not page.may_control, page.number)).settings
+
     def wake(self) -> None:
         """Wake the senders of all pages, so that they send what has changed."""
         for page in self._pages:

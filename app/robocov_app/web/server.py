@@ -122,6 +122,7 @@ class WebDisplay:
             file_executor=self._file_executor,
         )
         self.saved_files: tuple[str, ...] = ()
+        self._status = ""
         self._files_listed_at = 0.0
         self._created_at = time()
         self._background: set[asyncio.Task[None]] = set()
@@ -152,6 +153,7 @@ class WebDisplay:
 
     def receive(self, window: BaseWindow) -> None:
         """Fit the window to the controlling page, and post that page's input as events."""
+        self._status = window.status_text
         self.shared.window_input.post(window)
 
     def send(self, surface: pygame.Surface, cursor: int = pygame.SYSTEM_CURSOR_ARROW) -> None:
@@ -170,6 +172,7 @@ class WebDisplay:
         state = {
             "cursor": _CSS_CURSORS.get(cursor, "default"),
             "title": next(iter(pygame.display.get_caption()), "robocov"),
+            "status": self._status,
             "saved": self.saved_files,
             "copied": self.clipboard.get()[:MAX_COPIED_CHARACTERS],
         }
@@ -268,13 +271,13 @@ class WebDisplay:
             await PageConnection(page, self.shared).run()
         finally:
             pages.close(page)
+            self.shared.window_input.set_page(pages.display_settings)
             # The delivery can drop the page's base frame.
             self.shared.delivery.has_work.set()
 
     def _handle_control_change(self, previous: Page | None, page: Page | None) -> None:
         """Fit the window to the new controlling page, and release the keys held in the previous one."""
-        if page is not None:
-            self.shared.window_input.set_page(page.settings)
+        self.shared.window_input.set_page(self.shared.pages.display_settings)
         if previous is not None:
             self.shared.window_input.put(events.FocusLost(kind="blur"))
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 MAX_WAITING_MESSAGES = 5000
 """If more messages are waiting, the server stops reading until the window has caught up."""
-NARROW_PAGE_PX = 700
-"""Page width below which the panel is hidden, in CSS pixels."""
 _MIN_WAIT_S = 0.001
 """Lets other threads run even if the window would not wait."""
 
@@ -91,7 +89,7 @@ class WindowInput:
             pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
         theme = "dark" if page.dark else "light"
         # Show or hide the panel only when a page becomes wide or narrow, so that the user's choice is kept.
-        is_narrow = page.width < NARROW_PAGE_PX * page.ratio
+        is_narrow = page.is_narrow
         shows_panel: bool | None = None
         if is_narrow != self._is_narrow:
             shows_panel = not is_narrow

@@ -6,6 +6,7 @@ from importlib.resources import files
 from itertools import count
 from types import SimpleNamespace
 
+from robocov_app.web.events import PageChanged
 from robocov_app.web.files import list_saved
 from robocov_app.web.pages import Pages
 
@@ -29,6 +30,36 @@ def test_a_teacher_who_reloads_the_page_stays_the_first():
     assert open_page(pages, may_control=False).name == "Viewer 4"
 
 
+def report_size(page, width: int, height: int, ratio: float = 1.0) -> None:
+    page.settings = PageChanged(kind="page", width=width, height=height, ratio=ratio, dark=False)
+
+
+def test_a_phone_in_control_does_not_shrink_the_projector():
+    pages = Pages(lambda previous, page: None)
+    projector = open_page(pages, may_control=True)
+    report_size(projector, 1920, 1080)
+    phone = open_page(pages, may_control=False)
+    report_size(phone, 780, 1600, ratio=2.0)
+    pages.give_control(phone)
+    assert pages.display_settings is projector.settings
+    notebook = open_page(pages, may_control=False)
+    report_size(notebook, 1280, 720)
+    pages.give_control(notebook)
+    assert pages.display_settings is notebook.settings, "a wide page has a window of its size"
+    pages.give_control(phone)
+    pages.close(projector)
+    assert pages.display_settings is notebook.settings
+    pages.close(notebook)
+    assert pages.display_settings is phone.settings
+
+
+def test_a_phone_alone_has_a_window_of_its_size():
+    pages = Pages(lambda previous, page: None)
+    phone = open_page(pages, may_control=True)
+    report_size(phone, 390, 800)
+    assert pages.display_settings is phone.settings
+
+
 def test_uploaded_files_are_not_offered_as_saved_until_they_are_saved(tmp_path):
     uploaded = tmp_path / "broken.json"
     uploaded.write_text("{")
@@ -44,4 +75,5 @@ def test_the_page_says_who_asks_for_what_and_nothing_covers_its_messages():
     page = files("robocov_app.web").joinpath("page.html").read_text("utf-8")
     assert "${asking[0].name} asks for control" in page
     assert "${asking.length} ask for control" in page
+    assert "${first.name} asks for control" in page
     assert re.search(r"#note, #notices \{ z-index: 1; \}", page)

@@ -145,6 +145,38 @@ def told_by(browser):
     return lambda: [each for each in browser.js("return kept.splice(0)") if each["kind"] != "shown"]
 
 
+def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_path):
+    sized(browser, 1280, 720)
+    with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        assert not browser.find("#toast").is_displayed()
+        projector = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window("tab")
+        sized(browser, 390, 844, 2.0)
+        browser.driver.get(link)
+        browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
+        browser.js("tell({kind: 'control', to: 0})")
+        phone = browser.driver.current_window_handle
+        browser.driver.switch_to.window(projector)
+        browser.until(lambda: browser.find("#toast").is_displayed())
+        assert "asks for control" in browser.find("#toast").text
+        later, hand_over = browser.all("#toast button")[1], browser.all("#toast button")[0]
+        assert (hand_over.text, later.text) == ("Hand over", "Later")
+        hand_over.click()
+        browser.until(lambda: browser.js("return document.body.className") == "watching")
+        assert not browser.find("#toast").is_displayed()
+        browser.driver.switch_to.window(phone)
+        browser.until(lambda: browser.js("return document.body.className") == "")
+        assert canvas_size(browser) == [1280, 720], "the projector keeps its size"
+        assert browser.js("return canvas.getBoundingClientRect().width") <= 390
+        browser.keys("w")
+        browser.until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
+        browser.driver.close()
+        browser.driver.switch_to.window(projector)
+        assert not browser.complaints()
+
+
 def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(browser, tmp_path):
     sized(browser, 900, 600)
     with (

@@ -114,6 +114,11 @@ class CommandWindow(BaseWindow):
         self.scale = scale
         self.is_help_open = False
 
+    @property
+    def status_text(self) -> str:
+        """The status message."""
+        return self.model.message
+
     # Commands
 
     def do(self, name: str) -> None:

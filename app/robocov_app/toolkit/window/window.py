@@ -127,6 +127,11 @@ class BaseWindow:
         """Return a value that changes whenever the frame must be redrawn; None while something moves."""
         return None
 
+    @property
+    def status_text(self) -> str:
+        """What a screen reader announces when it changes."""
+        return ""
+
     def close(self) -> None:
         """Stop threads and processes that the window has started."""
 

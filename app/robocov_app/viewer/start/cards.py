@@ -60,17 +60,17 @@ class StartCard:
 START_CARDS = (
     StartCard(
         StartChoice("Rooms", options={"map": "rooms"}),
-        "Six robots spread through a building that they do not know.",
+        "Six robots explore a building that they do not know.",
         ("rooms",),
     ),
     StartCard(
         StartChoice("The trap", options={"map": "trap"}),
-        "A wall in the shape of a U. Who gets stuck, and why?",
+        "A U-shaped wall. Which robots get stuck, and why?",
         ("trap",),
     ),
     StartCard(
         StartChoice("City with 50 robots", options={"map": "city", "robots": 50, "start": "uniform"}),
-        "Fifty robots share the streets between blocks of houses.",
+        "Fifty robots share the streets of a city.",
         ("city",),
     ),
     StartCard(
@@ -78,17 +78,17 @@ START_CARDS = (
             "Compare three controllers",
             options={"map": "blocks-a", "controllers": ("rapf", "rpf", "lloyd")},
         ),
-        "From the same starting positions: which of them covers the map best?",
+        "Same starting positions. Which one covers best?",
         ("compare-rapf", "compare-rpf", "compare-lloyd"),
         ("RAPF", "RPF", "Lloyd"),
     ),
     StartCard(
         StartChoice("Draw your own", Target.EDITOR),
-        "Draw walls and rooms, then let robots cover them.",
+        "Draw a map, then let robots cover it.",
     ),
     StartCard(
         StartChoice("Lesson 1", Target.LESSON),
-        "What holds robots back, and what helps: eleven short chapters.",
+        "What holds robots back? Eleven short chapters.",
         ("lesson",),
     ),
 )

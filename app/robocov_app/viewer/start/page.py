@@ -56,6 +56,7 @@ _TITLE_PX = 22
 _TAGLINE_PX = 13
 _HEADING_PX = 12
 _CARD_TITLE_PX = 14
+_SMALL_CARD_TITLE_PX = 12
 _CARD_TEXT_PX = 12
 _CARD_LINE_PX = 16
 _NAME_PX = 11
@@ -447,21 +448,32 @@ class StartPage(BaseWindow):
         inner = box.inflate(-2 * padding, -2 * padding)
         picture = Rect(inner.left, inner.top, inner.width, inner.height - text_height)
         self._draw_previews(card, picture)
+        self._draw_badge(number, inner, is_focused=is_focused)
         y = picture.bottom + round(8 * scale)
-        badge = Rect(inner.left, y, round(18 * scale), round(18 * scale))
+        size = self._choose_title_size(card.choice.title, inner.width)
+        title = shorten_to_width(card.choice.title, round(size * scale), inner.width, True)
+        self._write(title, (inner.left, y), size, theme.ink, bold=True)
+        lines = wrap_text(card.text, round(_CARD_TEXT_PX * scale), inner.width)[:2]
+        for k, line in enumerate(lines):
+            y_line = y + (24 + _CARD_LINE_PX * k) * scale
+            self._write(line, (inner.left, y_line), _CARD_TEXT_PX, mix(theme.background, theme.ink, 0.72))
+
+    def _choose_title_size(self, title: str, width: float) -> float:
+        """Return the size of a title at scale 1, px: smaller if it would not fit into a width."""
+        if measure_text(title, round(_CARD_TITLE_PX * self._layout.scale), True) <= width:
+            return _CARD_TITLE_PX
+        return _SMALL_CARD_TITLE_PX
+
+    def _draw_badge(self, number: int, box: Rect, *, is_focused: bool) -> None:
+        """Draw the key of a card in the upper left corner of a box."""
+        theme = self.theme
+        scale = self._layout.scale
+        badge = Rect(box.left, box.top, round(18 * scale), round(18 * scale))
         fill = theme.accent if is_focused else mix(theme.background, theme.ink, 0.1)
         color = get_accent_ink(theme) if is_focused else theme.ink
         draw_rounded_box(self.screen, badge, fill, edge=fill, radius=round(5 * scale))
         digit = render_text(str(number), round(_NAME_PX * scale), color, True)
         self.screen.blit(digit, digit.get_rect(center=badge.center))
-        title = shorten_to_width(
-            card.choice.title, round(_CARD_TITLE_PX * scale), inner.width - 26 * scale, True
-        )
-        self._write(title, (badge.right + 8 * scale, y), _CARD_TITLE_PX, theme.ink, bold=True)
-        lines = wrap_text(card.text, round(_CARD_TEXT_PX * scale), inner.width)[:2]
-        for k, line in enumerate(lines):
-            y_line = y + (24 + _CARD_LINE_PX * k) * scale
-            self._write(line, (inner.left, y_line), _CARD_TEXT_PX, mix(theme.background, theme.ink, 0.72))
 
     def _draw_previews(self, card: StartCard, box: Rect) -> None:
         """Draw the recorded runs of a card side by side, or the drawing of a map."""
