@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,8 +18,7 @@ Color: TypeAlias = tuple[int, int, int]
 Role: TypeAlias = Literal["free", "solid", "ignore"]
 ROLES: tuple[Role, ...] = ("free", "solid", "ignore")
 WHITE: Color = (255, 255, 255)
-NO_ROLE = 0
-"""Code of pixels without a role. The code of a role is its index in `ROLES` plus one."""
+
 PICTURE_TOLERANCE = 24.0
 """Tolerance of a picture, in levels (0 to 255): JPEG compression and soft edges change colors this much."""
 MAX_DARK_LUMINANCE = 0.5
@@ -33,6 +33,23 @@ _MAX_LISTED_COLORS = 6
 _MAX_NAME_CHARACTERS = 100
 _FUNCTION = re.compile(r"rgba?\(([^()]*)\)", re.IGNORECASE)
 _NUMBER = re.compile(r"\+?(\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(%?)", re.ASCII)
+
+
+class RoleCode(IntEnum):
+    """Codes of roles in arrays of pixels."""
+
+    NONE = 0
+    FREE = 1
+    SOLID = 2
+    IGNORE = 3
+
+
+ROLE_CODES: dict[Role, RoleCode] = {
+    "free": RoleCode.FREE,
+    "solid": RoleCode.SOLID,
+    "ignore": RoleCode.IGNORE,
+}
+_ROLES_BY_CODE = {code: role for role, code in ROLE_CODES.items()}
 
 
 @dataclass(frozen=True)
@@ -81,8 +98,8 @@ class ColorKey:
         if color is None or not self.entries:
             return None
         # A picture of one pixel.
-        code = int(self.classify(np.array([[color]], dtype=np.uint8))[0, 0])
-        return None if code == NO_ROLE else ROLES[code - 1]
+        code = RoleCode(self.classify(np.array([[color]], dtype=np.uint8))[0, 0])
+        return _ROLES_BY_CODE.get(code)
 
     def find_nearest(self, color: Color) -> Color | None:
         """Return the nearest declared color of any role, or None if no color is within the tolerance."""
@@ -105,9 +122,9 @@ class ColorKey:
         Returns
         -------
         roles : (rows, columns) array of uint8
-            `NO_ROLE`, or the index in `ROLES` plus one.
+            A `RoleCode` for each pixel.
         """
-        roles = np.full(pixels.shape[:2], NO_ROLE, dtype=np.uint8)
+        roles = np.full(pixels.shape[:2], RoleCode.NONE, dtype=np.uint8)
         nearest = np.full(pixels.shape[:2], 256, dtype=np.int16)  # more than any difference of levels
         for color, role in self.entries:
             difference = np.zeros(pixels.shape[:2], dtype=np.int16)
@@ -115,7 +132,7 @@ class ColorKey:
                 levels = pixels[:, :, channel].astype(np.int16)
                 np.maximum(difference, abs(levels - color[channel]), out=difference)
             closer = (difference < nearest) & (difference <= self.tolerance)
-            roles[closer] = ROLES.index(role) + 1
+            roles[closer] = ROLE_CODES[role]
             nearest[closer] = difference[closer]
         return roles
 

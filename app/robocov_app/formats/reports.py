@@ -107,6 +107,12 @@ class ImportReport(_Report):
             f"{self.format}: {self.vertices_read} vertices read, {self.vertices_kept} kept; "
             f"free area {area_read} read, {area_kept} kept",
             f"{width:.4g} x {height:.4g} m, {format_count(self.obstacles, 'obstacle')}",
+            *self.format_remarks(),
+        ]
+
+    def format_remarks(self) -> list[str]:
+        """Return the repairs, losses, changes and notes, one line each."""
+        return [
             *_label_lines("repaired", self.repaired),
             *_label_lines("dropped", self.dropped),
             *_label_lines("changed", self.changed),

@@ -165,8 +165,8 @@ def test_shapes_are_selected_by_name() -> None:
 def test_omissions_and_repairs_are_reported() -> None:
     collected = collect_shapes(HALL, [[0, 0], [1, 0], [2, 0]], lines=[[[1, 1], [1, 1]]])
     collected.omissions.add_heights(np.array([np.nan, 2.0, 3.5]))
-    collected.leave_out("text", count=2)
-    collected.leave_out("empty geometry", count=2)
+    collected.count_omission("text", count=2)
+    collected.count_omission("empty geometry", count=2)
     collected.repairs.counts["ring", "closed"] += 2
     foreign = build_map(collected)
     assert foreign.dropped == (
@@ -181,7 +181,7 @@ def test_omissions_and_repairs_are_reported() -> None:
         MapError, match=r"no closed outline and no line \(1 text left out\), expected a drawing"
     ):
         empty = collect_shapes()
-        empty.leave_out("text")
+        empty.count_omission("text")
         build_map(empty)
 
 

@@ -32,7 +32,7 @@ def read(folder: Path, data: bytes) -> Brightness:
 
 
 def shade(picture: Brightness) -> np.ndarray:
-    return picture.level / picture.full
+    return picture.level / picture.max_level
 
 
 def test_pgm_of_8_and_16_bits_is_read(tmp_path: Path) -> None:
@@ -92,12 +92,12 @@ def test_png_of_every_depth_and_color_is_read(tmp_path: Path) -> None:
 def test_colors_are_averaged_and_alpha_is_separate(tmp_path: Path) -> None:
     colors = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
     picture = read(tmp_path, png(Image.fromarray(colors)))
-    assert picture.full == 765
+    assert picture.max_level == 765
     assert picture.level.tolist() == [[255, 255, 60]]
     assert picture.alpha is not None
     assert picture.alpha.tolist() == [[255, 128, 0]]
     gray = read(tmp_path, png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
-    assert (gray.full, gray.level.tolist()) == (255, [[7, 9]])
+    assert (gray.max_level, gray.level.tolist()) == (255, [[7, 9]])
     assert gray.alpha is not None and gray.alpha.tolist() == [[255, 3]]
     deep = b"\0" + struct.pack(">8H", 65535, 0, 0, 65535, 257, 514, 771, 0)
     picture = read(tmp_path, raw_png(2, 1, 16, 6, deep))

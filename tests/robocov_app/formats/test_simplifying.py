@@ -210,7 +210,7 @@ def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> No
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
     # without any tolerance the very same outline comes back, necks and all
-    back = outline.to_polygons(outline.restore_necks(outline.draw(everything, nothing)))
+    back = outline.to_polygons(outline.restore_necks(outline.simplify_outline(everything, nothing)))
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
 
@@ -219,7 +219,7 @@ def test_required_vertices_are_kept() -> None:
     outline = OriginalOutline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
     fixed = np.zeros(100, dtype=bool)
     fixed[[7, 33, 90]] = True
-    source = set(outline.draw(np.full(100, 0.5), fixed).source)
+    source = set(outline.simplify_outline(np.full(100, 0.5), fixed).source)
     assert {7.0, 33.0, 90.0} <= source
     assert len(source) <= 12
 

@@ -62,7 +62,7 @@ def test_unsupported_rules_are_counted() -> None:
         "@supports (x:y) {rect{fill:none}} g > rect {fill:none} rect:hover{fill:none} rect{fill:red}"
     )
     assert rules.get_properties(element())["fill"] == "red"
-    assert rules.unsupported == 4
+    assert rules.unsupported_count == 4
 
 
 def test_unfinished_rules_are_left_out() -> None:

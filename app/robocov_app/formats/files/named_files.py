@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 
 from robocov.errors import MapError, quote
-from robocov_app.formats.files.reading import read_head
+from robocov_app.formats.files.reading import require_regular_file
 
 MAX_INCLUDED_FILES = 200
 """Largest number of files that a map may include. A file that is read twice counts twice."""
@@ -30,13 +30,13 @@ class IncludeBudget:
         self.files_read = 0
         self.bytes_read = 0
 
-    def take(self, path: Path, at: str) -> None:
+    def count_file(self, path: Path, place: str) -> None:
         """Count a file that is about to be read.
 
         Parameters
         ----------
         path : Path
-        at : str
+        place : str
             Place where the file is named, for messages.
 
         Raises
@@ -44,20 +44,19 @@ class IncludeBudget:
         MapError
             If the map includes too many files or too many bytes, or the file cannot be read.
         """
-        # Reading no bytes raises the error for a file that is missing or not a regular file.
-        read_head(path, 0)
+        require_regular_file(path)
         self.files_read += 1
         self.bytes_read += path.stat().st_size
         if self.files_read > self.max_files:
             expected = f"expected at most {self.max_files} (a file read twice counts twice)"
-            raise MapError(f"{at}: included files: {expected}, got more")
+            raise MapError(f"{place}: included files: {expected}, got more")
         if self.bytes_read > self.max_bytes:
             expected = f"expected at most {self.max_bytes / 1e6:g} MB in total"
-            raise MapError(f"{at}: included files: {expected}, got more")
+            raise MapError(f"{place}: included files: {expected}, got more")
 
 
 def find_named_file(
-    path: Path, name: str, kind: str, *, at: str, notes: list[str], allow_anywhere: bool
+    path: Path, name: str, kind: str, *, place: str, notes: list[str], allow_anywhere: bool
 ) -> Path:
     """Return the path of a file that is named in another file.
 
@@ -72,7 +71,7 @@ def find_named_file(
         Name, relative to the folder of `path`.
     kind : str
         Kind of the file, such as "picture", for messages.
-    at : str
+    place : str
         Place of the name, for messages.
     notes : list of str
         Notes of the import. One is appended if the file next to `path` is used instead.
@@ -85,9 +84,9 @@ def find_named_file(
         If the name is empty, too long or invalid, or if the file must be in the folder but is not.
     """
     if not name:
-        raise MapError(f"{at}: empty, expected the name of a {kind}")
+        raise MapError(f"{place}: empty, expected the name of a {kind}")
     if len(name) > _MAX_PATH_CHARACTERS:
-        raise MapError(f"{at}: {quote(name)}: expected a shorter name, got {len(name)} characters")
+        raise MapError(f"{place}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
     # PureWindowsPath separates folders at both kinds of slashes.
     neighbor = path.parent / PureWindowsPath(name).name
@@ -95,16 +94,16 @@ def find_named_file(
         is_allowed = allow_anywhere or _is_inside(named, path.parent)
         is_usable = is_allowed and _exists(named)
         if not is_usable and neighbor.is_file() and _is_inside(neighbor, path.parent):
-            key = at.rpartition(": ")[2]
+            key = place.rpartition(": ")[2]
             note = f"{key}: {quote(name)} not found, used {quote(neighbor.name)} next to the file"
             if note not in notes:
                 notes.append(note)
             return neighbor
     except (OSError, ValueError, RuntimeError) as error:
-        raise MapError(f"{at}: {quote(name)}: {_describe_name_error(error)}") from None
+        raise MapError(f"{place}: {quote(name)}: {_describe_name_error(error)}") from None
     if not is_allowed:
         expected = f"expected a {kind} in it (--anywhere allows it)"
-        raise MapError(f"{at}: {quote(name)} is outside the folder of the file, {expected}")
+        raise MapError(f"{place}: {quote(name)} is outside the folder of the file, {expected}")
     return named
 
 

@@ -46,6 +46,11 @@ def read_head(path: Path, maximum: int = HEAD_BYTES) -> bytes:
         raise MapError(f"{where}: cannot be read: {describe_error(error)}") from None
 
 
+def require_regular_file(path: Path) -> None:
+    """Raise MapError if there is no regular file at a path, or it cannot be read."""
+    read_head(path, 0)
+
+
 def read_content(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
     """Return the content of a file.
 
@@ -60,8 +65,7 @@ def read_content(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
     MapError
         If the file is larger, or if it cannot be read.
     """
-    # Reading no bytes raises the error for a file that is missing or not a regular file.
-    read_head(path, 0)
+    require_regular_file(path)
     if path.stat().st_size <= maximum:
         # The file may have grown since: one byte more shows whether it has.
         content = read_head(path, maximum + 1)

@@ -90,14 +90,14 @@ class Element:
         text = self.attributes.get(name, default)
         expected = f"expected {_describe_count(count)} within 1e7"
         if text is None:
-            self.refuse(f"{name}: missing, {expected}")
+            self.raise_error(f"{name}: missing, {expected}")
         values = np.array([parse_number(word) for word in text.replace(",", " ").split()])
         has_right_count = count is None or count == len(values)
         if not has_right_count or not (np.abs(values) <= MAX_COORDINATE_M).all():
-            self.refuse(f"{name}: {expected}, got {quote(text)}")
+            self.raise_error(f"{name}: {expected}, got {quote(text)}")
         return values
 
-    def refuse(self, problem: str) -> NoReturn:
+    def raise_error(self, problem: str) -> NoReturn:
         """Raise a MapError with the file, the line and the name of the element."""
         name = self.attributes.get("id")
         label = f"<{self.tag}>" if name is None else f"<{self.tag}> {quote(name)}"
@@ -209,30 +209,30 @@ class _Reader:
         """Count characters, because entities and default attributes can expand to more than the file has."""
         self.remaining_characters -= count
         if self.remaining_characters < 0:
-            self._refuse("entities that expand to too much text")
+            self._raise_error("entities that expand to too much text")
 
     def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
         """Check a declared entity: it may be short text, which expat inserts at every reference."""
         self._count_declaration()
         entity = f"an entity {quote(name)}"
         if value is None:
-            self._refuse(f"{entity} that refers to another file ({quote(rest[1])})")
+            self._raise_error(f"{entity} that refers to another file ({quote(rest[1])})")
         if is_parameter or "&" in value or "%" in value:
-            self._refuse(f"{entity} that refers to other entities")
+            self._raise_error(f"{entity} that refers to other entities")
         if len(value) * self.reference_count > _MAX_EXPANDED_CHARACTERS:
-            self._refuse(f"{entity} that expands to too much text")
+            self._raise_error(f"{entity} that expands to too much text")
 
     def _count_declaration(self, *_: object) -> None:
         """Count declared entities and attributes, because expat searches all of them at each use."""
         self.declaration_count += 1
         if self.declaration_count > _MAX_DECLARATIONS:
-            self._refuse(f"more than {_MAX_DECLARATIONS} declarations")
+            self._raise_error(f"more than {_MAX_DECLARATIONS} declarations")
 
     def _check_namespace(self, prefix: str | None, name: str | None) -> None:
         """Check the length of a namespace, which expat prepends to every name in it."""
         if name is not None and len(name) > _MAX_NAMESPACE_CHARACTERS:
-            self._refuse(f"a namespace of {len(name)} characters")
+            self._raise_error(f"a namespace of {len(name)} characters")
 
-    def _refuse(self, problem: str) -> NoReturn:
+    def _raise_error(self, problem: str) -> NoReturn:
         line = self.parser.CurrentLineNumber
         raise MapError(f"{self.where}:{line}: expected plain {self.kind}, got {problem}")

@@ -25,7 +25,7 @@ from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometr
 from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area
 from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_default_snap
 
-Role: TypeAlias = Literal["open", "walled", "solid", "wall", "opening", "post"]
+Role: TypeAlias = Literal["open", "room", "solid", "wall", "opening", "post"]
 DEFAULT_DOOR_WIDTH_M = 0.9
 OPENING_REACH_M = 0.4
 """Distance to which an opening joins spaces and cuts walls on each side of its line."""
@@ -162,14 +162,14 @@ def _collect_spaces(elements: Sequence[FloorElement], shapes: Shapes) -> _Spaces
     """Return the spaces among the elements of a floor; those without an area are counted as left out."""
     spaces = _Spaces()
     for element in elements:
-        if element.role not in ("open", "walled"):
+        if element.role not in ("open", "room"):
             continue
         area = _compute_area(element.geometry, shapes)
         if area.is_empty:
-            shapes.leave_out("space", "without an area")
+            shapes.count_omission("space", "without an area")
             continue
         spaces.areas.append(area)
-        if element.role == "walled":
+        if element.role == "room":
             spaces.walled += 1
             spaces.outlines += _get_rings(area)
     return spaces
@@ -211,7 +211,7 @@ def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes)
     for gap in gaps:
         neighbors = [floor.geoms[k] for k in tree.query(gap, predicate="intersects").tolist()]
         if not neighbors:
-            shapes.leave_out("opening", "that adjoins no space")
+            shapes.count_omission("opening", "that adjoins no space")
             continue
         free_area = to_multipolygon(shapely.intersection(shapely.MultiPolygon(neighbors), gap))
         # Several parts: the file leaves a gap for the wall, which the passage bridges.
@@ -239,8 +239,8 @@ def _add_obstacles(shapes: Shapes, elements: Sequence[FloorElement], floor: Mult
     for element in elements:
         geometry = element.geometry
         if element.role == "post":
-            shapes.add_point(geometry.rings[0][0], geometry.labels, at=geometry.at)
+            shapes.add_point(geometry.rings[0][0], geometry.labels, place=geometry.place)
         elif element.role == "solid":
             area = _compute_area(geometry, shapes)
             if not area.is_empty and shapely.relate_pattern(floor, area, _INTERIORS_INTERSECT):
-                shapes.add_outline(geometry.rings, geometry.labels, rule=geometry.rule, at=geometry.at)
+                shapes.add_outline(geometry.rings, geometry.labels, rule=geometry.rule, place=geometry.place)

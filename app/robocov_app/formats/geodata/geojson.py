@@ -177,45 +177,45 @@ class GeometryCollector:
         for k, text in enumerate(self.file.document):
             self._add_text(text, (k,))
 
-    def _add_text(self, text: Any, at: JsonPath) -> None:
+    def _add_text(self, text: Any, place: JsonPath) -> None:
         """Add a GeoJSON text: a geometry, a feature or a collection of features."""
         kind = files.get_member(text, "type")
         if kind == "FeatureCollection":
             features = text.get("features")
             if not isinstance(features, list):
-                raise self.file.build_error((*at, "features"), features, "a list of features")
-            self._store_reference_system(text, at)
+                raise self.file.build_error((*place, "features"), features, "a list of features")
+            self._store_reference_system(text, place)
             for k, feature in enumerate(features):
-                self._add_feature(feature, (*at, "features", k))
+                self._add_feature(feature, (*place, "features", k))
         elif kind == "Feature":
-            self._add_feature(text, at)
+            self._add_feature(text, place)
         elif kind == "Topology":
-            raise self.file.build_error((*at, "type"), kind, "GeoJSON, not TopoJSON")
+            raise self.file.build_error((*place, "type"), kind, "GeoJSON, not TopoJSON")
         else:
-            self.add_geometry(text, at, ())
+            self.add_geometry(text, place, ())
 
-    def _add_feature(self, feature: Any, at: JsonPath) -> None:
+    def _add_feature(self, feature: Any, place: JsonPath) -> None:
         """Add the geometry of a feature; a feature without one is counted as left out."""
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise self.file.build_error(at, feature, "a Feature")
-        self._store_reference_system(feature, at)
+            raise self.file.build_error(place, feature, "a Feature")
+        self._store_reference_system(feature, place)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise self.file.build_error((*at, "properties"), properties, "an object")
+            raise self.file.build_error((*place, "properties"), properties, "an object")
         if feature.get("geometry") is None:
-            self.shapes.leave_out("feature", "without a geometry")
+            self.shapes.count_omission("feature", "without a geometry")
             return
         labels = _list_labels(properties, feature.get("id"))
-        self.add_geometry(feature["geometry"], (*at, "geometry"), labels)
+        self.add_geometry(feature["geometry"], (*place, "geometry"), labels)
 
-    def add_geometry(self, geometry: Any, at: JsonPath, labels: tuple[str, ...]) -> None:
+    def add_geometry(self, geometry: Any, place: JsonPath, labels: tuple[str, ...]) -> None:
         """Add a geometry, or each geometry of a collection.
 
         Parameters
         ----------
         geometry : object
             A geometry as parsed from JSON.
-        at : JsonPath
+        place : JsonPath
             Keys and indices that lead to the geometry.
         labels : tuple of str
             Names of the shapes that it becomes.
@@ -228,50 +228,52 @@ class GeometryCollector:
         kind = files.get_member(geometry, "type")
         expected = f"one of {', '.join(_GEOMETRIES)}"
         if kind is None:
-            raise self.file.build_error(at, geometry, expected)
+            raise self.file.build_error(place, geometry, expected)
         if kind not in _GEOMETRIES:
-            raise self.file.build_error((*at, "type"), kind, expected)
-        self._store_reference_system(geometry, at)
+            raise self.file.build_error((*place, "type"), kind, expected)
+        self._store_reference_system(geometry, place)
         if kind != "GeometryCollection":
-            self._add_coordinates(kind, geometry.get("coordinates"), (*at, "coordinates"), labels)
+            self._add_coordinates(kind, geometry.get("coordinates"), (*place, "coordinates"), labels)
             return
         members = geometry.get("geometries")
         if not isinstance(members, list):
-            raise self.file.build_error((*at, "geometries"), members, "a list of geometries")
+            raise self.file.build_error((*place, "geometries"), members, "a list of geometries")
         for k, member in enumerate(members):
-            self.add_geometry(member, (*at, "geometries", k), labels)
+            self.add_geometry(member, (*place, "geometries", k), labels)
 
     def _add_coordinates(
-        self, kind: str, value: Any, at: JsonPath, labels: tuple[str, ...], whole: str = ""
+        self, kind: str, value: Any, place: JsonPath, labels: tuple[str, ...], parent_place: str = ""
     ) -> None:
         """Add the coordinates of a geometry.
 
-        For a part of a multipolygon, `whole` is the place of the multipolygon in the file.
+        For a part of a multipolygon, `parent_place` is the place of the multipolygon in the file.
         """
         if kind in _PLURAL:
             if not isinstance(value, list):
-                raise self.file.build_error(at, value, "a list")
+                raise self.file.build_error(place, value, "a list")
             for k, member in enumerate(value):
-                self._add_coordinates(_PLURAL[kind], member, (*at, k), labels, whole=format_path(at))
+                self._add_coordinates(
+                    _PLURAL[kind], member, (*place, k), labels, parent_place=format_path(place)
+                )
         elif value == []:
-            self.shapes.leave_out("geometry", "without coordinates")
+            self.shapes.count_omission("geometry", "without coordinates")
         elif kind == "Point":
-            point = self._parse_points([value], at, 1)
-            self.geometries.append(SourceGeometry("point", (point,), labels, format_path(at)))
+            point = self._parse_points([value], place, 1)
+            self.geometries.append(SourceGeometry("point", (point,), labels, format_path(place)))
         elif kind == "LineString":
-            line = self._parse_points(value, at, 2)
-            self.geometries.append(SourceGeometry("line", (line,), labels, format_path(at)))
+            line = self._parse_points(value, place, 2)
+            self.geometries.append(SourceGeometry("line", (line,), labels, format_path(place)))
         elif not isinstance(value, list):
-            raise self.file.build_error(at, value, "a list of rings")
+            raise self.file.build_error(place, value, "a list of rings")
         else:
-            rings = [self._parse_points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            self.geometries.append(self.shapes.build_polygon(rings, labels, format_path(at), whole))
+            rings = [self._parse_points(ring, (*place, k), 1) for k, ring in enumerate(value)]
+            self.geometries.append(self.shapes.build_polygon(rings, labels, format_path(place), parent_place))
 
-    def _parse_points(self, value: Any, at: JsonPath, min_count: int) -> Array:
-        points = self.file.parse_points(value, at, min_count=min_count, min_dimensions=2, max_dimensions=4)
+    def _parse_points(self, value: Any, place: JsonPath, min_count: int) -> Array:
+        points = self.file.parse_points(value, place, min_count=min_count, min_dimensions=2, max_dimensions=4)
         return self.shapes.drop_heights(points)
 
-    def _store_reference_system(self, member: dict[str, Any], at: JsonPath) -> None:
+    def _store_reference_system(self, member: dict[str, Any], place: JsonPath) -> None:
         """Store the coordinate reference system that an object names (GeoJSON before RFC 7946).
 
         Raise MapError if it differs from the one of an earlier object.
@@ -281,9 +283,9 @@ class GeometryCollector:
             return
         name = files.get_member(files.get_member(value, "properties"), "name")
         if not isinstance(name, str):
-            raise self.file.build_error((*at, "crs"), value, "the name of a reference system")
+            raise self.file.build_error((*place, "crs"), value, "the name of a reference system")
         if self.crs not in (None, name):
-            raise self.file.build_error((*at, "crs"), value, f"the same system as before, {self.crs}")
+            raise self.file.build_error((*place, "crs"), value, f"the same system as before, {self.crs}")
         self.crs = name
 
 

@@ -118,26 +118,26 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     level_ids = {level_id for level_id, level in levels.items() if level.ordinal == floor}
     roles: list[Role] = []
     geometries: list[SourceGeometry] = []
-    without_floor = 0
+    undrivable_count = 0
     for name in ("unit", "fixture", "kiosk", "opening"):
         for k, feature in enumerate(archive.list_features(name)):
             if _get_level_id(feature) not in level_ids:
                 continue
             if name == "unit" and _get_category(feature) in _NO_FLOOR:
-                without_floor += 1
+                undrivable_count += 1
             for geometry in _collect_geometries(archive.files[name], k, feature, shapes):
                 role = _choose_role(name, feature, geometry)
                 if role is None:
-                    shapes.leave_out(name, "without an area")
+                    shapes.count_omission(name, "without an area")
                     continue
                 roles.append(role)
                 if role == "opening":
                     # `build_floor` requires openings that are straight lines of two points.
                     geometry = _straighten(geometry)
                 geometries.append(geometry)
-    if without_floor:
+    if undrivable_count:
         note = "stairs, lifts and openings to the floor below treated as solid"
-        shapes.notes.append(f"{note}: {without_floor}")
+        shapes.notes.append(f"{note}: {undrivable_count}")
     geometries = convert_to_meters(geometries, shapes, DEGREES)
     elements = [FloorElement(role, geometry) for role, geometry in zip(roles, geometries, strict=True)]
     map_name = _get_venue_name(archive) or files.get_map_name(path)
@@ -166,7 +166,7 @@ def _choose_role(name: str, feature: dict[str, Any], geometry: SourceGeometry) -
         return "solid"
     if category in _OPEN:
         return "open"
-    return "walled"
+    return "room"
 
 
 def _read_folder(path: Path) -> dict[str, bytes]:
@@ -230,8 +230,8 @@ def _parse_levels(archive: _Archive) -> dict[str, _Level]:
         if not isinstance(identifier, str):
             raise file.build_error(("features", k, "id"), identifier, "a string")
         if not is_number(ordinal):
-            at = ("features", k, "properties", "ordinal")
-            raise file.build_error(at, ordinal, "the number of a floor")
+            place = ("features", k, "properties", "ordinal")
+            raise file.build_error(place, ordinal, "the number of a floor")
         short_names = _list_names(properties.get("short_name"))
         names = (identifier, *short_names, *_list_names(properties.get("name")))
         levels[identifier] = _Level(float(ordinal), names)
@@ -317,15 +317,15 @@ def _collect_geometries(
     if isinstance(category, str) and category.strip():
         labels.append(to_one_line(category).strip()[:_MAX_LABEL_CHARACTERS])
     if feature.get("geometry") is None:
-        shapes.leave_out("feature", "without a geometry")
+        shapes.count_omission("feature", "without a geometry")
         return []
     collector = GeometryCollector(file, shapes)
-    at = ("features", index, "geometry")
-    collector.add_geometry(feature["geometry"], at, tuple(dict.fromkeys(labels)))
+    place = ("features", index, "geometry")
+    collector.add_geometry(feature["geometry"], place, tuple(dict.fromkeys(labels)))
     return collector.geometries
 
 
 def _straighten(geometry: SourceGeometry) -> SourceGeometry:
     """Return the straight line from the first point of an opening to the last."""
     line = geometry.rings[0]
-    return SourceGeometry("line", (line[[0, -1]],), geometry.labels, geometry.at)
+    return SourceGeometry("line", (line[[0, -1]],), geometry.labels, geometry.place)

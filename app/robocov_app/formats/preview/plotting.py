@@ -38,6 +38,19 @@ _AREA_ORDER = 2
 """Drawing order of areas: above the ground."""
 _MARK_ORDER = 5
 """Drawing order of positions and of the narrowest passage: above everything else."""
+_TITLE_Y_PX = 24
+_SUBTITLE_Y_PX = 44
+"""Baselines of the title and of the line below it, from the top of the page at scale 1."""
+_CAPTION_OFFSET_PX = 14
+"""Distance of a caption from the arena below it, at scale 1."""
+_LAST_LINE_OFFSET_PX = 16
+"""Distance of the last line from the bottom of the page, at scale 1."""
+_POSITION_MARK_PT = 8.0
+_POSITION_TEXT_OFFSET_PT = 6
+_TEXT_HALO_PT = 3.0
+_PASSAGE_WIDTH_PT = 2.0
+_PASSAGE_HALO_PT = 4.2
+_PASSAGE_RING_WIDTH_PT = 1.8
 _PASSAGE_RING_PT = 20.0
 """Diameter of the ring around the narrowest passage if it is too small to be seen."""
 _MIN_GROUPED_NUMBER = 9999.5
@@ -95,8 +108,8 @@ def plot_import(
     )
     with plain_style():
         handles = _build_handles(environment, theme, comparison)
-        # The first two lines of the report are in the title and the captions.
-        layout = lay_out_page(theme, aspect, captions, handles, report.format_lines()[2:])
+        # The facts of the report are in the title and the captions.
+        layout = lay_out_page(theme, aspect, captions, handles, report.format_remarks())
         _write_title(layout, environment, report)
         for panel, caption in zip(layout.panels, captions, strict=True):
             _write_caption(layout.page, caption, panel.box[0], panel.box[1], panel.caption_width)
@@ -123,15 +136,17 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
     page = layout.page
     left = _get_left(layout)
     max_width = page.size[0] - left - page.margin
-    page.write(environment.name, left, 24 * page.scale, points=HEADING, bold=True, max_width=max_width)
+    page.write(
+        environment.name, left, _TITLE_Y_PX * page.scale, points=HEADING, bold=True, max_width=max_width
+    )
     width, height = report.size
     facts = f"{width:.4g} x {height:.4g} m, imported from {report.format}"
-    page.write(facts, left, 44 * page.scale, color=page.theme.faint, max_width=max_width)
+    page.write(facts, left, _SUBTITLE_Y_PX * page.scale, color=page.theme.faint, max_width=max_width)
 
 
 def _write_caption(page: FigurePage, caption: Caption, left: float, top: float, width: float) -> None:
     """Write a caption above the arena whose left and top edges are given, px."""
-    y = top - 14 * page.scale
+    y = top - _CAPTION_OFFSET_PX * page.scale
     page.write(caption.name, left, y, points=TITLE, bold=True)
     indent = measure_caption_indent(page, caption.name)
     page.write(caption.facts, left + indent, y, color=page.theme.faint, max_width=width - indent)
@@ -142,7 +157,7 @@ def _write_lines(layout: ImportPage) -> None:
     page = layout.page
     left = _get_left(layout)
     for k, line in enumerate(reversed(layout.lines)):
-        y = page.size[1] - (LINE_HEIGHT_PX * k + 16) * page.scale
+        y = page.size[1] - (LINE_HEIGHT_PX * k + _LAST_LINE_OFFSET_PX) * page.scale
         page.write(line, left, y, points=SMALL, color=page.theme.faint)
 
 
@@ -162,13 +177,21 @@ def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport,
     axes.add_collection(edges, autolim=False)
     _draw_area(axes, comparison.lost, theme.trajectory, theme.trajectory, _MARK_OPACITY)
     ink = to_plot_color(theme.ink)
-    halo = [withStroke(linewidth=3.0, foreground=to_plot_color(theme.background))]
+    halo = [withStroke(linewidth=_TEXT_HALO_PT, foreground=to_plot_color(theme.background))]
     for x, y in report.others:
-        axes.plot([x], [y], marker="+", markersize=8.0, color=ink, zorder=_MARK_ORDER, path_effects=halo)
+        axes.plot(
+            [x],
+            [y],
+            marker="+",
+            markersize=_POSITION_MARK_PT,
+            color=ink,
+            zorder=_MARK_ORDER,
+            path_effects=halo,
+        )
         axes.annotate(
             f"{x:.10g} {y:.10g}",
             (x, y),
-            (6, 6),
+            (_POSITION_TEXT_OFFSET_PT, _POSITION_TEXT_OFFSET_PT),
             textcoords="offset points",
             fontsize=SMALL,
             color=ink,
@@ -198,12 +221,12 @@ def _draw_gap(axes: Axes, gap: Gap, theme: Theme) -> None:
     """Draw the narrowest passage as a line, with a ring around it if the line is short."""
     color = to_plot_color(theme.final)
     points = np.array(gap.between)
-    halo = [withStroke(linewidth=4.2, foreground=to_plot_color(theme.background))]
+    halo = [withStroke(linewidth=_PASSAGE_HALO_PT, foreground=to_plot_color(theme.background))]
     axes.plot(
         points[:, 0],
         points[:, 1],
         color=color,
-        linewidth=2.0,
+        linewidth=_PASSAGE_WIDTH_PT,
         zorder=_MARK_ORDER,
         clip_on=False,
         path_effects=halo,
@@ -220,7 +243,7 @@ def _draw_gap(axes: Axes, gap: Gap, theme: Theme) -> None:
         markersize=_PASSAGE_RING_PT,
         markerfacecolor="none",
         markeredgecolor=color,
-        markeredgewidth=1.8,
+        markeredgewidth=_PASSAGE_RING_WIDTH_PT,
         zorder=_MARK_ORDER,
         clip_on=False,
         path_effects=halo,
@@ -238,7 +261,9 @@ def _build_handles(environment: Environment, theme: Theme, comparison: ImportCom
         handles.append(_build_mark_handle(f"opened: {area} m² were solid", theme.start))
     if comparison.gap is not None:
         label = f"narrowest passage, {comparison.gap.width:.3g} m"
-        handles.append(Line2D([], [], color=to_plot_color(theme.final), linewidth=2.0, label=label))
+        handles.append(
+            Line2D([], [], color=to_plot_color(theme.final), linewidth=_PASSAGE_WIDTH_PT, label=label)
+        )
     return handles
 
 

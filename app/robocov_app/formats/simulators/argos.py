@@ -48,7 +48,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.find_child("arena")
     if arena is None:
-        root.refuse("no <arena>")
+        root.raise_error("no <arena>")
     shapes = Shapes(root.where, options)
     size = _parse_lengths(arena, "size")[:2]
     corner = arena.parse_numbers("center", count=3, default="0,0,0")[:2] - size / 2
@@ -71,17 +71,17 @@ def _distribute(element: Element, shapes: Shapes) -> None:
     orientation = element.find_child("orientation")
     entity = element.find_child("entity")
     if position is None or orientation is None or entity is None or not entity.children:
-        element.refuse("expected <position>, <orientation> and <entity> with something in it")
+        element.raise_error("expected <position>, <orientation> and <entity> with something in it")
     quantity = int(entity.parse_numbers("quantity", count=1)[0])
     body = entity.children[0]
     method = position.attributes.get("method", "")
     is_turned_alike = orientation.attributes.get("method", "") == "constant"
     if method not in ("grid", "constant") or not is_turned_alike:
         tag = to_one_line(body.tag)[:_MAX_TAG_CHARACTERS]
-        shapes.leave_out(tag, "that ARGoS places at random", max(quantity, 0))
+        shapes.count_omission(tag, "that ARGoS places at random", max(quantity, 0))
         return
     if not 0 <= quantity <= MAX_PLACED_ENTITIES:
-        entity.refuse(f"expected a number from 0 to {MAX_PLACED_ENTITIES}, got quantity {quantity}")
+        entity.raise_error(f"expected a number from 0 to {MAX_PLACED_ENTITIES}, got quantity {quantity}")
     angles = orientation.parse_numbers("values", count=3)
     if method == "constant":
         positions = [position.parse_numbers("values", count=3)] * quantity
@@ -95,7 +95,7 @@ def _compute_grid_positions(element: Element, quantity: int) -> Array:
     """Return the positions of entities in a grid, (quantity, 3) m, in the order in which ARGoS fills it."""
     layout = element.parse_numbers("layout", count=3).astype(int)
     if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
-        element.refuse(f"expected one for {quantity}, got layout {layout.tolist()}")
+        element.raise_error(f"expected one for {quantity}, got layout {layout.tolist()}")
     columns, rows, _ = layout
     distances = element.parse_numbers("distances", count=3)
     first = element.parse_numbers("center", count=3) + (layout - 1) * distances / 2
@@ -127,14 +127,14 @@ def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> 
     # Rotations by 180 degrees do not tilt boxes and cylinders.
     tilt = np.abs((angles[1:] + 90) % 180 - 90)
     if (tilt > _MAX_TILT_DEG).any():
-        shapes.leave_out(tag, "that is tilted")
+        shapes.count_omission(tag, "that is tilted")
     elif tag == "box":
         ring = UNIT_SQUARE * _parse_lengths(element, "size")[:2]
         frame = build_frame(position[0], position[1], math.radians(angles[0]))
-        shapes.add_outline([transform_points(frame, ring)], labels, at=f"line {element.line}")
+        shapes.add_outline([transform_points(frame, ring)], labels, place=f"line {element.line}")
     else:
         radius = float(_parse_lengths(element, "radius", count=1)[0])
-        shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")
+        shapes.add_circle(position[:2], radius, labels, place=f"line {element.line}")
 
 
 def _parse_lengths(element: Element, name: str, count: int = 3) -> Array:
@@ -142,5 +142,5 @@ def _parse_lengths(element: Element, name: str, count: int = 3) -> Array:
     values = element.parse_numbers(name, count=count)
     lengths = values[:2]
     if not (lengths.min() >= _MIN_LENGTH_M and lengths.max() <= MAX_SIZE_M):
-        element.refuse(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
+        element.raise_error(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
     return values

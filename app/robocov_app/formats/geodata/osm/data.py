@@ -18,8 +18,10 @@ USED_TAGS = {
 _LABEL_TAGS = ("name", "room", "indoor", "barrier", "building", "natural")
 _MAX_READINGS = 4
 """Number of times that all vertices may be read: to measure areas, to find doors, and to draw shapes."""
-_FIRST_UNNUMBERED = 2**64
-"""First number given to nodes without an id in the file. Ids of OpenStreetMap have at most 64 bits."""
+_FIRST_NEW_ID = 2**64
+"""First id given to nodes without one in the file. Ids of OpenStreetMap have at most 64 bits."""
+_MISSING_NODE_ID = -_FIRST_NEW_ID
+"""Id that no node has; a way with such a node counts as incomplete."""
 
 
 @dataclass(eq=False, slots=True)
@@ -30,7 +32,7 @@ class OsmElement:
     ----------
     kind : str
         ``node``, ``way`` or ``relation``.
-    number : int
+    id : int
     tags : dict of str to str
         Only those in `USED_TAGS`.
     members : list of int
@@ -38,14 +40,14 @@ class OsmElement:
     """
 
     kind: str
-    number: int
+    id: int
     tags: dict[str, str] = field(default_factory=dict)
     members: list[int] = field(default_factory=list)
 
     @property
     def place(self) -> str:
-        """Kind and number, for messages."""
-        return f"{self.kind} {self.number}"
+        """Kind and id, for messages."""
+        return f"{self.kind} {self.id}"
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -95,15 +97,15 @@ class OsmData:
         """All elements: nodes, ways, relations."""
         return [*self.nodes.values(), *self.ways.values(), *self.relations.values()]
 
-    def add_node(self, number: int, longitude: float, latitude: float) -> None:
+    def add_node(self, node_id: int, longitude: float, latitude: float) -> None:
         """Add the position of a node, in degrees."""
-        self._node_rows[number] = len(self._coordinates) // 2
+        self._node_rows[node_id] = len(self._coordinates) // 2
         self._coordinates.extend((longitude, latitude))
         self._points = None
 
-    def has_node(self, number: int) -> bool:
+    def has_node(self, node_id: int) -> bool:
         """Return whether the position of a node is known."""
-        return number in self._node_rows
+        return node_id in self._node_rows
 
     def add_line(self, line: list[tuple[float, float] | None]) -> list[int]:
         """Add nodes that have no id in the file, and return new ids for them.
@@ -113,36 +115,35 @@ class OsmData:
         line : list of (longitude, latitude) or None
             Position of each node, in degrees. None stands for a node outside the extract.
         """
-        numbers = []
+        ids = []
         for point in line:
             if point is None:
-                # An id that no node has, so that the way counts as incomplete.
-                numbers.append(-_FIRST_UNNUMBERED)
+                ids.append(_MISSING_NODE_ID)
                 continue
-            number = _FIRST_UNNUMBERED + len(self._coordinates) // 2
+            node_id = _FIRST_NEW_ID + len(self._coordinates) // 2
             longitude, latitude = point
-            self.add_node(number, longitude, latitude)
-            numbers.append(number)
-        return numbers
+            self.add_node(node_id, longitude, latitude)
+            ids.append(node_id)
+        return ids
 
     def add_element(self, element: OsmElement) -> None:
         """Add an element, unless it is a node without tags or position, or a relation that is not an area."""
-        if element.kind == "node" and element.tags and self.has_node(element.number):
-            self.nodes[element.number] = element
+        if element.kind == "node" and element.tags and self.has_node(element.id):
+            self.nodes[element.id] = element
         elif element.kind == "way":
-            self.ways[element.number] = element
+            self.ways[element.id] = element
         elif element.kind == "relation" and element.tags.get("type") == "multipolygon":
-            self.relations[element.number] = element
+            self.relations[element.id] = element
 
     def get_point(self, node: OsmElement) -> Array:
         """Return the (2,) longitude and latitude of a node."""
-        point: Array = self._get_points()[self._node_rows[node.number]]
+        point: Array = self._get_points()[self._node_rows[node.id]]
         return point
 
     def get_ways(self, element: OsmElement) -> list[OsmElement | None]:
         """Return the ways of a relation, with None for missing ones; for a way, the way itself."""
         if element.kind == "relation":
-            return [self.ways.get(number) for number in element.members]
+            return [self.ways.get(way_id) for way_id in element.members]
         return [element]
 
     def get_lines(self, element: OsmElement) -> list[Array] | None:
@@ -160,7 +161,7 @@ class OsmData:
         lines = []
         for way in ways:
             members = [] if way is None else way.members
-            rows = [self._node_rows.get(number, -1) for number in members]
+            rows = [self._node_rows.get(node_id, -1) for node_id in members]
             if len(rows) < 2 or min(rows) < 0:
                 return None
             lines.append(self._get_points()[rows])

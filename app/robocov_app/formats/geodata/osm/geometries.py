@@ -19,7 +19,7 @@ def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | 
     """Return a way as a line; if nodes are missing, count it as left out and return None."""
     lines = data.get_lines(way)
     if lines is None:
-        shapes.leave_out("way", "with missing nodes")
+        shapes.count_omission("way", "with missing nodes")
         return None
     return SourceGeometry("line", (lines[0],), way.labels, way.place, width=parse_width(way.tags))
 
@@ -28,15 +28,15 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
     """Return a way or relation as a polygon; if it has no area, count it as left out and return None."""
     lines = data.get_lines(element)
     if lines is None:
-        shapes.leave_out(element.kind, "with missing nodes")
+        shapes.count_omission(element.kind, "with missing nodes")
         return None
     merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(line) for line in lines]))
     rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]
     if not rings:  # all nodes have the same position
-        shapes.leave_out(element.kind, "without an area")
+        shapes.count_omission(element.kind, "without an area")
         return None
     if not all((ring[0] == ring[-1]).all() for ring in rings):
-        shapes.leave_out(element.kind, "that is not closed")
+        shapes.count_omission(element.kind, "that is not closed")
         return None
     return SourceGeometry("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
 

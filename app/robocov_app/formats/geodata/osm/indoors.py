@@ -11,7 +11,7 @@ from robocov_app.formats.geodata.osm.data import OsmData, OsmElement
 from robocov_app.formats.geodata.osm.geometries import parse_width, to_line, to_point, to_polygon
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 
-_SPACES: dict[str, Role] = {"room": "walled", "corridor": "open", "area": "open"}
+_SPACES: dict[str, Role] = {"room": "room", "corridor": "open", "area": "open"}
 _STAIRS = {"stairs", "elevator", "escalator", "steps"}
 """Tag values of areas that robots cannot drive on."""
 _MIN_INDOOR_FRACTION = 0.5
@@ -72,7 +72,7 @@ def measure_floors(data: OsmData) -> dict[float, float]:
     """
     floors: dict[float, float] = {}
     for element in data.elements:
-        if _choose_role(element) not in ("open", "walled"):
+        if _choose_role(element) not in ("open", "room"):
             continue
         area = _measure_area(data, element)
         for level in _parse_levels(element.tags):
@@ -122,7 +122,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
     geometries: list[SourceGeometry] = []
     doors: list[OsmElement] = []
     walls: list[OsmElement] = []
-    stairs = 0
+    stairs_count = 0
     for element in data.elements:
         role = _choose_role(element)
         if role is None or floor not in _parse_levels(element.tags):
@@ -130,21 +130,21 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
         if role == "opening":
             doors.append(element)
             continue
-        # Doors are nodes of the outlines of rooms ("walled") or of walls that are drawn as lines.
-        if role in ("walled", "wall"):
+        # Doors are nodes of the outlines of rooms ("room") or of walls that are drawn as lines.
+        if role in ("room", "wall"):
             walls.append(element)
         if role == "solid" and _is_stairs(element.tags):
-            stairs += 1
+            stairs_count += 1
         geometry = _build_geometry(data, element, role, shapes)
         if geometry is not None:
             roles.append(role)
             geometries.append(geometry)
-    if stairs:
-        shapes.notes.append(f"stairs and lifts treated as solid: {stairs}")
+    if stairs_count:
+        shapes.notes.append(f"stairs and lifts treated as solid: {stairs_count}")
     door_lines = _find_doors(data, doors, walls)
     lost_doors = len(doors) - len(door_lines)
     if lost_doors:
-        shapes.leave_out("door", "in no wall of this level", lost_doors)
+        shapes.count_omission("door", "in no wall of this level", lost_doors)
     # All together, so that they get the same origin.
     projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
     shapes_in_meters = projected[: len(geometries)]
@@ -167,13 +167,13 @@ def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement])
 
     They are the preceding node of its wall, the door, and the following node.
     """
-    neighbors = _find_neighbors({door.number for door in doors}, data, walls)
+    neighbors = _find_neighbors({door.id for door in doors}, data, walls)
     lines = []
     for door in doors:
-        if door.number not in neighbors:
+        if door.id not in neighbors:
             continue
-        before, after = neighbors[door.number]
-        line = data.get_lines(OsmElement("way", door.number, members=[before, door.number, after]))
+        before, after = neighbors[door.id]
+        line = data.get_lines(OsmElement("way", door.id, members=[before, door.id, after]))
         if line is not None:
             width = parse_width(door.tags)
             lines.append(SourceGeometry("line", (line[0],), ("door",), door.place, width=width))
@@ -186,9 +186,9 @@ def _find_neighbors(doors: set[int], data: OsmData, walls: list[OsmElement]) -> 
     for wall in walls:
         for way in data.get_ways(wall):
             nodes = [] if way is None else way.members
-            for k, number in enumerate(nodes):
-                if number in doors and number not in neighbors:
-                    neighbors[number] = _get_adjacent_nodes(nodes, k)
+            for k, node_id in enumerate(nodes):
+                if node_id in doors and node_id not in neighbors:
+                    neighbors[node_id] = _get_adjacent_nodes(nodes, k)
     return neighbors
 
 
@@ -214,4 +214,4 @@ def _build_opening(door: SourceGeometry) -> SourceGeometry:
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M
     half: Array = direction * (width / 2 / max(length, _MIN_LENGTH_M))
-    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.at)
+    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.place)

@@ -39,7 +39,7 @@ def _list_geometries(data: OsmData, shapes: Shapes) -> list[SourceGeometry]:
         if not _is_obstacle(element, is_water_free=shapes.options.water == "free"):
             continue
         if _is_underground(element.tags):
-            shapes.leave_out("element", "below the ground")
+            shapes.count_omission("element", "below the ground")
             continue
         geometry = _build_geometry(data, element, shapes)
         if geometry is not None:

@@ -61,7 +61,7 @@ class _XmlReader:
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start_element
         self.parser.EndElementHandler = self._end_element
-        self.parser.StartDoctypeDeclHandler = lambda *_: self._refuse("expected no document type")
+        self.parser.StartDoctypeDeclHandler = lambda *_: self._raise_error("expected no document type")
         try:
             self.parser.Parse(content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
@@ -72,13 +72,13 @@ class _XmlReader:
         """Add the content of an XML element; raise MapError if an attribute is missing or invalid."""
         self.depth += 1
         if self.depth == 1 and name != "osm":
-            self._refuse(f"expected <osm>, got <{to_one_line(name)[:40]}>")
+            self._raise_error(f"expected <osm>, got <{to_one_line(name)[:40]}>")
         try:
             self._add(name, attributes)
         except KeyError as error:
-            self._refuse(f"<{name}>: no {error.args[0]}")
+            self._raise_error(f"<{name}>: no {error.args[0]}")
         except ValueError as error:
-            self._refuse(f"<{name}>: {to_one_line(error)[:80]}")
+            self._raise_error(f"<{name}>: {to_one_line(error)[:80]}")
 
     def _add(self, name: str, attributes: dict[str, str]) -> None:
         """Add the content of an XML element.
@@ -113,7 +113,7 @@ class _XmlReader:
             self.data.add_element(self.element)
             self.element = None
 
-    def _refuse(self, problem: str) -> NoReturn:
+    def _raise_error(self, problem: str) -> NoReturn:
         raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {problem}")
 
 
@@ -140,54 +140,54 @@ def _read_json(path: Path) -> OsmData:
     return data
 
 
-def _add_json_element(data: OsmData, file: JsonFile, value: Any, at: JsonPath) -> None:
+def _add_json_element(data: OsmData, file: JsonFile, value: Any, place: JsonPath) -> None:
     """Add a node, way or relation, unless it was deleted; other kinds of elements are skipped."""
     if not isinstance(value, dict):
-        raise file.build_error(at, value, "an element of OpenStreetMap")
+        raise file.build_error(place, value, "an element of OpenStreetMap")
     kind = value.get("type")
     if kind not in ("node", "way", "relation"):  # such as the areas and counts of Overpass
         return
     number = value.get("id")
     if type(number) is not int:
-        raise file.build_error((*at, "id"), number, "a whole number")
+        raise file.build_error((*place, "id"), number, "a whole number")
     if value.get("action") == "delete" or value.get("visible") is False:
         return
-    element = OsmElement(kind, number, _parse_json_tags(file, value, at))
+    element = OsmElement(kind, number, _parse_json_tags(file, value, place))
     if kind == "node":
-        longitude, latitude = _parse_json_point(file, value, at)
+        longitude, latitude = _parse_json_point(file, value, place)
         data.add_node(number, longitude, latitude)
     elif kind == "way":
-        element.members = _parse_json_nodes(data, file, value, at)
+        element.members = _parse_json_nodes(data, file, value, place)
     else:
-        element.members = _parse_json_ways(data, file, value, at)
+        element.members = _parse_json_ways(data, file, value, place)
     data.add_element(element)
 
 
-def _parse_json_tags(file: JsonFile, value: dict[str, Any], at: JsonPath) -> dict[str, str]:
+def _parse_json_tags(file: JsonFile, value: dict[str, Any], place: JsonPath) -> dict[str, str]:
     tags = value.get("tags", {})
     if not isinstance(tags, dict):
-        raise file.build_error((*at, "tags"), tags, "an object")
+        raise file.build_error((*place, "tags"), tags, "an object")
     return {key: text for key, text in tags.items() if key in USED_TAGS and isinstance(text, str)}
 
 
-def _parse_json_point(file: JsonFile, value: Any, at: JsonPath) -> tuple[float, float]:
+def _parse_json_point(file: JsonFile, value: Any, place: JsonPath) -> tuple[float, float]:
     if not isinstance(value, dict):
-        raise file.build_error(at, value, "lat and lon")
+        raise file.build_error(place, value, "lat and lon")
     for key, limit in (("lon", 360.0), ("lat", 90.0)):
         degrees = value.get(key)
         if not is_number(degrees) or not abs(degrees) <= limit:  # type: ignore[arg-type]
-            raise file.build_error((*at, key), degrees, "degrees")
+            raise file.build_error((*place, key), degrees, "degrees")
     return float(value["lon"]), float(value["lat"])
 
 
-def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
+def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], place: JsonPath) -> list[int]:
     """Return the ids of the nodes of a way, and add the positions that the way contains (``out geom``)."""
     numbers = value.get("nodes", [])
     if not isinstance(numbers, list) or not all(type(number) is int for number in numbers):
-        raise file.build_error((*at, "nodes"), numbers, "a list of whole numbers")
+        raise file.build_error((*place, "nodes"), numbers, "a list of whole numbers")
     if "geometry" not in value:
         return numbers
-    line = _parse_json_line(file, value["geometry"], (*at, "geometry"))
+    line = _parse_json_line(file, value["geometry"], (*place, "geometry"))
     # A way may have positions without ids: its nodes get new ones.
     if len(line) != len(numbers):
         return data.add_line(line)
@@ -198,35 +198,35 @@ def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], at: 
     return numbers
 
 
-def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
+def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], place: JsonPath) -> list[int]:
     """Return the ids of the ways of a relation, and add the ways that it contains (``out geom``)."""
     members = value.get("members", [])
     if not isinstance(members, list):
-        raise file.build_error((*at, "members"), members, "a list of members")
+        raise file.build_error((*place, "members"), members, "a list of members")
     numbers = []
     for k, member in enumerate(members):
-        place = (*at, "members", k)
+        member_place = (*place, "members", k)
         if not isinstance(member, dict):
-            raise file.build_error(place, member, "a member of a relation")
+            raise file.build_error(member_place, member, "a member of a relation")
         if member.get("type") != "way":
             continue
         number = member.get("ref")
         if type(number) is not int:
-            raise file.build_error((*place, "ref"), number, "a whole number")
+            raise file.build_error((*member_place, "ref"), number, "a whole number")
         numbers.append(number)
         if "geometry" in member and number not in data.ways:
-            line = _parse_json_line(file, member["geometry"], (*place, "geometry"))
+            line = _parse_json_line(file, member["geometry"], (*member_place, "geometry"))
             data.add_element(OsmElement("way", number, members=data.add_line(line)))
     return numbers
 
 
-def _parse_json_line(file: JsonFile, value: Any, at: JsonPath) -> list[tuple[float, float] | None]:
+def _parse_json_line(file: JsonFile, value: Any, place: JsonPath) -> list[tuple[float, float] | None]:
     """Return the points of a line, with None for points outside the query's bounding box."""
     if not isinstance(value, list):
-        raise file.build_error(at, value, "a list of lat and lon")
+        raise file.build_error(place, value, "a list of lat and lon")
     line: list[tuple[float, float] | None] = []
     for k, point in enumerate(value):
-        line.append(None if point is None else _parse_json_point(file, point, (*at, k)))
+        line.append(None if point is None else _parse_json_point(file, point, (*place, k)))
     return line
 
 

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -29,6 +30,21 @@ _MAX_TRIED_CELLS = 16_000_000
 """Size of the largest grid that is tried in order to keep passages that a coarser grid closes."""
 _DIGITS = 6
 """Decimals of the corner of a grid, in m: it is rounded to a micrometer."""
+
+
+class _Crossings(NamedTuple):
+    """Points in which the sides of polygons cross lines of cell centers, (k,) each.
+
+    Attributes
+    ----------
+    line : array of int
+        Row or column of centers.
+    position : array
+        Position along it, in cells; the center of cell i is at i.
+    """
+
+    line: IntArray
+    position: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,16 +130,8 @@ class CellGrid:
 
     def _find_crossings(
         self, area: BaseGeometry, subdivision: int = 1, *, transposed: bool = False
-    ) -> tuple[IntArray, Array]:
-        """Find where the sides of polygons cross the rows of cell centers, or the columns if `transposed`.
-
-        Returns
-        -------
-        line : (k,) array of int
-            Row of each crossing; column if `transposed`.
-        position : (k,) array
-            Position along it, in cells; the center of cell i is at i.
-        """
+    ) -> _Crossings:
+        """Find the crossings of polygons with the rows of cell centers, or with columns if `transposed`."""
         sides = (extract_sides(area) - self.origin) / (self.cell / subdivision) - 0.5
         if transposed:
             sides = sides[..., ::-1]
@@ -135,7 +143,7 @@ class CellGrid:
         line = concatenate_ranges(low, count)
         side = np.arange(len(low)).repeat(count)
         slope = np.divide(x1 - x0, y1 - y0, out=np.zeros_like(x0), where=count > 0)
-        return line, x0[side] + (line - y0[side]) * slope[side]
+        return _Crossings(line, x0[side] + (line - y0[side]) * slope[side])
 
 
 def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_CELLS) -> CellGrid:
@@ -248,13 +256,13 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
     # Each connected group of free cells ("island") belongs to the part of the map nearest to it. A part
     # without islands is lost; a part with several is divided.
     centers = _find_island_cells(islands, large, grid)
-    pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centers)), minlength=len(parts))
+    island_counts = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centers)), minlength=len(parts))
     losses = []
-    lost = int((pieces == 0).sum())
+    lost = int((island_counts == 0).sum())
     if lost:
         verb = "is" if lost == 1 else "are"
         losses.append(f"{format_count(lost, 'separate part')} of the free space {verb} lost")
-    if (pieces > 1).any():
+    if (island_counts > 1).any():
         separate = format_count(len(large), "separate part")
         losses.append(f"gaps close: the free space has {separate} instead of {len(parts)}")
     return "; ".join(losses)

@@ -110,15 +110,15 @@ def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
     # At the first corner of an outer ring, the free cell is north-east of it. If that cell is not free, the
     # ring is a hole, and the cell south-west of the corner is free.
     first = order[starts]
-    hole = np.where(corners.is_north_east_free[first], 0, 1)
-    part = ndimage.label(free)[0][corners.row[first] - hole, corners.column[first] - hole]
+    is_hole = ~corners.is_north_east_free[first]
+    part = ndimage.label(free)[0][corners.row[first] - is_hole, corners.column[first] - is_hole]
     # Sort the rings by part. The first ring of each part has the lowest corner, so it is the outer one.
     rank = np.argsort(part, kind="stable")
     length = np.diff(starts, append=len(order))[rank]
     vertex = order[concatenate_ranges(starts[rank], length)]
     ring = np.arange(len(rank)).repeat(length)
     # Horizontal and vertical sides of a ring alternate.
-    is_leaving_vertically = concatenate_ranges(hole[rank], length) % 2 == 0
+    is_leaving_vertically = concatenate_ranges(is_hole[rank].astype(int), length) % 2 == 0
     points, is_distinct = _place_necks(corners, vertex, is_leaving_vertically)
     rings = shapely.linearrings(points[is_distinct], indices=ring.repeat(is_distinct.sum(axis=1)))
     _, owner = np.unique(part, return_inverse=True)
@@ -153,10 +153,10 @@ def _pair_vertically(corners: _Corners) -> IntArray:
     index = np.arange(len(corners.row))
     # Along a line, sides connect the first corner to the second, the third to the fourth, and so on.
     upward = np.lexsort((corners.is_north, corners.row, corners.column))
-    vertical = np.empty_like(index)
+    vertical_end = np.empty_like(index)
     # index ^ 1 swaps 0 and 1, 2 and 3, and so on.
-    vertical[upward] = upward[index ^ 1]
-    return vertical
+    vertical_end[upward] = upward[index ^ 1]
+    return vertical_end
 
 
 def _place_necks(
@@ -202,8 +202,8 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
         row, column = is_corner.nonzero()
         is_west = south_west ^ north_west
         is_north = north_west ^ north_east
-        facts = [fact[is_corner] for fact in (is_west, is_north, is_double, north_east)]
-        strips.append((column, row + low, *facts))
+        attributes = [values[is_corner] for values in (is_west, is_north, is_double, north_east)]
+        strips.append((column, row + low, *attributes))
     column, row, is_west, is_north, is_double, north_east = map(np.concatenate, zip(*strips, strict=True))
     repeats = 1 + is_double
     is_second = concatenate_ranges(np.zeros_like(row), repeats) == 1
@@ -219,13 +219,13 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
     )
 
 
-def _connect_rings(vertical: IntArray, is_outer: BoolArray) -> tuple[IntArray, IntArray]:
+def _connect_rings(vertical_end: IntArray, is_outer: BoolArray) -> tuple[IntArray, IntArray]:
     """Return the indices of the corners ring by ring, and where each ring starts in them.
 
     The first side of an outer ring is horizontal, that of a hole is vertical.
     """
     # Lists are faster than arrays for single elements.
-    vertical_ends = vertical.tolist()
+    vertical_ends = vertical_end.tolist()
     leaves_horizontally = is_outer.tolist()
     is_unvisited = bytearray(b"\x01") * len(vertical_ends)
     order: list[int] = []

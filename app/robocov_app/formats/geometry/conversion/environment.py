@@ -72,18 +72,18 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
     conversion.require_at_most(MAX_OBSTACLES, sum(len(part.interiors) for part in parts), "obstacles")
     require_room(parts, conversion)
     before = MultiPolygon(parts)
-    drawing = _simplify(before, read, conversion)
-    conversion.require_at_most(MAX_VERTICES, shapely.count_coordinates(drawing.free), "vertices")
-    layout = build_layout(drawing, outer, before, read, conversion)
-    if foreign.primitives and shapely.get_num_coordinates(drawing.free) <= _MAX_CHECKED_VERTICES:
-        layout = restore_primitives(layout, drawing, before, conversion)
-    _report_deviation(layout.deviation, drawing.free, conversion)
-    environment = _to_environment(layout, drawing.free, conversion)
+    simplified = _simplify(before, read, conversion)
+    conversion.require_at_most(MAX_VERTICES, shapely.count_coordinates(simplified.free), "vertices")
+    layout = build_layout(simplified, outer, before, read, conversion)
+    if foreign.primitives and shapely.get_num_coordinates(simplified.free) <= _MAX_CHECKED_VERTICES:
+        layout = restore_primitives(layout, simplified, before, conversion)
+    _report_deviation(layout.deviation, simplified.free, conversion)
+    environment = _to_environment(layout, simplified.free, conversion)
     _report_unreachable(environment, conversion)
     return environment, _build_report(
         environment,
         read=read,
-        drawing=drawing,
+        simplified=simplified,
         layout=layout,
         cleaned=cleaned,
         selection=selection,
@@ -95,7 +95,7 @@ def _build_report(
     environment: Environment,
     *,
     read: MultiPolygon,
-    drawing: SimplifiedSpace,
+    simplified: SimplifiedSpace,
     layout: MapLayout,
     cleaned: Cleaned,
     selection: PartSelection,
@@ -116,7 +116,7 @@ def _build_report(
         area_kept=environment.free_area,
         size=(round(width, conversion.digits), round(height, conversion.digits)),
         obstacles=len(environment.obstacles),
-        tolerance=drawing.tolerance,
+        tolerance=simplified.tolerance,
         moved_area=layout.deviation.area,
         moved=layout.deviation.distance,
         removed=cleaned.number,

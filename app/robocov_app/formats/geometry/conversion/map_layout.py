@@ -53,7 +53,7 @@ class MapLayout(NamedTuple):
 
 
 def build_layout(
-    drawing: SimplifiedSpace,
+    simplified: SimplifiedSpace,
     outer: Polygon | None,
     before: MultiPolygon,
     read: MultiPolygon,
@@ -63,7 +63,7 @@ def build_layout(
 
     Parameters
     ----------
-    drawing : SimplifiedSpace
+    simplified : SimplifiedSpace
     outer : Polygon or None, m
         The boundary. None stands for the outline of the free space.
     before : MultiPolygon, m
@@ -76,7 +76,7 @@ def build_layout(
     -------
     MapLayout
     """
-    free = drawing.free
+    free = simplified.free
     base = None
     if outer is not None:
         simple = simplify_free_space(
@@ -93,7 +93,7 @@ def build_layout(
         digits=conversion.digits,
     )
     if outer is not None:
-        solid = _remove_slivers(solid, shapely.difference(outer, read), drawing.tolerance)
+        solid = _remove_slivers(solid, shapely.difference(outer, read), simplified.tolerance)
     return MapLayout(boundary, solid, [], measure_deviation(before, free))
 
 

@@ -37,7 +37,7 @@ _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 
 
 def restore_primitives(
-    layout: MapLayout, drawing: SimplifiedSpace, before: MultiPolygon, conversion: Conversion
+    layout: MapLayout, simplified: SimplifiedSpace, before: MultiPolygon, conversion: Conversion
 ) -> MapLayout:
     """Replace polygons of a layout by the circles and walls of which they consist.
 
@@ -47,7 +47,7 @@ def restore_primitives(
     Parameters
     ----------
     layout : MapLayout
-    drawing : SimplifiedSpace
+    simplified : SimplifiedSpace
         The simplified free space, which the layout surrounds.
     before : MultiPolygon, m
         The free space before simplification.
@@ -57,10 +57,10 @@ def restore_primitives(
     -------
     MapLayout
     """
-    max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (before, drawing.free))
+    max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (before, simplified.free))
     rejected: frozenset[Primitive] = frozenset()
     for _ in range(_MAX_ROUNDS):
-        candidate = _match_primitives(layout, drawing.tolerance, max_rooms, rejected, conversion)
+        candidate = _match_primitives(layout, simplified.tolerance, max_rooms, rejected, conversion)
         if not candidate.primitives:
             return layout
         pockets = _find_pockets(candidate)

@@ -162,7 +162,9 @@ def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOu
         near = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
         for k in near.tolist():
             other: ClosedOutline = outlines[k]
-            belongs = k in containers or (other.whole != "" and other.whole == largest.whole)
+            belongs = k in containers or (
+                other.parent_place != "" and other.parent_place == largest.parent_place
+            )
             if other in members or not belongs:
                 continue
             if are_edge_to_edge(current.area, other.area, drawing.snap):
@@ -196,7 +198,9 @@ def _find_covering_outline(drawing: Drawing) -> Boundary | None:
     """Return the largest outline, with other parts of its geometry, if all others lie entirely in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
     members = {
-        outline for outline in drawing.outlines if outline.whole != "" and outline.whole == largest.whole
+        outline
+        for outline in drawing.outlines
+        if outline.parent_place != "" and outline.parent_place == largest.parent_place
     }
     if len(members) == len(drawing.outlines):
         members = set()

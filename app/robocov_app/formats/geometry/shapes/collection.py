@@ -88,7 +88,7 @@ class Shapes:
         """Return whether to read a shape with these labels; if not, count it as left out."""
         is_accepted = self.labels.accepts(labels)
         if not is_accepted:
-            self.leave_out("shape", "by their names (--only, --skip)")
+            self.count_omission("shape", "by their names (--only, --skip)")
         return is_accepted
 
     def add_all(self, geometries: Iterable[SourceGeometry]) -> None:
@@ -102,19 +102,19 @@ class Shapes:
         if not self.accept(geometry.labels):
             return
         if geometry.kind == "point":
-            self.add_point(geometry.rings[0][0], geometry.labels, at=geometry.at)
+            self.add_point(geometry.rings[0][0], geometry.labels, place=geometry.place)
         elif geometry.kind == "line":
             width = self.thickness
             if geometry.width and self.options.thickness is None:
                 width = geometry.width
-            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), at=geometry.at)
+            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), place=geometry.place)
         else:
             self.add_outline(
                 geometry.rings,
                 geometry.labels,
                 rule=geometry.rule,
-                at=geometry.at,
-                whole=geometry.whole,
+                place=geometry.place,
+                parent_place=geometry.parent_place,
             )
 
     def add_outline(
@@ -123,9 +123,9 @@ class Shapes:
         labels: Sequence[str] = (),
         *,
         rule: Rule = "holes",
-        at: str = "",
+        place: str = "",
         thing: str = "outline",
-        whole: str = "",
+        parent_place: str = "",
         paint: Paint = UNPAINTED,
     ) -> bool:
         """Add the area that rings enclose.
@@ -136,12 +136,12 @@ class Shapes:
         labels : sequence of str
         rule : str
             See `enclosed_area.find_enclosed_area`.
-        at : str
+        place : str
             Place in the file, for messages.
         thing : str
             Kind of shape, for the report if it is left out because it encloses no area. If empty, such a
             shape is not reported.
-        whole : str
+        parent_place : str
             See `SourceGeometry`.
         paint : Paint
 
@@ -150,16 +150,16 @@ class Shapes:
         bool
             Whether the rings enclose an area.
         """
-        enclosed = find_enclosed_area(self._check_rings(rings, at), rule, self._crossings)
+        enclosed = find_enclosed_area(self._check_rings(rings, place), rule, self._crossings)
         for reason, count in enclosed.lost_holes.items():
-            self.leave_out("hole", reason, count)
+            self.count_omission("hole", reason, count)
         if enclosed.invalidity is not None:
-            self.repairs.add_self_crossing(enclosed.invalidity, at)
+            self.repairs.add_self_crossing(enclosed.invalidity, place)
         if enclosed.area.is_empty:
             if thing:
-                self.leave_out(thing, "without an area")
+                self.count_omission(thing, "without an area")
             return False
-        self._store_outline(ClosedOutline(enclosed.area, tuple(labels), whole=whole), paint)
+        self._store_outline(ClosedOutline(enclosed.area, tuple(labels), parent_place=parent_place), paint)
         return True
 
     def add_circle(
@@ -168,13 +168,13 @@ class Shapes:
         radius: float,
         labels: Sequence[str] = (),
         *,
-        at: str = "",
+        place: str = "",
         paint: Paint = UNPAINTED,
     ) -> None:
         """Add a disc with a center, (2,) m, and a radius, m."""
-        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], at)
+        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], place)
         circle = CircleObstacle((float(center[0]), float(center[1])), radius, get_obstacle_name(labels))
-        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
+        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], place)
         self._store_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
 
     def _store_outline(self, outline: ClosedOutline, paint: Paint) -> None:
@@ -191,25 +191,25 @@ class Shapes:
         edges = tuple(replace(line, order=last.order) for line in lines)
         self.outlines[-1] = replace(last, edges=edges)
 
-    def add_line(self, line: WallLine, *, at: str = "") -> None:
+    def add_line(self, line: WallLine, *, place: str = "") -> None:
         """Add a wall; raise MapError if a coordinate or the width is out of range."""
-        (points,) = self._check_rings([line.points], at)
+        (points,) = self._check_rings([line.points], place)
         width = max(line.width, 0.0)
-        place = ": ".join(filter(None, (self.where, at, "width")))
-        files.require_length(width, place, 0.0)
+        width_place = ": ".join(filter(None, (self.where, place, "width")))
+        files.require_length(width, width_place, 0.0)
         if width < MIN_SIZE_M:
             self.repairs.counts["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
             width = MIN_SIZE_M
         if not (points[1:] != points[:-1]).any():
-            self.leave_out("line", "without a length")
+            self.count_omission("line", "without a length")
             return
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
-    def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
+    def add_point(self, point: Array, labels: Sequence[str] = (), *, place: str = "") -> None:
         """Add a point, (2,) m; it becomes a pillar if the option ``pillar`` is given, else it is left out."""
-        ((x, y),) = self._check_rings([point[None]], at)[0].tolist()
+        ((x, y),) = self._check_rings([point[None]], place)[0].tolist()
         if self.options.pillar is None:
-            self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
+            self.count_omission("point", "(--pillar RADIUS makes pillars of them)")
         else:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, get_obstacle_name(labels)))
 
@@ -232,27 +232,27 @@ class Shapes:
         inset = width / 2 * (1.0 - _MAX_RELATIVE_THINNING)
         is_thin = shapely.is_empty(shapely.buffer(areas, -inset, quad_segs=4))
         if is_thin.any():
-            self.leave_out("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
+            self.count_omission("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
             self.outlines = [
                 outline for outline, thin in zip(self.outlines, is_thin, strict=True) if not thin
             ]
 
     def build_polygon(
-        self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = ""
+        self, rings: Iterable[Array], labels: tuple[str, ...], place: str, parent_place: str = ""
     ) -> SourceGeometry:
         """Build a polygon of a format that requires closed rings; open rings are counted as repaired."""
         rings = tuple(rings)
         unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
         if unclosed:
             self.repairs.counts["ring", "closed: the last point was not the first"] += unclosed
-        return SourceGeometry("polygon", rings, labels, at, whole=whole)
+        return SourceGeometry("polygon", rings, labels, place, parent_place=parent_place)
 
     def drop_heights(self, points: Array) -> Array:
         """Return points without their third coordinate, (k, 2); the report mentions dropped coordinates."""
         self.omissions.add_heights(points[:, 2:3])
         return points[:, :2]
 
-    def leave_out(self, kind: str, reason: str = "", count: int = 1) -> None:
+    def count_omission(self, kind: str, reason: str = "", count: int = 1) -> None:
         """Count shapes that are left out of the map, for the report."""
         self.omissions.counts[kind, reason] += count
 
@@ -267,18 +267,18 @@ class Shapes:
         self.vertices += number
         files.require_vertices(self.vertices, self.where)
 
-    def _check_rings(self, rings: Sequence[Array], at: str) -> list[Array]:
+    def _check_rings(self, rings: Sequence[Array], place: str) -> list[Array]:
         """Count and round the points of rings; raise MapError if a coordinate is out of range."""
         self.count_vertices(sum(map(len, rings)))
         for ring in rings:
             is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
             if not is_valid.all():
                 x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
-                place = self.where
-                if at:
-                    place = f"{place}: {at}"
+                location = self.where
+                if place:
+                    location = f"{self.where}: {place}"
                 expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
-                raise MapError(f"{place}: {expected}, got a point at [{x:g}, {y:g}] m")
+                raise MapError(f"{location}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
     def build_foreign_map(
@@ -319,7 +319,7 @@ class Shapes:
             raise MapError(f"{self.where}: {reason}, expected a drawing")
         result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
         if result.outside:
-            self.leave_out("shape", "outside of the boundary", result.outside)
+            self.count_omission("shape", "outside of the boundary", result.outside)
         return ForeignMap(
             name=name,
             description=description,

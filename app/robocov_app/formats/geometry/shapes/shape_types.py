@@ -33,23 +33,23 @@ class SourceGeometry:
     rings : tuple of (k, 2) arrays
         Rings of a polygon; a line or a point is a single array.
     labels : tuple of str
-    at : str
+    place : str
         Place in the file, for messages.
     rule : str
         See `enclosed_area.find_enclosed_area`.
     width : float or None, m
         Width of a line, if the file gives it.
-    whole : str
+    parent_place : str
         If this is one of several parts of a geometry: the place of that geometry in the file.
     """
 
     kind: Kind
     rings: tuple[Array, ...]
     labels: tuple[str, ...] = ()
-    at: str = ""
+    place: str = ""
     rule: Rule = "holes"
     width: float | None = None
-    whole: str = ""
+    parent_place: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class ClosedOutline:
         Names of the shape, the most specific one first.
     circle : CircleObstacle or None
         The disc, if the outline is a circle.
-    whole : str
+    parent_place : str
         See `SourceGeometry`.
     color : Color or None
         Color of the fill on a white page, if known.
@@ -79,7 +79,7 @@ class ClosedOutline:
     area: MultiPolygon
     labels: tuple[str, ...] = ()
     circle: CircleObstacle | None = None
-    whole: str = ""
+    parent_place: str = ""
     color: Color | None = None
     role: Role | None = None
     order: int = 0

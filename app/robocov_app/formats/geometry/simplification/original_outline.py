@@ -1,4 +1,4 @@
-"""The outline of a free space before simplification, and drawings of it with fewer vertices."""
+"""The outline of a free space before simplification, and simplified outlines with fewer vertices."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -84,8 +84,8 @@ class OriginalOutline(RingVertices):
         self.is_neck = is_neck
         self.cell = cell
 
-    def draw(self, tolerance: Array, is_fixed: BoolArray) -> RingVertices:
-        """Draw the outline with fewer vertices, by the algorithm of Douglas and Peucker.
+    def simplify_outline(self, tolerance: Array, is_fixed: BoolArray) -> RingVertices:
+        """Simplify the outline by the algorithm of Douglas and Peucker.
 
         Parameters
         ----------
@@ -110,54 +110,56 @@ class OriginalOutline(RingVertices):
         min_tolerance = 0.0 if self.cell is None else _MIN_TOLERANCE_CELLS * self.cell
         max_tolerance = np.maximum(np.sqrt(np.abs(self.areas)) / _FULL_TOLERANCE_SIZE, min_tolerance)
         kept, starts = path.simplify(allowed, stays, max_tolerance)
-        drawing = RingVertices(path.points[kept], starts, path.source[kept])
+        simplified = RingVertices(path.points[kept], starts, path.source[kept])
         if self.cell is None:
-            return drawing
-        return fit_walls(path, kept, drawing, allowed[kept])
+            return simplified
+        return fit_walls(path, kept, simplified, allowed[kept])
 
-    def restore_areas(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
-        """Restore the original area of the rings of a drawing that have lost or gained much of it.
+    def restore_areas(self, simplified: RingVertices, tolerance: Array) -> RingVertices:
+        """Restore the original area of the rings of a simplified outline that have lost or gained much of it.
 
         All sides of such a ring move by the same distance, at most half the tolerance. Small round obstacles
         need this: with few corners, all of them on the circle, they would shrink.
         """
         areas_before = self.areas
-        areas_after = drawing.areas
+        areas_after = simplified.areas
         has_changed = np.abs(areas_after - areas_before) > _MAX_AREA_LOSS * np.abs(areas_before)
         # Rings that lost more than half of their area, or changed orientation, are not restored.
         has_changed &= 2 * areas_after * np.sign(areas_before) > np.abs(areas_before)
         if not has_changed.any():
-            return drawing
-        side = drawing.sides
-        length = drawing.lengths
+            return simplified
+        side = simplified.sides
+        length = simplified.lengths
         # The outside of a counter-clockwise ring is to the right of its sides.
         normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
-        perimeter = np.maximum(np.add.reduceat(length, drawing.starts), 1e-300)
-        max_distance = tolerance[drawing.vertex] / 2
+        perimeter = np.maximum(np.add.reduceat(length, simplified.starts), 1e-300)
+        max_distance = tolerance[simplified.vertex] / 2
         ring_distance = np.where(has_changed, (areas_before - areas_after) / perimeter, 0.0)
-        distance = np.clip(ring_distance[drawing.ring], -max_distance, max_distance)
-        both_normals = normal + normal[drawing.before]
+        distance = np.clip(ring_distance[simplified.ring], -max_distance, max_distance)
+        both_normals = normal + normal[simplified.before]
         # A corner moves farther than its sides: a sharp one moves up to twice as far.
         scale = distance / np.maximum(compute_dot(both_normals, both_normals) / 2, 0.5)
-        return RingVertices(drawing.points + scale[:, None] * both_normals, drawing.starts, drawing.source)
+        return RingVertices(
+            simplified.points + scale[:, None] * both_normals, simplified.starts, simplified.source
+        )
 
-    def restore_necks(self, drawing: RingVertices) -> RingVertices:
-        """Insert the necks of the outline into a drawing.
+    def restore_necks(self, simplified: RingVertices) -> RingVertices:
+        """Insert the necks of the outline into a simplified outline.
 
-        The ``source`` of the result refers to the vertices of `drawing`.
+        The ``source`` of the result refers to the vertices of `simplified`.
         """
-        points = drawing.points
-        is_neck = self.is_neck[drawing.vertex] & (drawing.source == drawing.vertex)
+        points = simplified.points
+        is_neck = self.is_neck[simplified.vertex] & (simplified.source == simplified.vertex)
         if self.cell is None or not is_neck.any():
-            return RingVertices(points, drawing.starts, np.arange(len(points), dtype=float))
+            return RingVertices(points, simplified.starts, np.arange(len(points), dtype=float))
         doubled = np.arange(len(points)).repeat(1 + is_neck)
         is_second = np.append(False, doubled[1:] == doubled[:-1])
-        neighbor = np.where(is_second, drawing.after[doubled], drawing.before[doubled])
+        neighbor = np.where(is_second, simplified.after[doubled], simplified.before[doubled])
         vector = points[neighbor] - points[doubled]
         length = np.maximum(np.hypot(*vector.T), 1e-300)
         # A neck takes at most 0.4 of a side, so that the necks at both of its ends do not meet.
         fraction = np.where(is_neck[doubled], np.minimum(NECK * self.cell / length, 0.4), 0.0)
-        starts = np.searchsorted(doubled, drawing.starts)
+        starts = np.searchsorted(doubled, simplified.starts)
         return RingVertices(points[doubled] + fraction[:, None] * vector, starts, doubled.astype(float))
 
     @cached_property
@@ -165,19 +167,19 @@ class OriginalOutline(RingVertices):
         """Search tree of the sides of all rings."""
         return STRtree(shapely.linestrings(self.endpoints))
 
-    def restrain(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
-        """Move vertices of a drawing back to their origin if they are farther from all walls than allowed."""
-        vertex = drawing.vertex
+    def limit_movement(self, simplified: RingVertices, tolerance: Array) -> RingVertices:
+        """Move simplified vertices back to their origin if they are farther from all walls than allowed."""
+        vertex = simplified.vertex
         # A source of k + 0.5 is the midpoint of the side after vertex k.
-        half = (drawing.source % 1.0)[:, None]
+        half = (simplified.source % 1.0)[:, None]
         origin = (1.0 - half) * self.points[vertex] + half * self.points[self.after[vertex]]
-        moved = np.flatnonzero((drawing.points != origin).any(axis=1))
-        positions = shapely.points(drawing.points[moved])
+        moved = np.flatnonzero((simplified.points != origin).any(axis=1))
+        positions = shapely.points(simplified.points[moved])
         _, distance = self.walls.query_nearest(positions, return_distance=True, all_matches=False)
         too_far = moved[distance > tolerance[vertex[moved]]]
-        points = drawing.points.copy()
+        points = simplified.points.copy()
         points[too_far] = origin[too_far]
-        return RingVertices(points, drawing.starts, drawing.source)
+        return RingVertices(points, simplified.starts, simplified.source)
 
     def find_thin_parts(self, free: MultiPolygon, tolerance: float) -> ThinParts:
         """Find the thin parts of a free space and of the solid space around it.
@@ -207,9 +209,9 @@ class OriginalOutline(RingVertices):
         part, vertex = STRtree(shapely.points(self.points)).query(pieces, "dwithin", distance=reach)
         return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
 
-    def to_polygons(self, drawing: RingVertices) -> MultiPolygon:
-        """Return the polygons of a drawing of this outline, m. They may be invalid."""
-        rings = shapely.linearrings(drawing.points, indices=drawing.ring)
+    def to_polygons(self, simplified: RingVertices) -> MultiPolygon:
+        """Return the polygons of this outline after simplification, m. They may be invalid."""
+        rings = shapely.linearrings(simplified.points, indices=simplified.ring)
         return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
 
 

@@ -88,23 +88,23 @@ def simplify_free_space(
     thin = outline.find_thin_parts(free, tolerance)
     problems: Counter[str] = Counter()
     for attempt in range(min(_MAX_ROUNDS, 1 + _MAX_VERTEX_ROUNDS // len(allowed))):
-        drawing = outline.restore_areas(outline.draw(allowed, is_fixed), allowed)
-        drawing = outline.restrain(drawing, allowed)
+        simplified = outline.restore_areas(outline.simplify_outline(allowed, is_fixed), allowed)
+        simplified = outline.limit_movement(simplified, allowed)
         check = SimplificationCheck(
             outline,
-            drawing,
+            simplified,
             allowed=allowed,
             tolerance=tolerance,
             width=2 * radius,
             problems=problems,
         )
-        wrong, far = check.find_misdrawn()
-        wrong |= check.find_misshapen(thin)
+        is_wrong, is_too_far = check.find_area_and_distance_errors()
+        is_wrong |= check.find_thin_part_errors(thin)
         parts = None
-        if not (wrong.any() or far.any()):
-            parts, wrong = check.find_crossings()
-        if parts is None or wrong.any():
-            _tighten(check, wrong, far, is_fixed, whole_walls=attempt >= _PATIENT_ROUNDS)
+        if not (is_wrong.any() or is_too_far.any()):
+            parts, is_wrong = check.find_crossings()
+        if parts is None or is_wrong.any():
+            _tighten(check, is_wrong, is_too_far, is_fixed, whole_walls=attempt >= _PATIENT_ROUNDS)
             continue
         closed = check.find_closed_gaps(parts)
         if closed is None:
@@ -117,18 +117,23 @@ def simplify_free_space(
 
 
 def _tighten(
-    check: SimplificationCheck, wrong: BoolArray, far: BoolArray, is_fixed: BoolArray, *, whole_walls: bool
+    check: SimplificationCheck,
+    is_wrong: BoolArray,
+    is_too_far: BoolArray,
+    is_fixed: BoolArray,
+    *,
+    whole_walls: bool,
 ) -> None:
-    """Reduce the tolerance at the vertices in `wrong`, and fix those in `far`, for the next round.
+    """Reduce the tolerance at the vertices in `is_wrong`, and fix those in `is_too_far`, for the next round.
 
-    With `whole_walls`, all vertices that share a side of the drawing with one of these stay.
+    With `whole_walls`, all vertices that share a side of the simplified outline with one of these stay.
     """
     allowed: Array = check.allowed
-    wrong |= far & is_fixed
-    is_fixed |= far
+    is_wrong |= is_too_far & is_fixed
+    is_fixed |= is_too_far
     if whole_walls:
-        allowed[np.isin(check.side, check.side[wrong | far])] = 0.0
-    allowed[wrong] /= 2
+        allowed[np.isin(check.side_of_vertex, check.side_of_vertex[is_wrong | is_too_far])] = 0.0
+    allowed[is_wrong] /= 2
     allowed[allowed < 0.75 * check.tolerance * 0.5**_MAX_HALVINGS] = 0.0
 
 

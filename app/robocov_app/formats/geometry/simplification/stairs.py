@@ -53,8 +53,8 @@ def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> Ring
     return RingVertices(with_midpoints[is_kept], starts, source[is_kept])
 
 
-def fit_walls(path: RingVertices, kept: IntArray, drawing: RingVertices, tolerance: Array) -> RingVertices:
-    """Move the sides of a drawing onto the walls whose stairs they represent, and restore cut corners.
+def fit_walls(path: RingVertices, kept: IntArray, simplified: RingVertices, tolerance: Array) -> RingVertices:
+    """Move simplified sides onto the walls that their stairs represent, and restore cut corners.
 
     A side that represents stairs becomes the least-squares line through their midpoints, and ends where that
     line meets the lines of the adjacent sides. A short side between two long ones whose lines meet nearby is
@@ -65,26 +65,26 @@ def fit_walls(path: RingVertices, kept: IntArray, drawing: RingVertices, toleran
     path : RingVertices
         Result of `replace_stairs`.
     kept : (m,) array of int
-        Indices of the vertices of the path of which the drawing consists.
-    drawing : RingVertices
+        Indices of the vertices of the path of which the simplified outline consists.
+    simplified : RingVertices
     tolerance : (m,) array, m
 
     Returns
     -------
     RingVertices
     """
-    points = drawing.points
-    stairs = _fit_stairs(path, kept, drawing)
-    move = _move_to_stairs(drawing, stairs)
+    points = simplified.points
+    stairs = _fit_stairs(path, kept, simplified)
+    move = _move_to_stairs(simplified, stairs)
     # Only vertices next to stairs move, and only up to twice the tolerance.
-    move[~(stairs.is_stairs | stairs.is_stairs[drawing.before])] = 0.0
+    move[~(stairs.is_stairs | stairs.is_stairs[simplified.before])] = 0.0
     move[np.hypot(*move.T) > 2 * tolerance] = 0.0
-    corners = _find_cut_corners(drawing, stairs, tolerance)
+    corners = _find_cut_corners(simplified, stairs, tolerance)
     move[corners.is_cut] = corners.positions[corners.is_cut] - points[corners.is_cut]
     # The side of a cut corner becomes one point: its first end moves there, its second end is dropped.
-    is_kept = ~corners.is_cut[drawing.before]
-    starts = np.searchsorted(drawing.ring[is_kept], np.arange(len(drawing.starts)))
-    return RingVertices((points + move)[is_kept], starts, drawing.source[is_kept])
+    is_kept = ~corners.is_cut[simplified.before]
+    starts = np.searchsorted(simplified.ring[is_kept], np.arange(len(simplified.starts)))
+    return RingVertices((points + move)[is_kept], starts, simplified.source[is_kept])
 
 
 class _StairLines(NamedTuple):
@@ -102,12 +102,12 @@ class _CutCorners(NamedTuple):
     positions: Array
 
 
-def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _StairLines:
+def _fit_stairs(path: RingVertices, kept: IntArray, simplified: RingVertices) -> _StairLines:
     """Fit a line to the midpoints of the stairs that each side represents; other sides are their own line."""
-    count = path.size[drawing.ring]
-    first = path.starts[drawing.ring]
+    count = path.size[simplified.ring]
+    first = path.starts[simplified.ring]
     # The vertices of the path between each kept vertex and the next, which may be past the end of the ring.
-    length = np.maximum((kept[drawing.after] - kept) % count - 1, 0)
+    length = np.maximum((kept[simplified.after] - kept) % count - 1, 0)
     side = np.arange(len(kept)).repeat(length)
     inner = first[side] + (concatenate_ranges(kept + 1, length) - first[side]) % count[side]
     is_midpoint = path.source[inner] % 1.0 != 0.0
@@ -119,7 +119,7 @@ def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _S
         return np.asarray(np.bincount(side, values, len(kept)) / np.maximum(number, 1))
 
     # Relative to the first vertex of the side, to avoid cancellation in the squares of large coordinates.
-    x, y = (path.points[inner] - drawing.points[side]).T
+    x, y = (path.points[inner] - simplified.points[side]).T
     center = np.column_stack([average(x), average(y)])
     x = x - center[side, 0]
     y = y - center[side, 1]
@@ -127,33 +127,33 @@ def _fit_stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> _S
     angle = np.arctan2(2 * average(x * y), average(x * x) - average(y * y)) / 2
     fitted = np.column_stack([np.cos(angle), np.sin(angle)])
     is_stairs = (number >= _MIN_MIDPOINTS) & (2 * number >= length)
-    chord = drawing.sides / np.maximum(drawing.lengths, 1e-300)[:, None]
+    chord = simplified.sides / np.maximum(simplified.lengths, 1e-300)[:, None]
     return _StairLines(
         is_stairs,
-        origins=np.where(is_stairs[:, None], drawing.points + center, drawing.points),
+        origins=np.where(is_stairs[:, None], simplified.points + center, simplified.points),
         directions=np.where(is_stairs[:, None], fitted, chord),
     )
 
 
-def _move_to_stairs(drawing: RingVertices, lines: _StairLines) -> Array:
+def _move_to_stairs(simplified: RingVertices, lines: _StairLines) -> Array:
     """Return the vector, (m, 2) m, from each vertex to the point where the lines before and after it meet."""
-    before = drawing.before
+    before = simplified.before
     previous_origins = lines.origins[before]
     previous_directions = lines.directions[before]
     meeting, sine = intersect_lines(previous_origins, previous_directions, lines.origins, lines.directions)
     # Nearly parallel lines have no accurate intersection; the vertex is placed midway between them.
-    first_foot = project_onto_lines(drawing.points, previous_origins, previous_directions)
-    second_foot = project_onto_lines(drawing.points, lines.origins, lines.directions)
+    first_foot = project_onto_lines(simplified.points, previous_origins, previous_directions)
+    second_foot = project_onto_lines(simplified.points, lines.origins, lines.directions)
     middle = (first_foot + second_foot) / 2
-    return np.asarray(np.where(np.abs(sine)[:, None] > _MIN_SINE, meeting, middle) - drawing.points)
+    return np.asarray(np.where(np.abs(sine)[:, None] > _MIN_SINE, meeting, middle) - simplified.points)
 
 
-def _find_cut_corners(drawing: RingVertices, lines: _StairLines, tolerance: Array) -> _CutCorners:
+def _find_cut_corners(simplified: RingVertices, lines: _StairLines, tolerance: Array) -> _CutCorners:
     """Find short sides between two long ones whose lines meet nearby; sides that represent stairs are not."""
-    points = drawing.points
-    after = drawing.after
-    before = drawing.before
-    length = drawing.lengths
+    points = simplified.points
+    after = simplified.after
+    before = simplified.before
+    length = simplified.lengths
     # Both ends of a side must be allowed to move.
     allowed = np.minimum(tolerance, tolerance[after])
     is_long = length > 4 * allowed

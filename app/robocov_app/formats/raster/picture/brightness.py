@@ -22,8 +22,8 @@ class Brightness:
     Attributes
     ----------
     level : (rows, columns) array of unsigned integers
-        The sum of red, green and blue, from 0 (black) to `full` (white).
-    full : int
+        The sum of red, green and blue, from 0 (black) to `max_level` (white).
+    max_level : int
         Level of white.
     alpha : (rows, columns) array of uint8 or None
         Opacity, from 0 to 255 (opaque).
@@ -38,7 +38,7 @@ class Brightness:
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
-    full: int
+    max_level: int
     alpha: NDArray[np.uint8] | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
     lossy: bool = False

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
-from robocov_app.formats.colors import NO_ROLE, ROLES, Role
+from robocov_app.formats.colors import ROLE_CODES, ROLES, Role, RoleCode
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.geometry.cells.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
 from robocov_app.formats.options import ReadOptions, get_or_default
@@ -43,28 +43,23 @@ def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, l
     notes: list[str] = []
     if roles is not None:
         if is_transparent is not None:
-            roles[is_transparent] = NO_ROLE  # a transparent pixel has no color
+            roles[is_transparent] = RoleCode.NONE  # a transparent pixel has no color
         notes = _describe_roles(roles, options)
-        cells[roles == _get_role_code("free")] = FREE
-        cells[roles == _get_role_code("solid")] = BLOCKED
+        cells[roles == RoleCode.FREE] = FREE
+        cells[roles == RoleCode.SOLID] = BLOCKED
         if not options.invert:
             _free_soft_edges(cells, picture, roles, options)
     if is_transparent is not None:
         cells[is_transparent] = UNKNOWN
     if roles is not None and options.ignore_color:
-        _fill_from_around(cells, roles == _get_role_code("ignore"))
+        _fill_from_around(cells, roles == RoleCode.IGNORE)
     return cells, notes
-
-
-def _get_role_code(role: Role) -> int:
-    """Return the code of a role in arrays of roles; see `NO_ROLE`."""
-    return ROLES.index(role) + 1
 
 
 def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
     """Classify light pixels as free and dark ones as blocked; the option ``invert`` swaps them."""
     threshold = get_or_default(options.threshold, _DEFAULT_THRESHOLD)
-    shade = np.arange(picture.full + 1) / picture.full
+    shade = np.arange(picture.max_level + 1) / picture.max_level
     is_free = shade >= threshold
     if options.invert:
         is_free = shade <= 1.0 - threshold
@@ -78,7 +73,7 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
     for role in ROLES:
         names = getattr(options, f"{role}_color")
         if names:
-            percentage = 100 * np.count_nonzero(roles == _get_role_code(role)) / roles.size
+            percentage = 100 * np.count_nonzero(roles == ROLE_CODES[role]) / roles.size
             colors = ", ".join(names)
             note = f"{percentage:.3g} % of the pixels are {colors}, treated as {_ROLE_LABELS[role]}"
             notes.append(note)
@@ -92,15 +87,21 @@ def _free_soft_edges(
 
     Soft edges have mixed colors without a role; they would become walls around the declared color.
     """
-    # 765 = 3 * 255: brightness from 0 to 1.
-    declared = [sum(color) / 765 for color, role in options.build_color_key().entries if role != "solid"]
+    # Brightness from 0 to 1.
+    declared = [
+        sum(color) / (3 * 255) for color, role in options.build_color_key().entries if role != "solid"
+    ]
     if not declared or min(declared) >= 0.5:
         return
-    mixed = (cells == BLOCKED) & (roles == NO_ROLE) & (picture.level > min(declared) * picture.full)
+    mixed = (
+        (cells == BLOCKED) & (roles == RoleCode.NONE) & (picture.level > min(declared) * picture.max_level)
+    )
     around = np.ones((3, 3), dtype=bool)
-    is_declared = (roles == ROLES.index("free") + 1) | (roles == ROLES.index("ignore") + 1)
+    is_declared = (roles == RoleCode.FREE) | (roles == RoleCode.IGNORE)
     mixed &= ndimage.binary_dilation(is_declared, around, iterations=_SOFT_EDGE_PX)
-    mixed &= ndimage.binary_dilation((cells == FREE) & (roles == NO_ROLE), around, iterations=_SOFT_EDGE_PX)
+    mixed &= ndimage.binary_dilation(
+        (cells == FREE) & (roles == RoleCode.NONE), around, iterations=_SOFT_EDGE_PX
+    )
     cells[mixed] = FREE
 
 
@@ -167,8 +168,8 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: s
         cause = f"{percentage:.3g} % of the pixels are transparent, which counts as solid"
         advice = "--unknown free treats transparent cells as free"
     else:
-        darkest = picture.level.min() / picture.full
-        lightest = picture.level.max() / picture.full
+        darkest = picture.level.min() / picture.max_level
+        lightest = picture.level.max() / picture.max_level
         cause = f"its brightness is from {darkest:.2g} to {lightest:.2g}"
         advice = "--threshold, --invert or --free-color choose otherwise"
     raise MapError(f"{where}: no cell is free: {cause} ({advice})")
@@ -188,6 +189,6 @@ def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str
         light = f"only {percentage:.2g} % of the pixels are light, all of them thin lines"
         return [f"{light}: use --invert if they are the walls"]
     if not counts[BLOCKED] and not counts[UNKNOWN]:
-        darkest = picture.level.min() / picture.full
+        darkest = picture.level.min() / picture.max_level
         return [f"nothing is solid: the darkest pixel has a brightness of {darkest:.2g} (--threshold)"]
     return []

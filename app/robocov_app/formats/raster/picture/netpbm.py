@@ -102,10 +102,10 @@ class _Header(NamedTuple):
 def _parse_header(data: bytes, where: str) -> _Header:
     """Parse the header: type (P2, P3, P5 or P6), width, height and maximum level."""
     numbers = []
-    at = 2  # after the type
+    position = 2  # after the type
     for name in ("width", "height", "maximum"):
-        blank = _BLANK.match(data, at)
-        start = at
+        blank = _BLANK.match(data, position)
+        start = position
         digits = None
         if blank is not None:
             start = blank.end()
@@ -114,7 +114,7 @@ def _parse_header(data: bytes, where: str) -> _Header:
             actual = quote(data[start:][:12])
             raise MapError(f"{where}: {name}: expected a whole number, got {actual}")
         numbers.append(int(digits[0]))
-        at = digits.end()
+        position = digits.end()
     width, height, maximum = numbers
     files.require_cells(width, height, where)
     if not 1 <= maximum <= _MAX_LEVEL:
@@ -122,7 +122,7 @@ def _parse_header(data: bytes, where: str) -> _Header:
     channels = 1
     if data[1:2] in b"36":  # P3 and P6 are in color
         channels = 3
-    return _Header(width, height, channels, maximum, at)
+    return _Header(width, height, channels, maximum, position)
 
 
 def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
@@ -151,16 +151,16 @@ def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
         text = re.sub(rb"#[^\r\n]*", b" ", text)
     values = np.empty(count, np.uint16)
     done = 0
-    at = 0
-    while done < count and at < len(text):
-        blank = _BLANK.search(text, at + _PIECE_BYTES)
-        piece = text[at:]
+    position = 0
+    while done < count and position < len(text):
+        blank = _BLANK.search(text, position + _PIECE_BYTES)
+        piece = text[position:]
         next_piece = len(text)
         if blank is not None:
-            piece = text[at : blank.start()]
+            piece = text[position : blank.start()]
             next_piece = blank.end()
         numbers = files.parse_integers(piece, " ")
-        at = next_piece
+        position = next_piece
         if numbers is None:
             raise MapError(f"{where}: expected {count} whole numbers as pixels, got other text")
         numbers = numbers[: count - done]

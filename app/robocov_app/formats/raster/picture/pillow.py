@@ -29,6 +29,9 @@ MAGIC_NUMBERS = {
 """First bytes of the formats that are decoded with Pillow, keyed by Pillow's names."""
 _MAX_JPEG_PIXELS_PER_BYTE = 512
 """A complete JPEG has at least one bit for 8 x 8 pixels. Pillow would fill missing pixels with gray."""
+_WHITE_IS_ZERO = 0
+"""Value of the TIFF tag PhotometricInterpretation if 0 is white (TIFF 6.0, section 3)."""
+_MAX_16_BIT_LEVEL = 65535
 _MODES_WITH_ALPHA = ("LA", "PA", "RGBA", "La", "RGBa")
 
 
@@ -87,8 +90,8 @@ def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
     """
     from PIL.ExifTags import Base
 
-    full = 65535
-    is_white_zero = getattr(image, "tag_v2", {}).get(Base.PhotometricInterpretation) == 0
+    max_level = _MAX_16_BIT_LEVEL
+    is_white_zero = getattr(image, "tag_v2", {}).get(Base.PhotometricInterpretation) == _WHITE_IS_ZERO
     level = np.empty((image.height, image.width), np.uint16)
     alpha = np.empty((image.height, image.width), np.uint8)
     low = np.inf
@@ -103,17 +106,17 @@ def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
         shade = np.clip(np.where(known, samples, 0.0), 0.0, 1.0)
         if is_white_zero:
             shade = 1.0 - shade
-        level[rows] = np.rint(full * shade)
+        level[rows] = np.rint(max_level * shade)
     if not low <= high:
         raise _UnclearSamplesError("expected samples from 0 (black) to 1 (white), got none that is a number")
     if low < 0.0 or high > 1.0:
         expected = "expected floating-point samples from 0 (black) to 1 (white)"
         raise _UnclearSamplesError(f"{expected}, got {low:.6g} to {high:.6g}")
-    shades = to_rgb(level[:, :, None], full)
+    shades = to_rgb(level[:, :, None], max_level)
     step = choose_thumbnail_step(image.width, image.height)
     return Brightness(
         level,
-        full,
+        max_level,
         alpha=None if (alpha == 255).all() else alpha,
         roles=key.classify(shades) if key else None,
         thumbnail=shades[::step, ::step].copy(),
@@ -137,26 +140,26 @@ def _convert(image: Image, key: ColorKey) -> Brightness:
     if image.mode == "I" and tiff_tags:
         raise _UnclearSamplesError("expected unsigned samples of up to 16 bits")
     if image.mode.startswith("I") and not is_transparent:
-        return _convert_deep_samples(image, tiff_tags, key)
+        return _convert_16_bit_samples(image, tiff_tags, key)
     has_alpha = is_transparent or image.mode in _MODES_WITH_ALPHA
     is_gray = image.mode in ("1", "L", "LA") and not is_transparent
     return _convert_bytes(image, key, texts, is_lossy=is_lossy, is_gray=is_gray, has_alpha=has_alpha)
 
 
-def _convert_deep_samples(image: Image, tiff_tags: Any, key: ColorKey) -> Brightness:
+def _convert_16_bit_samples(image: Image, tiff_tags: Any, key: ColorKey) -> Brightness:
     """Convert a gray picture with samples of up to 16 bits."""
     from PIL.ExifTags import Base
 
-    full = 65535
+    max_level = _MAX_16_BIT_LEVEL
     level = np.asarray(image).astype(np.uint16)
     if tiff_tags:
-        full = (1 << tiff_tags[Base.BitsPerSample][0]) - 1
-        if tiff_tags.get(Base.PhotometricInterpretation) == 0:  # white is zero
-            level = full - level
-    shades = to_rgb(level[:, :, None], full)
+        max_level = (1 << tiff_tags[Base.BitsPerSample][0]) - 1
+        if tiff_tags.get(Base.PhotometricInterpretation) == _WHITE_IS_ZERO:
+            level = max_level - level
+    shades = to_rgb(level[:, :, None], max_level)
     step = choose_thumbnail_step(image.width, image.height)
     roles = key.classify(shades) if key else None
-    return Brightness(level, full, roles=roles, thumbnail=shades[::step, ::step].copy())
+    return Brightness(level, max_level, roles=roles, thumbnail=shades[::step, ::step].copy())
 
 
 def _convert_bytes(

@@ -75,14 +75,14 @@ def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied
     (rows, columns) array of uint8
     """
     level = picture.level
-    full = picture.full
+    max_level = picture.max_level
     if picture.alpha is not None:
         # The sum of red, green, blue and alpha, each from 0 to 255; in a gray picture the colors are equal.
-        color_sums = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)
+        color_sums = np.rint(np.arange(max_level + 1) * (3 * 255 / max_level)).astype(np.uint16)
         level = color_sums[level] + picture.alpha.astype(np.uint16)
-        full = 4 * 255
-    darkness = _compute_darkness(full, negate)
-    table = np.full(full + 1, UNKNOWN, np.uint8)
+        max_level = 4 * 255
+    darkness = _compute_darkness(max_level, negate)
+    table = np.full(max_level + 1, UNKNOWN, np.uint8)
     table[darkness < free] = FREE
     table[darkness > occupied] = BLOCKED
     return table[level]
@@ -104,7 +104,7 @@ def classify_scale(
     -------
     (rows, columns) array of uint8
     """
-    darkness = _compute_darkness(picture.full, negate)
+    darkness = _compute_darkness(picture.max_level, negate)
     occupancy = np.rint((darkness - free) / max(occupied - free, 1e-9) * 100.0)
     occupancy[darkness < free] = 0.0
     occupancy[darkness > occupied] = 100.0
@@ -116,15 +116,15 @@ def classify_scale(
 
 def classify_raw(picture: Brightness, threshold: float) -> Cells:
     """Classify the pixels of a picture of mode raw, whose values are the occupancy in percent."""
-    occupancy = np.rint(_compute_darkness(picture.full, negate=True) * 255.0)
+    occupancy = np.rint(_compute_darkness(picture.max_level, negate=True) * 255.0)
     table = _find_blocked_cells(occupancy, threshold)
     table[occupancy > 100.0] = UNKNOWN
     return table[picture.level]
 
 
-def _compute_darkness(full: int, negate: bool) -> Array:
-    """Return the darkness, from 0 to 1, of each level from 0 to `full`."""
-    shade = np.arange(full + 1) / full
+def _compute_darkness(max_level: int, negate: bool) -> Array:
+    """Return the darkness, from 0 to 1, of each level from 0 to `max_level`."""
+    shade = np.arange(max_level + 1) / max_level
     return shade if negate else 1.0 - shade
 
 

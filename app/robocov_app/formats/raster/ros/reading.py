@@ -51,7 +51,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         path,
         metadata.image,
         "picture",
-        at=f"{where}: image",
+        place=f"{where}: image",
         notes=repaired,
         allow_anywhere=options.anywhere,
     )
@@ -111,7 +111,7 @@ def _describe_yaw(yaw_in_file: float, yaw: float) -> list[str]:
 def _describe_doubtful_cells(picture: Brightness, metadata: Metadata) -> list[str]:
     """Return a note if the thresholds make cells free that were probably saved as unknown."""
     count = int(np.count_nonzero(picture.level == UNKNOWN_LEVEL))
-    is_plain = not metadata.negate and picture.full == 255 and picture.alpha is None
+    is_plain = not metadata.negate and picture.max_level == 255 and picture.alpha is None
     is_unknown_free = metadata.free > 1 - UNKNOWN_LEVEL / 255
     if not is_plain or not is_unknown_free or count < picture.level.size / 100:
         return []

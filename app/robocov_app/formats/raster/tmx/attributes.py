@@ -38,5 +38,5 @@ def parse_integer(element: Element, name: str, minimum: int, default: str = "") 
     """
     text = element.attributes.get(name, default)
     if not re.fullmatch(r"-?[0-9]{1,10}", text) or not minimum <= int(text) < 2**32:
-        element.refuse(f"expected a whole number from {minimum}, got {name} {quote(text)}")
+        element.raise_error(f"expected a whole number from {minimum}, got {name} {quote(text)}")
     return int(text)

@@ -89,7 +89,7 @@ def read_tile_layers(root: Element, layers: list[Layer]) -> TileLayers:
     if is_infinite:
         window = _find_bounds(pieces)
     elif any(piece.window != window for piece in pieces):
-        root.refuse(f"expected layers of {columns} x {rows} tiles, got one of another size")
+        root.raise_error(f"expected layers of {columns} x {rows} tiles, got one of another size")
     _require_few_tiles(root, window, len(layers))
     grids = [_combine(layer_pieces, window) for layer_pieces in pieces_of_layers]
     if is_infinite:
@@ -114,7 +114,7 @@ def _require_few_tiles(root: Element, window: Window, layer_count: int) -> None:
     if size > MAX_TILES or size * layer_count > MAX_TILES_READ:
         expected = f"expected at most {MAX_TILES} tiles, and {MAX_TILES_READ} in all layers"
         layers = format_count(layer_count, "layer")
-        root.refuse(f"{expected}, got {columns} x {rows} in {layers}")
+        root.raise_error(f"{expected}, got {columns} x {rows} in {layers}")
 
 
 def _combine(pieces: list[_Piece], window: Window) -> GlobalIDs:
@@ -175,5 +175,5 @@ class _PieceReader:
         height = parse_integer(sized, "height", 1)
         self._tile_count += width * height
         if self._tile_count > MAX_TILES_READ:
-            piece.refuse(f"expected at most {MAX_TILES_READ} tiles in all, got more")
+            piece.raise_error(f"expected at most {MAX_TILES_READ} tiles in all, got more")
         return width, height

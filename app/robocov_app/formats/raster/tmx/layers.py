@@ -61,7 +61,7 @@ def _iterate_layers(group: Layer, shapes: Shapes) -> Iterator[Layer]:
             is_solid = group.is_solid or bool(selection.only & folded)
         layer = Layer(element, labels, offset, is_solid)
         if selection.skip & folded:
-            shapes.leave_out("layer", "by their names (--only, --skip)")
+            shapes.count_omission("layer", "by their names (--only, --skip)")
         elif element.tag == "group":
             yield from _iterate_layers(layer, shapes)
         elif element.tag == "objectgroup" or selection.only is None or is_solid:

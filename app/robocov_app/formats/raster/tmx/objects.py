@@ -79,7 +79,7 @@ def _parse_vertices(element: Element, minimum: int) -> Array:
     """Return the vertices of a polygon or polyline, (k, 2) px; raise MapError if there are too few."""
     numbers = element.parse_numbers("points")
     if len(numbers) % 2 or len(numbers) < 2 * minimum:
-        element.refuse(f"points: expected {minimum} points, got {len(numbers)} numbers")
+        element.raise_error(f"points: expected {minimum} points, got {len(numbers)} numbers")
     return numbers.reshape(-1, 2)
 
 

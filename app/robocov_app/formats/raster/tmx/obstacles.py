@@ -147,7 +147,7 @@ class ObstacleReader:
 
     def _require_few_parts(self, additional: int) -> None:
         if self._part_count + additional > MAX_PARTS:
-            self._root.refuse(f"expected at most {MAX_PARTS} parts of tiles, got more")
+            self._root.raise_error(f"expected at most {MAX_PARTS} parts of tiles, got more")
 
     def _add_part(self, element: Element, shape: ObjectShape, labels: tuple[str, ...]) -> None:
         self._require_few_parts(1)
@@ -183,7 +183,7 @@ class ObstacleReader:
                 self._add_shape(element, shape, labels)
             else:
                 reason = "that is not solid by name or property (--only NAME selects it)"
-                self._shapes.leave_out("object", reason)
+                self._shapes.count_omission("object", reason)
 
     def _is_solid(
         self, element: Element, labels: tuple[str, ...], folded: set[str], is_layer_solid: bool
@@ -197,16 +197,16 @@ class ObstacleReader:
     def _add_shape(self, element: Element, shape: ObjectShape, labels: tuple[str, ...]) -> None:
         """Add an obstacle whose points are in pixels on the map."""
         shapes = self._shapes
-        at = f"line {element.line}"
+        place = f"line {element.line}"
         points = self._frame.to_meters(shape.points)
         if shape.kind == "line":
-            shapes.add_line(WallLine(points, shapes.thickness, labels), at=at)
+            shapes.add_line(WallLine(points, shapes.thickness, labels), place=place)
         elif shape.kind == "circle" and (points[0] != points[1]).any():
             radius = float(np.hypot(*(points[1] - points[0])))
-            shapes.add_circle(points[0], radius, labels, at=at)
+            shapes.add_circle(points[0], radius, labels, place=place)
         elif shape.kind == "point":
-            shapes.add_point(points[0], at=at)
+            shapes.add_point(points[0], place=place)
         else:
             is_polygon = shape.kind == "polygon"
-            if not is_polygon or not shapes.add_outline([points], labels, at=at, thing=""):
-                shapes.leave_out("object", "that is a text or a template, or has no area")
+            if not is_polygon or not shapes.add_outline([points], labels, place=place, thing=""):
+                shapes.count_omission("object", "that is a text or a template, or has no area")

@@ -57,7 +57,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     orientation = root.attributes.get("orientation", "orthogonal")
     if orientation != "orthogonal":
         name = to_one_line(orientation)[:_MAX_QUOTED_CHARACTERS]
-        root.refuse(f"expected an orthogonal map, got {name}")
+        root.raise_error(f"expected an orthogonal map, got {name}")
     tile = np.array([parse_integer(root, "tilewidth", 1), parse_integer(root, "tileheight", 1)], float)
     pixel = _choose_pixel_size(tile, options, shapes.notes)
     files.require_length(pixel * float(tile.max()), f"{root.where}: the side of a tile")
@@ -74,7 +74,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.labels.require_known_names()
     has_solid_cells = bool(is_solid.any())
     if not (has_solid_cells or shapes.outlines or shapes.lines or shapes.pillars):
-        _refuse_nothing_solid(layers, root.where)
+        _raise_nothing_solid_error(layers, root.where)
     width, height = (pixel * tile).tolist()
     world = outline_free_cells(~is_solid, (width, height), (0.0, 0.0), root.where)
     shapes.count_vertices(count_polygon_vertices(world))
@@ -96,7 +96,7 @@ def _choose_pixel_size(tile: Array, options: ReadOptions, notes: list[str]) -> f
     return cell / float(tile[0])
 
 
-def _refuse_nothing_solid(layers: list[Layer], where: str) -> NoReturn:
+def _raise_nothing_solid_error(layers: list[Layer], where: str) -> NoReturn:
     names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
     problem = "nothing is solid by properties, collision objects or names of layers"
     expected = f"expected --only LAYER with one of walls: {names or 'there is none'}"

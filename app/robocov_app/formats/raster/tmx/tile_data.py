@@ -56,10 +56,10 @@ def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
     else:
         words = [to_one_line(word)[:_MAX_NAME_CHARACTERS] for word in (encoding, compression) if word]
         name = " ".join(words)
-        piece.refuse(f"expected CSV, or base64 with zlib or gzip or neither, got {name}")
+        piece.raise_error(f"expected CSV, or base64 with zlib or gzip or neither, got {name}")
     if ids is None or len(ids) != count:
         actual = "more" if ids is None else len(ids)
-        piece.refuse(f"expected {count} tiles as stated, got {actual}")
+        piece.raise_error(f"expected {count} tiles as stated, got {actual}")
     return ids
 
 
@@ -72,7 +72,7 @@ def _decode_base64_ids(piece: Element, compression: str, count: int) -> GlobalID
             # wbits=47 accepts zlib and gzip.
             raw = zlib.decompressobj(wbits=47).decompress(raw, size + 1)
     except (ValueError, zlib.error) as error:
-        piece.refuse(f"not {compression or 'base64'}: {to_one_line(error)[:60]}")
+        piece.raise_error(f"not {compression or 'base64'}: {to_one_line(error)[:60]}")
     if len(raw) > size:
         return None
     return np.frombuffer(raw, "<u4", min(count, len(raw) // 4))
@@ -84,5 +84,5 @@ def _decode_csv_ids(piece: Element, count: int) -> GlobalIDs | None:
         return None
     numbers = files.parse_integers(piece.text, ",")
     if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
-        piece.refuse("expected whole numbers from 0, separated by commas")
+        piece.raise_error("expected whole numbers from 0, separated by commas")
     return numbers.astype(np.uint32)

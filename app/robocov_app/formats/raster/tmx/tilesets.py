@@ -73,16 +73,16 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
 
 def _read_file(element: Element, path: Path, shapes: Shapes, budget: files.IncludeBudget) -> Element:
     """Return the tileset in the file that an element names."""
-    at = f"{element.where}:{element.line}"
+    place = f"{element.where}:{element.line}"
     file = files.find_named_file(
         path,
         element.attributes["source"],
         "tileset",
-        at=at,
+        place=place,
         notes=shapes.notes,
         allow_anywhere=shapes.options.anywhere,
     )
-    budget.take(file, at)
+    budget.count_file(file, place)
     return read_xml_tree(file, "tileset", "TSX")
 
 

@@ -23,12 +23,12 @@ class Node:
     ----------
     value : str, list, dict or None
         None if the file does not contain it.
-    at : str
+    place : str
         Place of the value, for messages, as in "world.yaml: obstacle[0].shape".
     """
 
     value: files.Value | None
-    at: str
+    place: str
 
     @property
     def is_given(self) -> bool:
@@ -37,11 +37,11 @@ class Node:
 
     def __getitem__(self, name: str) -> Node:
         """Return the value of a key; raise MapError if this value is not a mapping."""
-        prefix = self.at if self.at.endswith(": ") else f"{self.at}."
+        prefix = self.place if self.place.endswith(": ") else f"{self.place}."
         if isinstance(self.value, dict):
             return Node(self.value.get(name), f"{prefix}{name}")
         if self.is_given:
-            self.refuse("a mapping (name: value)")
+            self.raise_error("a mapping (name: value)")
         return Node(None, f"{prefix}{name}")
 
     def list_items(self, *, allow_single: bool = False) -> list[Node]:
@@ -60,9 +60,9 @@ class Node:
         if not self.is_given:
             return []
         if isinstance(self.value, list):
-            return [Node(item, f"{self.at}[{k}]") for k, item in enumerate(self.value)]
+            return [Node(item, f"{self.place}[{k}]") for k, item in enumerate(self.value)]
         if not allow_single:
-            self.refuse("a list")
+            self.raise_error("a list")
         return [self]
 
     def get_text(self, default: str = "") -> str:
@@ -70,7 +70,7 @@ class Node:
         if not self.is_given:
             return default
         if not isinstance(self.value, str):
-            self.refuse("one value")
+            self.raise_error("one value")
         return self.value
 
     def is_true(self) -> bool:
@@ -81,13 +81,13 @@ class Node:
         """Return the value as a number; raise MapError for invalid input."""
         value = files.parse_number(self.get_text(str(default)))
         if not abs(value) <= MAX_COORDINATE_M:
-            self.refuse("a number within 1e7")
+            self.raise_error("a number within 1e7")
         return value
 
     def parse_length(self, default: float) -> float:
         """Return the value as a positive length, m; raise MapError if it is out of range."""
         value = self.parse_number(default)
-        files.require_length(value, self.at)
+        files.require_length(value, self.place)
         return value
 
     def parse_numbers(self, default: list[float]) -> Array:
@@ -110,9 +110,9 @@ class Node:
         """
         values = [item.parse_number(0.0) for item in self.list_items()]
         if self.is_given and len(values) < 2:
-            self.refuse(f"a list of {len(default)} numbers")
+            self.raise_error(f"a list of {len(default)} numbers")
         return np.array([*values, *default[len(values) :]])
 
-    def refuse(self, expected: str) -> NoReturn:
+    def raise_error(self, expected: str) -> NoReturn:
         """Raise a MapError that names the place of this value, and what was expected there."""
-        raise MapError(f"{self.at}: expected {expected}, got {quote(self.value)}")
+        raise MapError(f"{self.place}: expected {expected}, got {quote(self.value)}")

@@ -38,12 +38,12 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     """
     source = _get_source(world["obstacle_map"])
     # Notes name the place without the file.
-    _, _, place = source.at.rpartition(": ")
+    _, _, place = source.place.rpartition(": ")
     file = files.find_named_file(
         path,
         source.get_text(),
         "picture",
-        at=source.at,
+        place=source.place,
         notes=shapes.notes,
         allow_anywhere=shapes.options.anywhere,
     )
@@ -53,8 +53,8 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     picture = read_picture(file, to_one_line(file))
     step = int(world["mdownsample"].parse_number(1.0))
     if step < 1:
-        world["mdownsample"].refuse("a number from 1")
-    is_free = 2 * picture.level.astype(np.uint32) >= picture.full
+        world["mdownsample"].raise_error("a number from 1")
+    is_free = 2 * picture.level.astype(np.uint32) >= picture.max_level
     transparency = describe_transparency(picture)
     if transparency:
         shapes.notes.append(f"{place}: {transparency}")
@@ -70,7 +70,7 @@ def _get_source(obstacle_map: Node) -> Node:
         return obstacle_map
     if obstacle_map["name"].get_text() != "image":
         name = quote(obstacle_map["name"].value)
-        raise MapError(f"{obstacle_map.at}: expected a picture, got {name}, which IR-SIM generates")
+        raise MapError(f"{obstacle_map.place}: expected a picture, got {name}, which IR-SIM generates")
     return obstacle_map["path"]
 
 
@@ -86,7 +86,7 @@ def _find_packaged_picture(source: Node) -> Path:
     """
     name = source.get_text()
     missing = (
-        f"{source.at}: expected a picture next to the file, or one of those of IR-SIM, got {quote(name)}"
+        f"{source.place}: expected a picture next to the file, or one of those of IR-SIM, got {quote(name)}"
     )
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:

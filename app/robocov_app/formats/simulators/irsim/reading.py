@@ -118,10 +118,10 @@ class _GroupReader:
         number = max(int(group["number"].parse_number(1.0)), 0)
         self._object_count += number
         if self._object_count > MAX_OBJECTS:
-            group["number"].refuse(f"a number of at most {MAX_OBJECTS} in total")
+            group["number"].raise_error(f"a number of at most {MAX_OBJECTS} in total")
         states = self._parse_states(group, number)
         if states is None:
-            self._shapes.leave_out(kind, "that IR-SIM places at random", number)
+            self._shapes.count_omission(kind, "that IR-SIM places at random", number)
             return
         names = group["name"].list_items(allow_single=True)
         for k in range(number):
@@ -143,7 +143,7 @@ class _GroupReader:
     def _add_obstacle(self, group: Node, k: int, frame: Array, labels: tuple[str, ...]) -> None:
         """Add obstacle k of a group; `frame` is the (3, 3) transform from its frame to meters."""
         if group["unobstructed"].is_true():
-            self._shapes.leave_out("obstacle", "that nothing collides with")
+            self._shapes.count_omission("obstacle", "that nothing collides with")
             return
         if group["kinematics"].is_given:
             self._moving_count += 1
@@ -163,7 +163,7 @@ class _GroupReader:
         if name == "circle":
             return self._compute_states_on_circle(distribution, number)
         if name != "manual":
-            distribution["name"].refuse("manual, circle or random")
+            distribution["name"].raise_error("manual, circle or random")
         states = group["state"].list_items()
         is_nested = bool(states) and isinstance(states[0].value, list)
         if not is_nested:

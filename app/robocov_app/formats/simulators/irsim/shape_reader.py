@@ -8,6 +8,10 @@ from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transf
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
 from robocov_app.formats.simulators.irsim.node import Node
 
+_DEFAULT_RADIUS_M = 0.2
+_DEFAULT_SIDE_M = 1.0
+"""Default length and width of a rectangle."""
+
 
 class ShapeReader:
     """Adds the shapes of obstacles to a collection, and limits their number.
@@ -43,40 +47,41 @@ class ShapeReader:
         # IR-SIM places the origin of a body with a wheelbase on the rear axle.
         shift = np.array([shape["wheelbase"].parse_number(0.0) / 2, 0.0])
         if shape["random_shape"].is_true():
-            self._shapes.leave_out("shape", "of random form")
+            self._shapes.count_omission("shape", "of random form")
         elif name == "circle":
             self._add_circle(shape, frame, labels, shift)
         elif name == "rectangle":
             self._add_rectangle(shape, frame, labels, shift)
         elif name == "polygon":
             points = _parse_vertices(shape, frame, minimum=3)
-            self._shapes.add_outline([points], labels, at=_get_place(shape), thing="polygon")
+            self._shapes.add_outline([points], labels, place=_get_place(shape), thing="polygon")
         elif name == "linestring":
             points = _parse_vertices(shape, frame, minimum=2)
-            self._shapes.add_line(WallLine(points, self._shapes.thickness, labels), at=_get_place(shape))
+            self._shapes.add_line(WallLine(points, self._shapes.thickness, labels), place=_get_place(shape))
         elif name == "compound":
             for part in shape["parts"].list_items():
                 pose = part["pose"].parse_numbers([0.0, 0.0, 0.0])[:3]
                 self.add(part, frame @ build_frame(*pose), labels)
         else:
-            shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
+            shape["name"].raise_error("circle, rectangle, polygon, linestring or compound")
 
     def _add_circle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
         """Add a disc; `shift`, (2,) m, moves it within its frame."""
         center = shape["center"].parse_numbers([0.0, 0.0])[:2] + shift
-        radius = shape["radius"].parse_length(0.2)
+        radius = shape["radius"].parse_length(_DEFAULT_RADIUS_M)
         (center,) = transform_points(frame, center[None])
-        self._shapes.add_circle(center, radius, labels, at=_get_place(shape))
+        self._shapes.add_circle(center, radius, labels, place=_get_place(shape))
 
     def _add_rectangle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
-        size = np.array([shape["length"].parse_length(1.0), shape["width"].parse_length(1.0)])
-        ring = transform_points(frame, UNIT_SQUARE * size + shift)
-        self._shapes.add_outline([ring], labels, at=_get_place(shape))
+        length = shape["length"].parse_length(_DEFAULT_SIDE_M)
+        width = shape["width"].parse_length(_DEFAULT_SIDE_M)
+        ring = transform_points(frame, UNIT_SQUARE * [length, width] + shift)
+        self._shapes.add_outline([ring], labels, place=_get_place(shape))
 
 
 def _get_place(shape: Node) -> str:
     """Return the place of a shape for messages, without the name of the file."""
-    _, _, place = shape.at.partition(": ")
+    _, _, place = shape.place.partition(": ")
     return place
 
 
@@ -84,5 +89,5 @@ def _parse_vertices(shape: Node, frame: Array, *, minimum: int) -> Array:
     """Return the vertices of a polygon or line, (k, 2) m; raise MapError if there are too few."""
     points = [point.parse_numbers([0.0, 0.0])[:2] for point in shape["vertices"].list_items()]
     if len(points) < minimum:
-        shape["vertices"].refuse("a list of points [x, y]")
+        shape["vertices"].raise_error("a list of points [x, y]")
     return transform_points(frame, np.array(points))

@@ -65,7 +65,7 @@ class BitmapReader:
             millions = files.MAX_CELLS // 1_000_000
             expected = f"expected at most {millions} million pixels in all bitmaps"
             raise MapError(f"{where}: {expected}, got more")
-        is_dark = picture.level <= _MAX_DARK_LEVEL * picture.full
+        is_dark = picture.level <= _MAX_DARK_LEVEL * picture.max_level
         transparency = describe_transparency(picture)
         if transparency:
             self._notes.append(f"{to_one_line(file.name)}: {transparency}")

@@ -81,7 +81,7 @@ class ModelPlacer:
     world : World
     shapes : Shapes
     find_file : callable
-        ``find_file(name, kind, at=place)`` returns the path of a file that the world names.
+        ``find_file(name, kind, place=place)`` returns the path of a file that the world names.
 
     Attributes
     ----------
@@ -110,12 +110,12 @@ class ModelPlacer:
         for given in entities:
             entity, labels = self._expand_macros(given)
             if depth > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: nested in more than {files.MAX_DEPTH} models")
+                raise MapError(f"{entity.place}: nested in more than {files.MAX_DEPTH} models")
             if entity.type in ("window", "block"):
                 continue
             model_frame = frame @ self._parse_pose(entity, "pose")
             if entity.type not in ("model", "position"):
-                self._shapes.leave_out(to_one_line(entity.type)[:_MAX_TYPE_CHARACTERS])
+                self._shapes.count_omission(to_one_line(entity.type)[:_MAX_TYPE_CHARACTERS])
             elif not self._shapes.accept(labels):
                 continue
             elif entity.type == "position":
@@ -124,7 +124,7 @@ class ModelPlacer:
                 if _is_solid(entity):
                     self._add_model(entity, model_frame @ self._parse_pose(entity, "origin"), labels)
                 else:
-                    self._shapes.leave_out("model", "that nothing collides with")
+                    self._shapes.count_omission("model", "that nothing collides with")
                 self._place(entity.children, model_frame, depth + 1)
 
     def _expand_macros(self, entity: Entity) -> tuple[Entity, tuple[str, ...]]:
@@ -138,11 +138,13 @@ class ModelPlacer:
         while chain[-1].type in macros:
             chain.append(macros[chain[-1].type])
             if len(chain) > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: the model {quote(entity.type)} is defined in terms of itself")
+                raise MapError(
+                    f"{entity.place}: the model {quote(entity.type)} is defined in terms of itself"
+                )
         self._entity_count += 1 + sum(len(base.children) for base in chain)
         if self._entity_count > MAX_ENTITIES:
-            raise MapError(f"{entity.at}: expected at most {MAX_ENTITIES} models and blocks, got more")
-        expanded = Entity(chain[-1].type, entity.at)
+            raise MapError(f"{entity.place}: expected at most {MAX_ENTITIES} models and blocks, got more")
+        expanded = Entity(chain[-1].type, entity.place)
         for base in reversed(chain):
             expanded.properties.update(base.properties)
             expanded.children.extend(base.children)
@@ -160,13 +162,13 @@ class ModelPlacer:
         """Add the bitmap of a model; without one, its blocks; without blocks, its box."""
         size = entity.parse_numbers("size", (_DEFAULT_SIDE, _DEFAULT_SIDE)) * self._meters_per_unit
         for length in size.tolist():
-            files.require_length(length, f"{entity.at}: size")
+            files.require_length(length, f"{entity.place}: size")
         box = _ModelBox(frame, size)
         blocks = self._parse_blocks(entity)
         if "bitmap" in entity.properties:
             self._add_bitmap(entity, box, size, labels)
             if blocks:
-                self._shapes.leave_out("block", "next to a bitmap", len(blocks))
+                self._shapes.count_omission("block", "next to a bitmap", len(blocks))
             return
         rings: list[Array] = []
         if blocks:
@@ -176,11 +178,11 @@ class ModelPlacer:
         elif not entity.parse_number("noblocks", 0):
             rings = [np.asarray(box.polygon.exterior.coords)[:-1]]
         for ring in rings:
-            self._shapes.add_outline([ring], labels, at=entity.at, thing="block")
+            self._shapes.add_outline([ring], labels, place=entity.place, thing="block")
 
     def _add_bitmap(self, entity: Entity, box: _ModelBox, size: Array, labels: tuple[str, ...]) -> None:
         """Add a model with a bitmap to the floor plans."""
-        file = self._find_file(entity.get_text("bitmap"), "picture", at=f"{entity.at}: bitmap")
+        file = self._find_file(entity.get_text("bitmap"), "picture", place=f"{entity.place}: bitmap")
         bitmap = self._bitmaps.read(file)
         self._shapes.count_vertices(count_polygon_vertices(bitmap.free))
         cell = float(max(size[0] / bitmap.columns, size[1] / bitmap.rows))
@@ -226,5 +228,5 @@ def _parse_rings(entity: Entity) -> list[Array]:
     for prefix, points in rings.items():
         count = entity.parse_number(f"{prefix}points", len(points))
         if count != len(points):
-            raise MapError(f"{entity.at}: expected {count:g} points as stated, got {len(points)}")
+            raise MapError(f"{entity.place}: expected {count:g} points as stated, got {len(points)}")
     return [np.array([points[index] for index in sorted(points)]) for points in rings.values()]

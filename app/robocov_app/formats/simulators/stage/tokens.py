@@ -32,17 +32,17 @@ class Token(NamedTuple):
         "word", "number", "string", or the bracket itself.
     text : str
         The text of the token, without quotation marks.
-    at : str
+    place : str
         File and line, for messages.
     """
 
     kind: str
     text: str
-    at: str
+    place: str
 
-    def refuse(self, expected: str) -> NoReturn:
+    def raise_error(self, expected: str) -> NoReturn:
         """Raise a MapError that names the place of this token, and what was expected there."""
-        raise MapError(f"{self.at}: expected {expected}, got {quote(self.text)}")
+        raise MapError(f"{self.place}: expected {expected}, got {quote(self.text)}")
 
 
 def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
@@ -52,7 +52,7 @@ def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
     ----------
     path : Path
     find_file : callable
-        ``find_file(name, kind, at=place)`` returns the path of a file that another file names.
+        ``find_file(name, kind, place=place)`` returns the path of a file that another file names.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class _TokenReader:
                 continue
             if kind == "strange":
                 strange = content[match.start() : match.start() + _MAX_QUOTED_CHARACTERS]
-                token._replace(text=strange).refuse("a word, a number or a bracket")
+                token._replace(text=strange).raise_error("a word, a number or a bracket")
             is_include = kind == "word" and text == "include"
             if is_after_include:
                 self._include(token, open_files)
@@ -97,16 +97,16 @@ class _TokenReader:
 
     def _append(self, token: Token) -> None:
         if len(self.tokens) >= MAX_TOKENS:
-            raise MapError(f"{token.at}: expected at most {MAX_TOKENS} words and numbers, got more")
+            raise MapError(f"{token.place}: expected at most {MAX_TOKENS} words and numbers, got more")
         self.tokens.append(token)
 
     def _include(self, token: Token, open_files: tuple[Path, ...]) -> None:
         """Append the tokens of the file that a token names; raise MapError if it includes itself."""
         if token.kind != "string":
-            token.refuse("a file to include")
-        path = self._find_file(token.text, "file", at=token.at)
+            token.raise_error("a file to include")
+        path = self._find_file(token.text, "file", place=token.place)
         includes_itself = any(path.resolve() == file.resolve() for file in open_files)
         if includes_itself or len(open_files) > files.MAX_DEPTH:
-            token.refuse("a file that does not include itself")
-        self._budget.take(path, token.at)
+            token.raise_error("a file that does not include itself")
+        self._budget.count_file(path, token.place)
         self.read(path, (*open_files, path))

@@ -118,14 +118,14 @@ class EntityReader:
                 raise
             except Exception as error:  # ezdxf raises exceptions of any type for invalid attributes
                 kind = to_one_line(entity.dxftype())[:20]
-                self._shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
+                self._shapes.count_omission("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _add_entity(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
         """Add an entity on a layer; if it is hidden or of an unsupported kind, count it as left out."""
         kind = entity.dxftype()
         labels = (layer, *reversed(blocks))
         if layer.casefold() in self._hidden_layers or entity.dxf.get("invisible", 0):
-            self._shapes.leave_out("shape", "hidden, or on layers that are off")
+            self._shapes.count_omission("shape", "hidden, or on layers that are off")
         elif kind == "INSERT":
             self._add_block(entity, layer, blocks)
         elif kind == "MLINE":
@@ -133,7 +133,7 @@ class EntityReader:
         elif self._shapes.accept(labels):
             add = self._adders.get(kind)
             if add is None:
-                self._shapes.leave_out(to_one_line(kind)[:_MAX_KIND_CHARACTERS])
+                self._shapes.count_omission(to_one_line(kind)[:_MAX_KIND_CHARACTERS])
             else:
                 add(entity, labels, _describe_place(entity))
 
@@ -141,7 +141,7 @@ class EntityReader:
         """Add the entities of a block at each position where it is inserted."""
         block = insert.block()
         if block is None or block.block.is_xref:
-            self._shapes.leave_out("block", "missing from the file")
+            self._shapes.count_omission("block", "missing from the file")
             return
         inserts = [insert]
         if insert.mcount > 1:
@@ -149,21 +149,21 @@ class EntityReader:
         for single in inserts:
             self._add_entities(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
 
-    def _add_point(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_point(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         (point,) = self._to_meters([entity.dxf.location])
-        self._shapes.add_point(point, at=at)
+        self._shapes.add_point(point, place=place)
 
-    def _add_segment(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        self._add_line(self._to_meters([entity.dxf.start, entity.dxf.end]), labels, at)
+    def _add_segment(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+        self._add_line(self._to_meters([entity.dxf.start, entity.dxf.end]), labels, place)
 
-    def _add_quadrilateral(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_quadrilateral(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         ring = self._to_meters(entity.wcs_vertices())
-        self._shapes.add_outline([ring], labels, rule="evenodd", at=at)
+        self._shapes.add_outline([ring], labels, rule="evenodd", place=place)
 
-    def _add_hatch(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_hatch(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         """Add a hatch as an area, if the option ``hatches`` is set; otherwise count it as left out."""
         if not self._shapes.options.hatches:
-            self._shapes.leave_out("HATCH", "(--hatches imports them as areas)")
+            self._shapes.count_omission("HATCH", "(--hatches imports them as areas)")
             return
         from ezdxf.path import from_hatch
 
@@ -171,25 +171,25 @@ class EntityReader:
         for path in from_hatch(entity):
             self._require_near(to_plane(path.control_vertices()))
             rings.append(self._to_meters(list(path.flattening(self._tolerance))))
-        self._shapes.add_outline(rings, labels, rule="evenodd", at=at)
+        self._shapes.add_outline(rings, labels, rule="evenodd", place=place)
 
-    def _add_circle(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_circle(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         """Add a circle as a disc, or as a curve if it is tilted."""
         is_disc = entity.dxf.radius and abs(entity.ocs().uz.z) > _MIN_UPWARD_COMPONENT
         if not is_disc:
-            self._add_curve(entity, labels, at)
+            self._add_curve(entity, labels, place)
             return
         radius = self._get_radius(entity)
         self._has_curves = True
         (center,) = self._to_meters([entity.ocs().to_wcs(entity.dxf.center)])
-        self._shapes.add_circle(center, radius * self._scale, labels, at=at)
+        self._shapes.add_circle(center, radius * self._scale, labels, place=place)
 
-    def _add_curve(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_curve(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         """Add a circle, arc, ellipse or spline as an outline if it is closed, otherwise as a wall."""
         points = self._flatten(entity)
         self._has_curves = True
         self._require_near(points)
-        self._add_line(points * self._scale, labels, at)
+        self._add_line(points * self._scale, labels, place)
 
     def _flatten(self, entity: Any) -> Array:
         """Approximate a circle, arc, ellipse or spline by points, (k, 2) in units of the drawing."""
@@ -203,17 +203,17 @@ class EntityReader:
         tolerance = min(self._tolerance, self._get_radius(entity) / 8)
         return to_plane(list(entity.flattening(tolerance)))
 
-    def _add_polyline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _add_polyline(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
         """Add a polyline, whose edges may be arcs; it gets the largest width of its edges."""
         polyline = _parse_polyline(entity)
         if polyline is None:
-            self._shapes.leave_out("mesh")
+            self._shapes.count_omission("mesh")
             return
         rows = polyline.rows
         if polyline.is_closed:
             rows = np.concatenate([rows, rows[:1]])
         if len(rows) < 2:
-            self._shapes.leave_out("line", "without a length")
+            self._shapes.count_omission("line", "without a length")
             return
         self._require_near(rows[:, :2])
         points = flatten_polyline(rows[:, :2], rows[:, 2], self._tolerance)
@@ -225,16 +225,16 @@ class EntityReader:
             points = to_plane(list(plane.points_to_wcs(vectors)))
         self._require_near(points)
         width = max(polyline.width, float(rows[:, 3:].max()))
-        self._add_line(points * self._scale, labels, at, width * self._scale)
+        self._add_line(points * self._scale, labels, place, width * self._scale)
 
-    def _add_line(self, points: Array, labels: tuple[str, ...], at: str, width: float = 0.0) -> None:
+    def _add_line(self, points: Array, labels: tuple[str, ...], place: str, width: float = 0.0) -> None:
         """Add a line: as an outline if it is closed and has no width, otherwise as a wall.
 
         Parameters
         ----------
         points : (k, 2) array, m
         labels : tuple of str
-        at : str
+        place : str
             Place in the file, for messages.
         width : float, m
         """
@@ -243,13 +243,13 @@ class EntityReader:
         is_closed = len(points) > 3 and do_ends_meet
         has_width = width > 0.0
         if is_closed and not has_width:
-            self._shapes.add_outline([points[:-1]], labels, rule="evenodd", at=at)
+            self._shapes.add_outline([points[:-1]], labels, rule="evenodd", place=place)
             return
         if is_closed:
             points = np.concatenate([points[:-1], points[:1]])
         if not has_width or self._shapes.options.thickness is not None:
             width = self._shapes.thickness
-        self._shapes.add_line(WallLine(points, width, labels), at=at)
+        self._shapes.add_line(WallLine(points, width, labels), place=place)
 
     def _to_meters(self, vectors: Sequence[Any]) -> Array:
         """Convert ezdxf vectors to points, (k, 2) m; third coordinates are counted as left out."""

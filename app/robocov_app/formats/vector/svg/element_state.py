@@ -71,7 +71,7 @@ class ElementState:
         """Length to which percentages without a direction refer (SVG 2, section 8.9)."""
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
 
-    def enter(self, element: Element, properties: Style) -> ElementState:
+    def build_child_state(self, element: Element, properties: Style) -> ElementState:
         """Return the state of a child element with its own properties."""
         return replace(
             self,
@@ -82,7 +82,7 @@ class ElementState:
             opacity=self.opacity * parse_opacity(properties.get("opacity", "1")),
         )
 
-    def shift(self, element: Element) -> ElementState:
+    def translate(self, element: Element) -> ElementState:
         """Return the state translated to the position of a ``use`` or ``svg`` element."""
         x, y = self.parse_lengths(element, "x", "y")
         return replace(self, matrix=compose(self.matrix, build_affine(e=x, f=y)))

@@ -37,6 +37,9 @@ from robocov_app.formats.vector.svg.style import INHERITED, StyleSheet, inherit_
 from robocov_app.formats.vector.svg.transforms import build_affine, compose, fit_view_box
 
 ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
+_DEFAULT_PAGE_WIDTH_PX = 300.0
+_DEFAULT_PAGE_HEIGHT_PX = 150.0
+"""Size of a drawing that states none (CSS 2.1, section 10.3.2)."""
 _MIN_SIZE_M = 1.0
 """Minimum size of a drawing at its own scale. A smaller one must show something larger than itself."""
 _GROUP_TAGS = ("g", "a", "switch", "svg", "use")
@@ -53,7 +56,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     try:
         matrix, width, height = _compute_page(root.attributes, options.scale)
     except ValueError as error:
-        root.refuse(str(error))
+        root.raise_error(str(error))
     left, top, *_ = parse_view_box(root.attributes) or (0.0, 0.0, width, height)
     corners = transform_points(matrix, np.array([[left, top], [left + width, top + height]]))
     shapes.page = shapely.box(*corners.min(axis=0), *corners.max(axis=0))
@@ -92,8 +95,8 @@ def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Arra
         If an attribute is invalid.
     """
     box = parse_view_box(attributes)
-    width = _parse_page_length(attributes, "width", box[2] if box else 300.0)
-    height = _parse_page_length(attributes, "height", box[3] if box else 150.0)
+    width = _parse_page_length(attributes, "width", box[2] if box else _DEFAULT_PAGE_WIDTH_PX)
+    height = _parse_page_length(attributes, "height", box[3] if box else _DEFAULT_PAGE_HEIGHT_PX)
     box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"expected a size, got {width:g} x {height:g} px")
@@ -124,7 +127,7 @@ class _DrawingReader:
         self.root = root
         self.shapes = shapes
         self.sheet = StyleSheet(root.where)
-        self.clipped = 0
+        self.clipped_count = 0
         self._elements_by_id: dict[str, Element] = {}
         for element in root.iterate():
             name = element.attributes.get("id")
@@ -145,9 +148,9 @@ class _DrawingReader:
     def describe(self) -> list[str]:
         """Return notes about simplified or ignored elements."""
         counts = {
-            "dashed strokes treated as continuous lines": self.shape_reader.dashed,
-            "clip paths and masks not applied": self.clipped,
-            "style rules of other kinds than tag, .class and #id not applied": self.sheet.unsupported,
+            "dashed strokes treated as continuous lines": self.shape_reader.dashed_count,
+            "clip paths and masks not applied": self.clipped_count,
+            "style rules of other kinds than tag, .class and #id not applied": self.sheet.unsupported_count,
         }
         notes = []
         if self.shapes.vertices:
@@ -172,25 +175,25 @@ class _DrawingReader:
     def _draw_element(self, element: Element, outer: ElementState) -> None:
         """Add an element and its children; `outer` is the state around it."""
         if element.tag in _IMAGE_TAGS:
-            self.shapes.leave_out(element.tag)
+            self.shapes.count_omission(element.tag)
         if element.tag not in _GROUP_TAGS and element.tag not in SHAPE_TAGS:
             return
         if outer.depth > MAX_NESTING:
-            element.refuse(f"nested deeper than {MAX_NESTING}")
+            element.raise_error(f"nested deeper than {MAX_NESTING}")
         properties = self.sheet.get_properties(element)
         if is_hidden(properties):
-            self.shapes.leave_out("hidden element")
+            self.shapes.count_omission("hidden element")
             return
         if any(properties.get(name, "none") != "none" for name in ("clip-path", "mask")):
-            self.clipped += 1
+            self.clipped_count += 1
         try:
-            state = outer.enter(element, properties)
+            state = outer.build_child_state(element, properties)
             if element.tag in SHAPE_TAGS:
                 self.shape_reader.add(element, state)
                 return
             children = list(self._enter_group(element, state))
         except ValueError as error:
-            element.refuse(str(error))
+            element.raise_error(str(error))
         for child, child_state in children:
             self._draw_element(child, child_state)
 
@@ -203,11 +206,11 @@ class _DrawingReader:
             If an attribute is invalid.
         """
         if element.tag in ("use", "svg"):
-            state = state.shift(element)
+            state = state.translate(element)
         if element.tag == "use":
             target = self.find_target(element)
             if target is None:
-                self.shapes.leave_out("use", "of an element that is not in the file")
+                self.shapes.count_omission("use", "of an element that is not in the file")
                 return
             if target.tag not in ("symbol", "svg"):
                 yield target, state
@@ -233,9 +236,9 @@ class _ElementCounter:
     def count(self, element: Element, depth: int) -> tuple[int, int]:
         """Return how many elements an element draws, and how many of them are shapes."""
         if element in self._open:
-            element.refuse("uses itself")
+            element.raise_error("uses itself")
         if depth > MAX_NESTING:
-            element.refuse(f"uses are nested deeper than {MAX_NESTING}")
+            element.raise_error(f"uses are nested deeper than {MAX_NESTING}")
         if element not in self._counts:
             self._open.add(element)
             elements = 1

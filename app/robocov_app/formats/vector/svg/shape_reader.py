@@ -61,7 +61,7 @@ class ShapeReader:
         self.shapes = shapes
         self.unit = get_or_default(shapes.options.scale, METERS_PER_UNIT)
         self.key = shapes.options.build_color_key()
-        self.dashed = 0
+        self.dashed_count = 0
         self._sheet = sheet
         self._elements_by_id = elements_by_id
         self._remaining_commands = MAX_COMMANDS
@@ -75,7 +75,7 @@ class ShapeReader:
         has_fill = is_painted(style, "fill") and element.tag != "line"
         has_stroke = is_painted(style, "stroke")
         if not (is_visible and (has_fill or has_stroke)):
-            self.shapes.leave_out("hidden element")
+            self.shapes.count_omission("hidden element")
             return
         fill = self._find_paint(state, "fill")
         stroke = self._find_paint(state, "stroke")
@@ -100,13 +100,13 @@ class ShapeReader:
         elif stroke is not None:
             self._add_walls(subpaths, state, stroke, element)
         elif not has_area:
-            self.shapes.leave_out("shape", "without an area")
+            self.shapes.count_omission("shape", "without an area")
 
     def _is_ignored(self, paint: Paint, kind: str) -> bool:
         """Return whether the user ignores a color; if so, count the fill or stroke as left out."""
         if paint.role != "ignore":
             return False
-        self.shapes.leave_out(kind, "in an ignored color (--ignore-color)")
+        self.shapes.count_omission(kind, "in an ignored color (--ignore-color)")
         return True
 
     def _find_paint(self, state: ElementState, kind: Literal["fill", "stroke"]) -> Paint:
@@ -138,7 +138,7 @@ class ShapeReader:
         if radius <= 0.0:
             return False
         (center,) = transform_points(state.matrix, center)
-        self.shapes.add_circle(center, radius, state.labels, at=_format_line(element), paint=paint)
+        self.shapes.add_circle(center, radius, state.labels, place=_format_line(element), paint=paint)
         return True
 
     def _add_area(
@@ -152,7 +152,7 @@ class ShapeReader:
         if state.style["fill-rule"].lower() == "evenodd":
             rule = "evenodd"
         return self.shapes.add_outline(
-            rings, state.labels, rule=rule, at=_format_line(element), thing="", paint=paint
+            rings, state.labels, rule=rule, place=_format_line(element), thing="", paint=paint
         )
 
     def _add_edges(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> None:
@@ -171,16 +171,16 @@ class ShapeReader:
         """Add a stroke as walls."""
         lines = self._build_lines(subpaths, state, paint)
         if not lines:
-            self.shapes.leave_out("stroke", "without a width")
+            self.shapes.count_omission("stroke", "without a width")
             return
         min_width = self.shapes.options.compute_stroke_width(self.unit)
         if max(line.measure_widths()[1] for line in lines) < min_width:
-            self.shapes.leave_out("stroke", f"thinner than {min_width:.3g} m (--min-stroke)")
+            self.shapes.count_omission("stroke", f"thinner than {min_width:.3g} m (--min-stroke)")
             return
         if state.style["stroke-dasharray"].lower() != "none":
-            self.dashed += 1
+            self.dashed_count += 1
         for line in lines:
-            self.shapes.add_line(line, at=_format_line(element))
+            self.shapes.add_line(line, place=_format_line(element))
 
     def _build_lines(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> list[WallLine]:
         """Build the walls of a stroke, one for each subpath; none if it has no width."""

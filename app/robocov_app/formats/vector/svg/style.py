@@ -53,15 +53,15 @@ class _StyleRule(NamedTuple):
 
     Attributes
     ----------
-    marks : frozenset of str
+    required_names : frozenset of str
         Tag, classes and id that an element must have.
-    weight : tuple of int
+    specificity : tuple of int
         Specificity: numbers of ids, classes and tags, then the number of the rule. The highest rule wins.
     declarations : _Declarations
     """
 
-    marks: frozenset[str]
-    weight: tuple[int, int, int, int]
+    required_names: frozenset[str]
+    specificity: tuple[int, int, int, int]
     declarations: _Declarations
 
 
@@ -75,14 +75,14 @@ class StyleSheet:
 
     Attributes
     ----------
-    unsupported : int
+    unsupported_count : int
         Number of rules that are not supported, such as @supports.
     """
 
     def __init__(self, where: str) -> None:
-        self.unsupported = 0
+        self.unsupported_count = 0
         self._where = where
-        self._rules_by_mark: dict[str, list[_StyleRule]] = {}
+        self._rules_by_name: dict[str, list[_StyleRule]] = {}
         self._rule_count = 0
         self._characters = 0
         self._checks = 0
@@ -112,14 +112,14 @@ class StyleSheet:
         """
         attributes = element.attributes
         properties = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
-        marks = {element.tag, f"#{attributes.get('id', '')}"}
-        marks |= {f".{name}" for name in attributes.get("class", "").split()}
-        candidates = [rule for mark in ("", *marks) for rule in self._rules_by_mark.get(mark, ())]
+        names = {element.tag, f"#{attributes.get('id', '')}"}
+        names |= {f".{class_name}" for class_name in attributes.get("class", "").split()}
+        candidates = [rule for name in ("", *names) for rule in self._rules_by_name.get(name, ())]
         self._checks += len(candidates)
         if self._checks > MAX_RULE_CHECKS:
             raise MapError(f"{self._where}: too many rules for too many elements")
-        rules = [rule for rule in candidates if rule.marks <= marks]
-        rules.sort(key=lambda rule: rule.weight)
+        rules = [rule for rule in candidates if rule.required_names <= names]
+        rules.sort(key=lambda rule: rule.specificity)
         declarations = [rule.declarations for rule in rules]
         declarations.append(_split_by_importance(parse_declarations(attributes.get("style", ""))))
         for declared in declarations:
@@ -136,7 +136,7 @@ class StyleSheet:
             kept.append(text[position:start])
             # Other media and fonts do not change shapes.
             if not _HARMLESS.match(text, start):
-                self.unsupported += 1
+                self.unsupported_count += 1
             position = _skip_at_rule(text, start)
         return "".join([*kept, text[position:]])
 
@@ -144,19 +144,18 @@ class StyleSheet:
         """Add a rule, or count it as unsupported if its selector is not a tag, classes and an id."""
         match = _SELECTOR.fullmatch(selector)
         if match is None or not selector or self._rule_count >= MAX_RULES:
-            self.unsupported += 1
+            self.unsupported_count += 1
             return
         tags = [match[1]] if match[1] not in (None, "*") else []
-        marks = _CLASS_OR_ID.findall(match[2])
-        id_count = sum(mark.startswith("#") for mark in marks)
+        classes_and_ids = _CLASS_OR_ID.findall(match[2])
+        id_count = sum(name.startswith("#") for name in classes_and_ids)
         self._rule_count += 1
-        weight = (id_count, len(marks) - id_count, len(tags), self._rule_count)
-        rule = _StyleRule(frozenset([*tags, *marks]), weight, declarations)
-        # A rule is compared only with elements that have its last mark; "" is for rules without marks.
-        key = ""
-        if tags or marks:
-            key = [*tags, *marks][-1]
-        self._rules_by_mark.setdefault(key, []).append(rule)
+        specificity = (id_count, len(classes_and_ids) - id_count, len(tags), self._rule_count)
+        names = [*tags, *classes_and_ids]
+        rule = _StyleRule(frozenset(names), specificity, declarations)
+        # A rule is compared only with elements that have its last name; "" is for rules without names.
+        key = names[-1] if names else ""
+        self._rules_by_name.setdefault(key, []).append(rule)
 
 
 def _skip_at_rule(text: str, start: int) -> int:

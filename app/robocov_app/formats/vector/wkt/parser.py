@@ -57,7 +57,7 @@ class _Geometry(NamedTuple):
         Whether the last coordinate of its points is a measure, not a height.
     start : int
         Index of its first character in the text.
-    at : str
+    place : str
         Number of the geometry, for messages, such as "geometry 2.1".
     depth : int
         Number of collections around it.
@@ -66,7 +66,7 @@ class _Geometry(NamedTuple):
     kind: str
     is_measured: bool
     start: int
-    at: str
+    place: str
     depth: int
 
 
@@ -128,22 +128,22 @@ class WktParser:
             return
         srid = int(match[1])
         if self.srid not in (None, srid):
-            self._scanner.refuse(f"expected one SRID for all geometries, got {srid} after {self.srid}")
+            self._scanner.raise_error(f"expected one SRID for all geometries, got {srid} after {self.srid}")
         self.srid = srid
         self._scanner.position = match.end()
         self._scanner.skip_space()
 
-    def _parse_geometry(self, at: str, *, depth: int) -> None:
-        """Parse a geometry, whose number for messages is `at`, inside `depth` collections."""
+    def _parse_geometry(self, place: str, *, depth: int) -> None:
+        """Parse a geometry, whose number for messages is `place`, inside `depth` collections."""
         if depth > MAX_DEPTH:
-            self._scanner.refuse(f"nested too deeply, expected at most {MAX_DEPTH} levels")
+            self._scanner.raise_error(f"nested too deeply, expected at most {MAX_DEPTH} levels")
         start = self._scanner.position
         kind, is_measured = self._parse_kind()
         if self._accept_empty():
-            self._shapes.leave_out("geometry", "without coordinates")
+            self._shapes.count_omission("geometry", "without coordinates")
             return
         parse = self._parsers[kind]
-        parse(_Geometry(kind, is_measured, start, at, depth))
+        parse(_Geometry(kind, is_measured, start, place, depth))
 
     def _parse_kind(self) -> tuple[str, bool]:
         """Return the kind of a geometry, and whether its last coordinate is a measure."""
@@ -153,8 +153,8 @@ class WktParser:
             word = scanner.match(_WORD)
             name = word[0].upper() if word else ""
             if name.rstrip("ZM") in CURVED_KINDS:
-                scanner.refuse(f"expected a geometry with straight edges, got {name}")
-            scanner.refuse(f"expected one of {', '.join(KINDS)}, got {scanner.quote_next()}")
+                scanner.raise_error(f"expected a geometry with straight edges, got {name}")
+            scanner.raise_error(f"expected one of {', '.join(KINDS)}, got {scanner.quote_next()}")
         scanner.position = match.end()
         scanner.skip_space()
         dimensions = match[2] or ""
@@ -185,24 +185,24 @@ class WktParser:
 
     def _parse_collection(self, geometry: _Geometry) -> None:
         for number in self._iterate_items(may_be_empty=False):
-            self._parse_geometry(f"{geometry.at}.{number}", depth=geometry.depth + 1)
+            self._parse_geometry(f"{geometry.place}.{number}", depth=geometry.depth + 1)
 
     def _parse_polygon(self, geometry: _Geometry) -> None:
-        self._add_polygon(geometry, geometry.at)
+        self._add_polygon(geometry, geometry.place)
 
     def _parse_polygons(self, geometry: _Geometry) -> None:
         for number in self._iterate_items():
-            self._add_polygon(geometry, f"{geometry.at}.{number}", whole=geometry.at)
+            self._add_polygon(geometry, f"{geometry.place}.{number}", parent_place=geometry.place)
 
-    def _add_polygon(self, geometry: _Geometry, at: str, whole: str = "") -> None:
-        """Parse the rings of a polygon; `whole` is the number of the geometry if it has several polygons."""
+    def _add_polygon(self, geometry: _Geometry, place: str, parent_place: str = "") -> None:
+        """Parse the rings of a polygon; `parent_place` numbers a geometry of several polygons."""
         rings = [self._parse_points(geometry, minimum=1) for _ in self._iterate_items()]
         if rings:
-            self._geometries.append(self._shapes.build_polygon(rings, (), at, whole))
+            self._geometries.append(self._shapes.build_polygon(rings, (), place, parent_place))
 
     def _parse_line(self, geometry: _Geometry) -> None:
         points = self._parse_points(geometry, minimum=2)
-        self._geometries.append(SourceGeometry("line", (points,), at=geometry.at))
+        self._geometries.append(SourceGeometry("line", (points,), place=geometry.place))
 
     def _parse_lines(self, geometry: _Geometry) -> None:
         for _ in self._iterate_items():
@@ -211,7 +211,7 @@ class WktParser:
     def _parse_point(self, geometry: _Geometry) -> None:
         points = self._parse_points(geometry, minimum=1)
         if len(points) != 1:
-            self._scanner.refuse(f"expected one point, got {len(points)}", geometry.start)
+            self._scanner.raise_error(f"expected one point, got {len(points)}", geometry.start)
         self._add_points(points, geometry)
 
     def _parse_multipoint(self, geometry: _Geometry) -> None:
@@ -223,7 +223,9 @@ class WktParser:
             self._add_points(self._parse_points(geometry, minimum=1), geometry)
 
     def _add_points(self, points: Array, geometry: _Geometry) -> None:
-        self._geometries += [SourceGeometry("point", (point[None],), at=geometry.at) for point in points]
+        self._geometries += [
+            SourceGeometry("point", (point[None],), place=geometry.place) for point in points
+        ]
 
     def _parse_points(self, geometry: _Geometry, *, minimum: int) -> Array:
         """Parse at least `minimum` points in brackets; return their first two coordinates, (k, 2)."""
@@ -231,30 +233,30 @@ class WktParser:
         scanner.skip_space()
         match = scanner.match(_POINTS)
         if match is None:
-            self._refuse_points()
+            self._raise_points_error()
         scanner.position = match.start(1)
         rows: list[list[float]] = []
         for text in match[1].split(","):
             try:
                 rows.append([float(number) for number in text.split()])
             except ValueError:
-                self._refuse_point()
+                self._raise_point_error()
             if not 2 <= len(rows[-1]) <= 4 or len(rows[-1]) != len(rows[0]):
-                self._refuse_point()
+                self._raise_point_error()
             scanner.position += len(text) + 1
         if len(rows) < minimum:
-            scanner.refuse(f"expected at least {minimum} points, got 1", match.start())
+            scanner.raise_error(f"expected at least {minimum} points, got 1", match.start())
         scanner.position = match.end()
         points = np.array(rows)
         if not (np.abs(points) < _MAX_NUMBER).all():
-            scanner.refuse("expected finite numbers", match.start())
+            scanner.raise_error("expected finite numbers", match.start())
         dimensions = points.shape[1]
         has_heights = dimensions > 2 and not (geometry.is_measured and dimensions == 3)
         if has_heights:
             self._shapes.omissions.add_heights(points[:, 2])
         return points[:, :2]
 
-    def _refuse_points(self) -> NoReturn:
+    def _raise_points_error(self) -> NoReturn:
         """Raise MapError at the first character that follows which does not belong to a list of points."""
         scanner = self._scanner
         scanner.expect("(")
@@ -264,13 +266,13 @@ class WktParser:
             end = match.start()
         if scanner.text[end : end + 1] in ("", "("):
             scanner.position = end
-            scanner.refuse(f"expected a point or ), got {scanner.quote_next()}")
+            scanner.raise_error(f"expected a point or ), got {scanner.quote_next()}")
         comma = scanner.text.rfind(",", scanner.position, end)
         if comma >= 0:
             scanner.position = comma + 1
-        self._refuse_point()
+        self._raise_point_error()
 
-    def _refuse_point(self) -> NoReturn:
+    def _raise_point_error(self) -> NoReturn:
         """Raise MapError for the point that follows."""
         scanner = self._scanner
         ahead = scanner.text[scanner.position : scanner.position + _MAX_POINT_CHARACTERS]
@@ -278,4 +280,4 @@ class WktParser:
         scanner.skip_space()
         actual = quote(" ".join(point.split())) if point.strip() else "nothing"
         expected = "expected a point such as 1.5 2, with as many numbers as the first point"
-        scanner.refuse(f"{expected}, got {actual}")
+        scanner.raise_error(f"{expected}, got {actual}")

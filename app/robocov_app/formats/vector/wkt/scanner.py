@@ -63,7 +63,7 @@ class Scanner:
     def expect(self, character: str) -> None:
         """Move past white space and a given character; raise MapError if another one follows."""
         if not self.accept(character):
-            self.refuse(f"expected {character}, got {self.quote_next()}")
+            self.raise_error(f"expected {character}, got {self.quote_next()}")
 
     def quote_next(self) -> str:
         """Move past white space, and quote the beginning of the text that follows for a message."""
@@ -71,7 +71,7 @@ class Scanner:
         lines = self.text[self.position : self.position + _MAX_QUOTED_CHARACTERS].splitlines()
         return quote(lines[0]) if lines else "the end"
 
-    def refuse(self, problem: str, position: int | None = None) -> NoReturn:
+    def raise_error(self, problem: str, position: int | None = None) -> NoReturn:
         """Raise a MapError about a position, by default the next character."""
         if position is None:
             position = self.position
