@@ -448,7 +448,7 @@ class RunOptions(ScenarioOptions, JsonOption):
             record_every=self.record_every,
             overwrite=self.overwrite,
             figures=not self.no_pictures,
-            quiet=self.json,
+            hide_progress=self.json,
             video=self.video.build_settings(),
         )
 

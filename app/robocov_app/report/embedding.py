@@ -33,6 +33,8 @@ MAX_BYTES = 1_500_000
 """Maximum total size of the runs in a page. If they are larger, they are embedded at a lower rate."""
 NO_NUMBER = 65535
 """Code of a missing number among quantized numbers, which have 16 bits."""
+_SIMPLIFICATION_STEPS = 2000
+"""Simplified obstacles move by at most the extent of the map divided by this number."""
 MAX_OBSTACLE_VERTICES = 4000
 """Maximum number of vertices of all obstacles of a map. If there are more, the obstacles are simplified."""
 _RATES_HZ = (MAX_RATE_HZ, 4.0, 2.5, 2.0, 1.25, 1.0)
@@ -88,13 +90,13 @@ def embed_replay(
     -------
     dict
     """
-    rate, has_goals = _choose_detail(runs, max_bytes)
+    rate, include_goals = _choose_detail(runs, max_bytes)
     environments = [build_roster(run.record).environment for run in runs]
     maps = list(dict.fromkeys(environments))
     embedded_runs = []
     for run, style, environment in zip(runs, styles, environments, strict=True):
         map_number = maps.index(environment)
-        embedded_runs.append(embed_run(run, map_number, style, rate, has_goals=has_goals))
+        embedded_runs.append(embed_run(run, map_number, style, rate, include_goals=include_goals))
     return {
         "version": 1,
         "rate": rate,
@@ -125,16 +127,16 @@ def embed_map(environment: Environment) -> dict[str, Any]:
     -------
     dict
         ``region``: a ring. ``blocked``: polygons, each a list of rings. ``density``, if it is not uniform:
-        the data URL of an image. ``movers``, if obstacles move: for each of them its rings, the line of one
-        round trip, and its speed, m/s. Rings and lines are flat lists x, y, x, y, ... of integer multiples of
-        ``unit``, a length in meters: a millimeter or, for tiny maps, less.
+        the data URL of an image. ``movingObstacles``, if obstacles move: for each of them its rings, the line
+        of one round trip, and its speed, m/s. Rings and lines are flat lists x, y, x, y, ... of integer
+        multiples of ``unit``, a length in meters: a millimeter or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
     unit = 10.0 ** min(-3, math.floor(math.log10(extent)) - 3)
     blocked = environment.static.blocked
     if shapely.get_num_coordinates(blocked) > MAX_OBSTACLE_VERTICES:
-        blocked = shapely.simplify(blocked, extent / 2000)
+        blocked = shapely.simplify(blocked, extent / _SIMPLIFICATION_STEPS)
     content: dict[str, Any] = {
         "name": environment.name,
         "unit": unit,
@@ -145,15 +147,15 @@ def embed_map(environment: Environment) -> dict[str, Any]:
     if density_image:
         content["density"] = density_image
     content["blocked"] = [_round_rings(extract_rings(part), unit) for part in shapely.get_parts(blocked)]
-    movers = _embed_moving_obstacles(environment, unit)
-    if movers:
-        content["movers"] = movers
+    moving_obstacles = _embed_moving_obstacles(environment, unit)
+    if moving_obstacles:
+        content["movingObstacles"] = moving_obstacles
     return content
 
 
 def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[str, Any]]:
     """Build the moving obstacles as JSON content."""
-    movers = []
+    moving_obstacles = []
     for obstacle in environment.obstacles:
         path = obstacle.path
         if path is None:
@@ -162,13 +164,13 @@ def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[
             return_points = path.points[:1]
         else:
             return_points = path.points[-2::-1]  # back from the last point but one to the first
-        mover = {
+        content = {
             "rings": _round_rings(extract_rings(obstacle.polygon), unit),
             "line": _round_points([*path.points, *return_points], unit),
             "speed": path.speed,
         }
-        movers.append(mover)
-    return movers
+        moving_obstacles.append(content)
+    return moving_obstacles
 
 
 def _round_points(points: ArrayLike, unit: float) -> list[int]:
@@ -182,7 +184,7 @@ def _round_rings(rings: Iterable[Array], unit: float) -> list[list[int]]:
 
 
 def embed_run(
-    run: ReplayRun, map_number: int, style: CurveStyle, rate: float, *, has_goals: bool
+    run: ReplayRun, map_number: int, style: CurveStyle, rate: float, *, include_goals: bool
 ) -> dict[str, Any]:
     """Build a run as JSON content.
 
@@ -195,7 +197,7 @@ def embed_run(
         Style of the run's curve.
     rate : float
         Frames per simulated second.
-    has_goals : bool
+    include_goals : bool
         Whether to include the goals of the robots.
 
     Returns
@@ -231,7 +233,7 @@ def embed_run(
         "goals": None,
         "cost": _embed_cost(run.history, start, list_even_times(duration, rate), 1.0 / rate),
     }
-    if has_goals and np.isfinite(record.goals).any():
+    if include_goals and np.isfinite(record.goals).any():
         goals = _interpolate_points(record, record.goals, times + start)
         content["goals"] = _quantize_points(record, goals)
     if record.steering is not None:
@@ -254,7 +256,7 @@ def _embed_team(record: Record) -> dict[str, Any]:
     if record.conditions is not None:
         lifetimes = list_lifetimes(record)
         if any(lifetime != (0.0, None) for lifetime in lifetimes):
-            content["lives"] = lifetimes
+            content["lifetimes"] = lifetimes
     return content
 
 
@@ -360,14 +362,14 @@ def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
 
 def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bool]:
     """Choose the frame rate, Hz, and whether to include goals, so that the runs fit in `max_bytes`."""
-    for has_goals, rate in product((True, False), _RATES_HZ):
-        if _estimate_bytes(runs, rate, has_goals=has_goals) <= max_bytes:
-            return rate, has_goals
-    rate = max_bytes / _estimate_bytes(runs, 1.0, has_goals=False)
+    for include_goals, rate in product((True, False), _RATES_HZ):
+        if _estimate_bytes(runs, rate, include_goals=include_goals) <= max_bytes:
+            return rate, include_goals
+    rate = max_bytes / _estimate_bytes(runs, 1.0, include_goals=False)
     return max(min(rate, 1.0), _MIN_RATE_HZ), False
 
 
-def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) -> float:
+def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, include_goals: bool) -> float:
     """Estimate the size of runs in the page, in bytes, at a frame rate, Hz."""
     total = 0.0
     for run in runs:
@@ -376,7 +378,7 @@ def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) 
         if has_path(record):
             frames += float(record.time[-1] - record.time[0]) * rate
         points_per_robot = 1
-        if has_goals and np.isfinite(record.goals).any():
+        if include_goals and np.isfinite(record.goals).any():
             points_per_robot = 2
         # Two 16-bit numbers for each point, and one for the cost.
         bytes_per_frame = 4 * len(record.team) * points_per_robot + 2

@@ -41,6 +41,22 @@ _DENSITY_DOTS = 80
 _NUMBER_SIZES = (1.35, 1.15, 0.9, 0.7)
 """Text sizes of numbers with one, two, three and more digits, in radii of the robot."""
 _MIN_NUMBER_PX = 6.0
+_DIGIT_HEIGHT = 0.72
+"""Height of digits, in text sizes."""
+_MIN_START_PX = 2.4
+_MAX_START_PX = 5.0
+"""Diameters of the rings at starts."""
+_MIN_RADIUS_PX = 1.5
+_MAX_RADIUS_PX = 4.5
+_MAX_NUMBERED_RADIUS_PX = 9.0
+"""Radii of robots without and with numbers."""
+_CROSS_ARM_RADII = 0.62
+"""Half the side of the square whose diagonals cross out a failed robot, in radii of the robot."""
+_ARROW_HALF_LENGTH_PX = 7.0
+"""Half the length of the arrow on a moving obstacle."""
+_ARROW_HEAD_WIDTH = 0.45
+_ARROW_NECK = 0.2
+"""Half the width of the head of this arrow, and the position of its rear, in half lengths of the arrow."""
 
 
 class PictureFrame:
@@ -194,7 +210,7 @@ def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
         if len(track_since_join) > 1:
             simplified = shapely.simplify(shapely.LineString(track_since_join), _TOLERANCE_PX)
             lines.append(shapely.get_coordinates(simplified))
-    return f'<path class="way" d="{_format_path(lines)}"/>'
+    return f'<path class="trajectory" d="{_format_path(lines)}"/>'
 
 
 def _draw_starts(record: Record, frame: PictureFrame) -> str:
@@ -202,15 +218,15 @@ def _draw_starts(record: Record, frame: PictureFrame) -> str:
     first_rows = np.argmax(record.present, axis=0)
     joined = np.flatnonzero(record.present.any(axis=0))
     starts = frame.to_pixels(record.positions[first_rows[joined], joined])
-    radius = fit_mark_size(starts, 2.4, 5.0) / 2
+    radius = fit_mark_size(starts, _MIN_START_PX, _MAX_START_PX) / 2
     return "".join(_draw_circle("start", x, y, radius) for x, y in starts)
 
 
 def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> str:
     """Draw the final positions; failed robots are crossed out."""
     centers = frame.to_pixels(record.positions[-1])
-    max_radius = 9.0 if has_numbers else 4.5
-    radii = fit_radii(centers, record.team.radius * frame.zoom, 1.5, max_radius)
+    max_radius = _MAX_NUMBERED_RADIUS_PX if has_numbers else _MAX_RADIUS_PX
+    radii = fit_radii(centers, record.team.radius * frame.zoom, _MIN_RADIUS_PX, max_radius)
     numbers = build_roster(record).numbers
     shapes = []
     for robot in np.flatnonzero(record.present[-1]).tolist():
@@ -233,7 +249,7 @@ def _draw_circle(css_class: str, x: float, y: float, radius: float) -> str:
 
 def _draw_cross(x: float, y: float, radius: float) -> str:
     """Draw the cross on a failed robot."""
-    arm = 0.62 * radius
+    arm = _CROSS_ARM_RADII * radius
     falling = f"M{x - arm:.1f} {y - arm:.1f}L{x + arm:.1f} {y + arm:.1f}"
     rising = f"M{x - arm:.1f} {y + arm:.1f}L{x + arm:.1f} {y - arm:.1f}"
     return f'<path class="failed" d="{falling}{rising}"/>'
@@ -245,7 +261,7 @@ def _draw_number(number: int, x: float, y: float, radius: float) -> str:
     size = radius * _NUMBER_SIZES[digits - 1]
     if size < _MIN_NUMBER_PX:
         return ""
-    baseline = y + 0.36 * size  # digits are about 0.72 of the text size high
+    baseline = y + _DIGIT_HEIGHT / 2 * size
     return f'<text x="{x:.1f}" y="{baseline:.1f}" font-size="{size:.1f}">{number}</text>'
 
 
@@ -289,11 +305,12 @@ def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, fr
     visible = shapely.intersection(obstacle.polygon, environment.region.polygon)
     rings = [frame.to_pixels(ring) for ring in extract_rings(visible)]
     middle = frame.to_pixels(obstacle.middle)
-    along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
-    across = 0.45 * along[::-1] * np.array([-1.0, 1.0])
+    along = _ARROW_HALF_LENGTH_PX * obstacle.heading * np.array([1.0, -1.0])
+    across = _ARROW_HEAD_WIDTH * along[::-1] * np.array([-1.0, 1.0])
     tip = middle + along
+    neck = middle + _ARROW_NECK * along
     shaft = np.array([middle - along, tip])
-    head = np.array([middle + 0.2 * along + across, tip, middle + 0.2 * along - across])
+    head = np.array([neck + across, tip, neck - across])
     return (
         f'<path class="blocked moving" d="{_format_path(rings, is_closed=True)}"/>'
         f'<path class="motion" d="{_format_path([frame.to_pixels(obstacle.path)])}"/>'

@@ -72,7 +72,7 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     # The folder is created first, so that an unusable one is reported before the long computations.
     with create_result(out, "run", overwrite=settings.overwrite) as result:
         compile_kernels()
-        cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
+        cost = build_cost(scenario.environment, settings.lattice, quiet=settings.hide_progress)
         with Interruption() as interruption:
             run = execute_scenario(scenario, cost, result, "", settings, interruption)
             save_figures([run], cost, result.staging, settings)
@@ -109,7 +109,7 @@ def execute_comparison(
     runs: dict[str, Run] = {}
     with create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result:
         compile_kernels()
-        cost = build_cost(environment, settings.lattice, quiet=settings.quiet)
+        cost = build_cost(environment, settings.lattice, quiet=settings.hide_progress)
         with Interruption() as interruption:
             start_comparison(result.staging, list(scenarios))
             for subfolder, scenario in scenarios.items():
@@ -130,10 +130,10 @@ def _save_videos(
 ) -> None:
     """Save all other results, then the frames and videos if they were requested."""
     result.save_progress()
-    if settings.video.is_wanted:
+    if settings.video.has_output:
         from robocov_app.runs.video import save_videos
 
-        save_videos(runs, cost, result.staging, settings.video, interruption, quiet=settings.quiet)
+        save_videos(runs, cost, result.staging, settings.video, interruption, quiet=settings.hide_progress)
 
 
 def build_comparison_rows(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
@@ -238,7 +238,7 @@ def save_figures(
         return
     from robocov_app.figures.files import save_figure
 
-    with show_progress("figures", 2 * len(FIGURE_SUFFIXES), quiet=settings.quiet) as update:
+    with show_progress("figures", 2 * len(FIGURE_SUFFIXES), quiet=settings.hide_progress) as update:
         report_figure = make_counter(update)
 
         def save(figure: Figure, stem: str) -> None:

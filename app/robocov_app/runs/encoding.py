@@ -188,7 +188,7 @@ def find_encoder() -> str:
 
 
 def build_encoder_command(
-    path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False
+    path: Path, size: tuple[int, int], fps: float, *, is_streamed: bool = False
 ) -> list[str]:
     """Build the command that encodes raw RGB frames as an MP4 video.
 
@@ -200,7 +200,7 @@ def build_encoder_command(
         Size of the frames; both numbers must be even.
     fps : float
         Frames per second.
-    streamed : bool
+    is_streamed : bool
         Whether it must be possible to play the video while it is being written.
 
     Returns
@@ -216,7 +216,7 @@ def build_encoder_command(
     command += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
     command += ["-color_range", "tv"]
     flags = "+faststart"
-    if streamed:
+    if is_streamed:
         command += ["-g", f"{round(_SECONDS_PER_KEYFRAME * fps)}"]
         flags = "+frag_keyframe+empty_moov+default_base_moof"
     command += ["-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"]

@@ -78,7 +78,7 @@ def execute_scenario(
     record.save(result.staging / subfolder)
     # The simulation takes longest, so its record is saved before the evaluation starts.
     result.save_progress()
-    run = evaluate_record(record, cost, interruption, quiet=settings.quiet)
+    run = evaluate_record(record, cost, interruption, quiet=settings.hide_progress)
     save_numbers(run, result.staging / subfolder, settings.lattice)
     result.save_progress()
     return run
@@ -88,11 +88,11 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
     """Simulate a scenario to its end, or until it is interrupted."""
     simulation = scenario.build_simulation()
     redirected: AbstractContextManager[Any] = nullcontext()
-    if settings.quiet:
+    if settings.hide_progress:
         # What a user's controller prints must not be mixed with the JSON on standard output.
         redirected = redirect_stdout(sys.stderr)
     title = f"simulating {simulation.controller.label}"
-    with redirected, show_progress(title, scenario.steps, quiet=settings.quiet) as update:
+    with redirected, show_progress(title, scenario.steps, quiet=settings.hide_progress) as update:
 
         def report_step(step: int) -> bool:
             is_due = step % _STEPS_PER_PROGRESS_UPDATE == 0

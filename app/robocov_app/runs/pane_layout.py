@@ -34,6 +34,8 @@ _MIN_PANE_HEIGHT_PX = 40
 _MIN_SCALE = 0.75
 _HEADER_PADDING_PX = 6
 _PANE_PADDING_PX = 4
+_ANY_SIZE_PX = (64, 64)
+"""Size of a painter that only lists the entries of the legend, which do not depend on its size."""
 
 
 class PaneLayout(NamedTuple):
@@ -180,7 +182,7 @@ def _draw_legend(
     scenes: Sequence[Scene] | None,
 ) -> Frame:
     """Draw the common legend, with entries for everything that the panes show."""
-    painter = build_painter(records[0], settings, (64, 64), build_pane_layers(settings.colors), scale)
+    painter = build_painter(records[0], settings, _ANY_SIZE_PX, build_pane_layers(settings.colors), scale)
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.list_legend_entries(scene) for scene in scenes]

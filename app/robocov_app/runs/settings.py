@@ -50,7 +50,7 @@ class VideoSettings:
     hidden_layers: frozenset[str] = frozenset()
 
     @property
-    def is_wanted(self) -> bool:
+    def has_output(self) -> bool:
         """Whether frames or a video are to be saved."""
         return self.frames or self.video
 
@@ -87,7 +87,7 @@ class OutputSettings:
         Whether to replace an earlier result in the folder.
     figures : bool
         Whether to save figures.
-    quiet : bool
+    hide_progress : bool
         Whether to hide progress, because a program reads the output.
     video : VideoSettings
     """
@@ -96,5 +96,5 @@ class OutputSettings:
     record_every: int = 1
     overwrite: bool = False
     figures: bool = True
-    quiet: bool = False
+    hide_progress: bool = False
     video: VideoSettings = field(default_factory=VideoSettings)

@@ -16,7 +16,7 @@ RAPF = choose_controller_styles(["rapf"])["rapf"]
 def embed(robots: int, **settings) -> tuple:
     """Return a record and its data in a page."""
     record = build_moving_record(robots, **settings)
-    return record, embed_run(ReplayRun(record, None, "a run"), 0, RAPF, MAX_RATE_HZ, has_goals=False)
+    return record, embed_run(ReplayRun(record, None, "a run"), 0, RAPF, MAX_RATE_HZ, include_goals=False)
 
 
 @pytest.mark.parametrize("robots", [12, 20, 30])

@@ -415,7 +415,7 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
 def test_obstacles_have_their_positions_in_the_run(browser, repeat) -> None:
     path = ObstaclePath(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0)), 0.7, repeat)
     cart = CircleObstacle((1.0, 1.0), 0.3, path=path)
-    (mover,) = embed_map(replace(ROOMS, obstacles=(cart,)))["movers"]
+    (mover,) = embed_map(replace(ROOMS, obstacles=(cart,)))["movingObstacles"]
     mover["line"] = [0.001 * value for value in mover["line"]]
     for seconds in (0.0, 1.0, 4.5, 7.3, 20.0, 1234.5):
         shift = browser.js(read_asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
@@ -436,10 +436,10 @@ def test_robots_that_fail_are_crossed_out_and_late_robots_appear(browser, tmp_pa
     assert notes == ["mean distance", "mean distance, robot 2 failed", "mean distance, robot 2 failed"]
     script = (
         read_asset("data.js")
-        + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
+        + "const [data, times] = arguments; const run = new Run(data, new ArenaMap(data.plan, () => {}));"
         + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
     )
-    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, has_goals=True)
+    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, include_goals=True)
     states, said = browser.js(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
     assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
     assert said == ["robot 2 fails", "robot 3 joins"]
@@ -468,10 +468,10 @@ def test_axes_of_curves_are_those_of_figures(browser, low, high) -> None:
 def test_the_page_has_the_hues_of_the_data(browser, robots) -> None:
     record = build_moving_record(robots)
     run = ReplayRun(record, None, "a run")
-    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, has_goals=False)
+    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, include_goals=False)
     script = (
         read_asset("data.js")
-        + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
+        + "const [data, times] = arguments; const run = new Run(data, new ArenaMap(data.plan, () => {}));"
         + "return times.map((time) => run.huesAt(time))"
     )
     moments = [0, 1, data["count"] // 2, data["count"] - 1]

@@ -57,7 +57,7 @@ def test_speeds_are_embedded_for_cells_by_travel_time() -> None:
     mixed = replace(run.record, team=replace(run.record.team, max_speed=speeds))
     timed = replace(mixed, gains={**mixed.gains, "cells": "time"})
     found = [
-        embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)
+        embed_run(replace(run, record=record), 0, STYLE, 5.0, include_goals=True)
         for record in (run.record, mixed, timed)
     ]
     assert ["speeds" in data for data in found] == [False, False, True]
@@ -90,7 +90,7 @@ def test_even_times_begin_at_zero_and_end_at_the_end(end, rate) -> None:
 @pytest.mark.parametrize("seconds", [6.0, 4.35])
 def test_positions_are_those_of_the_record(hz, seconds) -> None:
     run = build_replay_run(seconds, hz=hz)
-    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, include_goals=True)
     record = run.record
     times = np.minimum(np.arange(data["count"]) * data["step"], data["end"])
     wanted = np.stack(
@@ -107,7 +107,7 @@ def test_positions_are_those_of_the_record(hz, seconds) -> None:
 
 def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
     run = build_replay_run()
-    cost = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)["cost"]
+    cost = embed_run(run, 0, STYLE, MAX_RATE_HZ, include_goals=True)["cost"]
     assert run.history is not None
     times = np.minimum(np.arange(cost["count"]) * cost["step"], 6.0)
     wanted = np.interp(times, run.history.time, run.history.mean_distance)
@@ -117,13 +117,15 @@ def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
 
 def test_a_run_without_goals_cost_or_path() -> None:
     record = build_record(controller="rpf")
-    data = embed_run(ReplayRun(record, None, "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    data = embed_run(ReplayRun(record, None, "x"), 0, STYLE, MAX_RATE_HZ, include_goals=True)
     assert data["goals"] is None and data["cost"] is None and data["path"]
     ends = replace(
         record, **{name: getattr(record, name)[[0, -1]] for name in ("time", "positions", "goals")}
     )
     assert not has_path(ends)
-    data = embed_run(ReplayRun(ends, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    data = embed_run(
+        ReplayRun(ends, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, include_goals=True
+    )
     assert data["count"] == 2 and not data["path"]
     assert data["cost"]["count"] > 20  # of the cost there is more
     assert np.abs(read_points(data, record) - record.positions[[0, -1]]).max() < 1e-3
@@ -133,20 +135,20 @@ def test_missing_goals_are_embedded_as_missing() -> None:
     record = build_record(hz=5.0)
     record.goals[:10] = np.nan
     run = ReplayRun(record, None, "x")
-    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, include_goals=True)
     gone = np.isnan(read_points(data, record, "goals")).all(axis=(1, 2))
     assert gone.tolist() == [k < 10 for k in range(data["count"])]
 
 
 def test_lifetimes_of_robots_are_embedded() -> None:
     run = build_replay_run()
-    assert "lives" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
+    assert "lifetimes" not in embed_run(run, 0, STYLE, 5.0, include_goals=True)
     bad = Conditions(failures=((2, 2.0), (4, 5.0)), joins=((3, 1.5), (4, 3.0)))
     record = replace(run.record, conditions=bad)
     assert list_lifetimes(record) == [(0.0, None), (0.0, 2.0), (1.5, None), (3.0, 5.0)]
-    assert embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)["lives"] == list_lifetimes(
-        record
-    )
+    assert embed_run(replace(run, record=record), 0, STYLE, 5.0, include_goals=True)[
+        "lifetimes"
+    ] == list_lifetimes(record)
     # who never comes is there after the end
     late = replace(run.record, conditions=Conditions(joins=((1, 99.0),)))
     assert list_lifetimes(late)[0] == (7.0, None)
@@ -158,8 +160,8 @@ def test_moving_obstacles_are_embedded_separately() -> None:
     environment = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
     data = embed_map(environment)
     assert data["blocked"] == embed_map(ROOMS)["blocked"]
-    assert "movers" not in embed_map(ROOMS)
-    (mover,) = data["movers"]
+    assert "movingObstacles" not in embed_map(ROOMS)
+    (mover,) = data["movingObstacles"]
     assert (np.array(mover["line"]) * data["unit"]).tolist() == [2, 3, 4, 3, 4, 5, 4, 3, 2, 3]
     assert mover["speed"] == 0.5
     (ring,) = mover["rings"]
@@ -170,7 +172,7 @@ def test_moving_obstacles_are_embedded_separately() -> None:
 def test_a_run_of_a_single_moment() -> None:
     record = build_record(seconds=0.0)
     data = embed_run(
-        ReplayRun(record, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True
+        ReplayRun(record, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, include_goals=True
     )
     assert data["end"] == 0.0 and data["count"] == 1
     json.dumps(data, allow_nan=False)
@@ -218,12 +220,12 @@ def test_no_name_ends_its_script_element() -> None:
 
 def test_headings_of_unicycles_are_embedded() -> None:
     run = build_replay_run()
-    assert "headings" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
+    assert "headings" not in embed_run(run, 0, STYLE, 5.0, include_goals=True)
     count, n = run.record.positions.shape[:2]
     angles = np.linspace(0.0, 3.0, count)[:, None] + np.arange(n)
     turning = Team.homogeneous(n, kinematics="unicycle")
     record = replace(run.record, team=turning, steering=np.stack([angles, 0.0 * angles], axis=2))
-    data = embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)
+    data = embed_run(replace(run, record=record), 0, STYLE, 5.0, include_goals=True)
     x, y = dequantize(data["headings"], -1.0, 1.0).reshape(data["count"], -1, 2).transpose(2, 0, 1)
     off = np.angle(np.exp(1j * (np.arctan2(y, x)[[0, -1]] - angles[[0, -1]])))
     assert np.abs(off).max() < 1e-3

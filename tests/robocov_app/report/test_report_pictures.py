@@ -59,7 +59,7 @@ def test_robots_are_drawn_at_their_final_positions() -> None:
     assert starts == pytest.approx(frame.to_pixels(record.positions[0]), abs=0.06)
     assert [each.text for each in root if each.tag == "text"] == ["1", "2", "3", "4", "5"]
     assert len(find_class(root, "cell")) == 5
-    assert find_class(root, "way")[0].get("d").count("M") == 5
+    assert find_class(root, "trajectory")[0].get("d").count("M") == 5
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
@@ -101,13 +101,13 @@ def test_a_record_without_a_path_has_no_lines() -> None:
     names = ("time", "positions", "goals")
     ends = replace(record, **{name: getattr(record, name)[[0, -1]] for name in names})
     root = parse_svg(draw_run(ends, None))
-    assert not find_class(root, "way") and find_class(root, "robot")
+    assert not find_class(root, "trajectory") and find_class(root, "robot")
 
 
 def test_a_very_large_team_makes_no_very_large_picture() -> None:
     record = build_record(robots=MAX_ROBOTS + 1, hz=2.0)
     root = parse_svg(draw_run(record, None))
-    assert not find_class(root, "cell") and not find_class(root, "way")
+    assert not find_class(root, "cell") and not find_class(root, "trajectory")
     assert len(find_class(root, "robot")) == MAX_ROBOTS + 1
 
 

@@ -15,8 +15,8 @@ from robocov_app.report.results.result import ReportedResult, ReportedRun
 MAX_SHOWN_RUNS = 50
 """Maximum number of runs of a result that a page shows."""
 _CRITERIA = (
-    "the best and the worst run of each controller by its final mean distance, and the case (start and seed) "
-    "that is nearest to the middle for all of them, with the gains that each is compared with"
+    "the best and the worst run of each controller by its final mean distance, and the most typical case "
+    "(start and seed) of all controllers, with the gains used in the comparison"
 )
 
 

@@ -146,7 +146,7 @@ def _describe_tuning(choices: Sequence[str], *, has_several_maps: bool) -> str:
         fold = "start and seed"
         other_folds = "from the others"
     return (
-        f"Tuned: if a controller has several sets of gains, the one for each {fold} is that with the lowest "
-        f"median {other_folds}, so that gains are never compared on the runs on which they were chosen; a "
-        f"failed run counts as the worst. Chosen: {'; '.join(choices)}."
+        f"Tuned: if a controller has several sets of gains, for each {fold} the set with the lowest median "
+        f"{other_folds} is used. So gains are never compared on the runs on which they were chosen. A failed "
+        f"run counts as the worst. Chosen: {'; '.join(choices)}."
     )

@@ -67,11 +67,11 @@ function clipped(polygon, x, y, dx, dy, limit) {
 }
 
 /** The transform from meters to pixels: the whole region, as large as possible, with a margin. */
-function frameOf(plan, width, height, margin = 2) {
-  const zoom = Math.min((width - 2 * margin) / plan.width, (height - 2 * margin) / plan.height);
-  const left = (width - zoom * plan.width) / 2;
-  const top = (height - zoom * plan.height) / 2;
-  return { zoom, x: (value) => left + (value - plan.left) * zoom, y: (value) => top + (plan.high - value) * zoom };
+function frameOf(arenaMap, width, height, margin = 2) {
+  const zoom = Math.min((width - 2 * margin) / arenaMap.width, (height - 2 * margin) / arenaMap.height);
+  const left = (width - zoom * arenaMap.width) / 2;
+  const top = (height - zoom * arenaMap.height) / 2;
+  return { zoom, x: (value) => left + (value - arenaMap.left) * zoom, y: (value) => top + (arenaMap.high - value) * zoom };
 }
 
 function traced(frame, rings) {
@@ -90,7 +90,7 @@ function drawnRadii(run, places, states, frame, most) {
   return run.radii.map((radius, i) => {
     let nearest = Infinity;
     for (let j = 0; j < run.robots; j += 1) {
-      if (j === i || states[j] === AWAY) continue;
+      if (j === i || states[j] === NOT_JOINED) continue;
       nearest = Math.min(nearest, Math.hypot(places[2 * i] - places[2 * j], places[2 * i + 1] - places[2 * j + 1]));
     }
     return Math.max(radius * frame.zoom, Math.min(Math.max((nearest * frame.zoom) / 2, 2.3), most));
@@ -101,46 +101,46 @@ function drawnRadii(run, places, states, frame, most) {
 function drawArena(canvas, run, time, look, show) {
   const context = prepared(canvas);
   if (!context) return;
-  const frame = frameOf(run.plan, canvas.clientWidth, canvas.clientHeight);
-  const [places, states] = [run.placesAt(time), run.statesAt(time)];
-  const region = traced(frame, [run.plan.region]);
+  const frame = frameOf(run.arenaMap, canvas.clientWidth, canvas.clientHeight);
+  const [places, states] = [run.positionsAt(time), run.statesAt(time)];
+  const region = traced(frame, [run.arenaMap.region]);
   context.lineJoin = "round";
   context.fillStyle = look.background;
   context.fill(region);
   if (show.cells && run.robots <= MAX_CELLS) drawCells(context, run, run.huesAt(time), places, states, frame, look);
-  const { density, left, high, width, height } = run.plan;
+  const { density, left, high, width, height } = run.arenaMap;
   if (density?.complete) {
     context.drawImage(density, frame.x(left), frame.y(high), width * frame.zoom, height * frame.zoom);
   }
   context.lineWidth = 1;
   context.fillStyle = look.obstacle;
   context.strokeStyle = look["obstacle-edge"];
-  for (const rings of run.plan.blocked) {
+  for (const rings of run.arenaMap.blocked) {
     const path = traced(frame, rings);
     context.fill(path, "evenodd");
     context.stroke(path);
   }
-  drawMovers(context, run, time, frame, region, look);
+  drawMovingObstacles(context, run, time, frame, region, look);
   context.lineWidth = 2;
   context.strokeStyle = look.boundary;
   context.stroke(region);
   if (show.trajectories && run.path) drawTrajectories(context, run, time, places, frame, look);
   drawStarts(context, run, states, frame, look);
   const radii = drawnRadii(run, places, states, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
-  if (show.goals && run.goals) drawGoals(context, run.placesAt(time, run.goals), places, radii, frame, look);
+  if (show.goals && run.goals) drawGoals(context, run.positionsAt(time, run.goals), places, radii, frame, look);
   drawFailed(context, run, places, states, radii, frame, look);
   if (run.headings) drawNoses(context, run, time, places, states, radii, frame, look);
   drawRobots(context, run, places, states, radii, frame, look);
 }
 
 /** Draws moving obstacles at their present positions, clipped to the region. */
-function drawMovers(context, run, time, frame, region, look) {
-  if (!run.plan.movers.length) return;
+function drawMovingObstacles(context, run, time, frame, region, look) {
+  if (!run.arenaMap.movingObstacles.length) return;
   context.save();
   context.clip(region);
-  for (const mover of run.plan.movers) {
-    const [dx, dy] = shiftOf(mover, (run.begin ?? 0) + Math.min(time, run.end));
-    const path = traced(frame, mover.rings.map((ring) => ring.map((value, k) => value + (k % 2 ? dy : dx))));
+  for (const obstacle of run.arenaMap.movingObstacles) {
+    const [dx, dy] = shiftOf(obstacle, (run.begin ?? 0) + Math.min(time, run.end));
+    const path = traced(frame, obstacle.rings.map((ring) => ring.map((value, k) => value + (k % 2 ? dy : dx))));
     context.lineWidth = 2;
     context.fillStyle = look["moving-obstacle"];
     context.fill(path, "evenodd");
@@ -148,15 +148,15 @@ function drawMovers(context, run, time, frame, region, look) {
     context.fillStyle = look.obstacle;
   }
   context.restore();
-  for (const mover of run.plan.movers) drawMotion(context, mover, (run.begin ?? 0) + Math.min(time, run.end), frame, look);
+  for (const obstacle of run.arenaMap.movingObstacles) drawMotion(context, obstacle, (run.begin ?? 0) + Math.min(time, run.end), frame, look);
 }
 
 /** Draws the path of a moving obstacle's center, dashed, and an arrow in its direction. */
-function drawMotion(context, mover, time, frame, look) {
-  const { line, rings } = mover;
+function drawMotion(context, obstacle, time, frame, look) {
+  const { line, rings } = obstacle;
   const [xs, ys] = [0, 1].map((axis) => rings[0].filter((_, k) => k % 2 === axis));
   const middle = [xs, ys].map((values) => (Math.min(...values) + Math.max(...values)) / 2);
-  const [now, next] = [time, time + 1e-3].map((moment) => shiftOf(mover, moment));
+  const [now, next] = [time, time + 1e-3].map((moment) => shiftOf(obstacle, moment));
   context.save();
   context.strokeStyle = look.ink;
   context.lineWidth = 1;
@@ -180,7 +180,7 @@ function drawMotion(context, mover, time, frame, look) {
 function drawTimedCells(context, run, hues, places, states, frame, look) {
   const { speeds } = run;
   for (const i of [...speeds.keys()].filter((k) => states[k] === WORKS).sort((a, b) => speeds[b] - speeds[a])) {
-    const equal = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS && speeds[j] === speeds[i])]);
+    const equal = traced(frame, [cellOf(run.arenaMap.region, places, i, (j) => states[j] === WORKS && speeds[j] === speeds[i])]);
     const circles = [];
     for (let j = 0; j < run.robots; j += 1) {
       if (states[j] !== WORKS || speeds[j] <= speeds[i]) continue;
@@ -212,7 +212,7 @@ function drawCells(context, run, hues, places, states, frame, look) {
   }
   for (let i = 0; i < run.robots; i += 1) {
     if (states[i] !== WORKS) continue;
-    const path = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS)]);
+    const path = traced(frame, [cellOf(run.arenaMap.region, places, i, (j) => states[j] === WORKS)]);
     context.fillStyle = look[`cell-${hues[i]}`];
     context.fill(path);
     context.stroke(path);
@@ -222,13 +222,13 @@ function drawCells(context, run, hues, places, states, frame, look) {
 function drawTrajectories(context, run, time, places, frame, look) {
   const { values, width } = run.where;
   const last = run.where.before(time);
-  const { left, low, width: wide, height: high } = run.plan;
+  const { left, low, width: wide, height: high } = run.arenaMap;
   context.lineWidth = run.robots > 30 ? 1.2 : 2;
   context.lineCap = "round";
   context.strokeStyle = look.trajectory;
   context.beginPath();
   for (let i = 0; i < run.robots; i += 1) {
-    const begin = run.lives[i][0];
+    const begin = run.lifetimes[i][0];
     if (time < begin) continue;
     let drawn = 0;
     for (let row = begin > 0 ? run.where.before(begin) + 1 : 0; row <= last; row += 1) {
@@ -246,8 +246,8 @@ function drawStarts(context, run, states, frame, look) {
   context.lineWidth = 1.8;
   context.strokeStyle = look.start;
   for (let i = 0; i < run.robots; i += 1) {
-    if (states[i] === AWAY) continue;
-    const begin = run.placesAt(run.lives[i][0]);
+    if (states[i] === NOT_JOINED) continue;
+    const begin = run.positionsAt(run.lifetimes[i][0]);
     context.beginPath();
     context.arc(frame.x(begin[2 * i]), frame.y(begin[2 * i + 1]), 4, 0, 2 * Math.PI);
     context.stroke();

@@ -43,7 +43,7 @@ class Series {
   }
 }
 
-class Plan {
+class ArenaMap {
   /** `again` is called to draw again when more has been loaded, such as an image. */
   constructor(data, again) {
     const meters = (ring) => Float64Array.from(ring, (value) => value * data.unit);
@@ -53,7 +53,7 @@ class Plan {
     this.height = this.high - this.low;
     this.region = meters(data.region);
     this.blocked = data.blocked.map((rings) => rings.map(meters));
-    this.movers = (data.movers ?? []).map(({ rings, line, speed }) => ({ rings: rings.map(meters), line: meters(line), speed }));
+    this.movingObstacles = (data.movingObstacles ?? []).map(({ rings, line, speed }) => ({ rings: rings.map(meters), line: meters(line), speed }));
     if (data.density) {
       this.density = new Image();
       this.density.onload = again;
@@ -76,20 +76,20 @@ function shiftOf({ line, speed }, time) {
   return [0, 1].map((axis) => line[2 * k + axis] + part * (line[2 * k + 2 + axis] - line[2 * k + axis]) - line[axis]);
 }
 
-const AWAY = 0;
+const NOT_JOINED = 0;
 const WORKS = 1;
 const FAILED = 2;
 
 class Run {
-  constructor(data, plan) {
-    Object.assign(this, data, { plan, robots: data.numbers.length });
+  constructor(data, arenaMap) {
+    Object.assign(this, data, { arenaMap, robots: data.numbers.length });
     this.where = new Series(data.positions, 2 * this.robots, data.step, data.count, data.end);
     this.goals = data.goals && new Series(data.goals, 2 * this.robots, data.step, data.count, data.end);
     this.headings = data.headings && new Series(data.headings, 2 * this.robots, data.step, data.count, data.end);
     this.range = data.cost;
     this.cost = data.cost && new Series(data.cost.values, 1, data.cost.step, data.cost.count, data.end);
-    this.lives = data.lives ?? Array.from({ length: this.robots }, () => [0, null]);
-    this.events = this.lives.flatMap(([begin, end], i) => [
+    this.lifetimes = data.lifetimes ?? Array.from({ length: this.robots }, () => [0, null]);
+    this.events = this.lifetimes.flatMap(([begin, end], i) => [
       ...(begin > 0 && begin <= this.end ? [{ time: begin, words: `+ ${this.numbers[i]}`, said: `robot ${this.numbers[i]} joins` }] : []),
       ...(end !== null ? [{ time: end, words: `× ${this.numbers[i]}`, said: `robot ${this.numbers[i]} fails` }] : []),
     ]).sort((a, b) => a.time - b.time);
@@ -99,14 +99,14 @@ class Run {
 
   /** State of each robot: it has not joined yet, works, or has failed. */
   statesAt(time) {
-    return this.lives.map(([begin, end]) => {
-      if (time < begin - 1e-9) return AWAY;
+    return this.lifetimes.map(([begin, end]) => {
+      if (time < begin - 1e-9) return NOT_JOINED;
       return end !== null && time >= end - 1e-9 ? FAILED : WORKS;
     });
   }
 
   /** Positions in meters, x and y alternating. If the record has no path, robots stay at the start until the end. */
-  placesAt(time, series = this.where) {
+  positionsAt(time, series = this.where) {
     return this.meters(series.at(this.path || time >= this.end ? time : 0));
   }
 
@@ -122,7 +122,7 @@ class Run {
   }
 
   meters(row) {
-    const { left, low, width, height } = this.plan;
+    const { left, low, width, height } = this.arenaMap;
     return Float64Array.from(row, (value, k) => (k % 2 ? low + value * height : left + value * width));
   }
 

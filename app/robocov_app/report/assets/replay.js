@@ -4,7 +4,7 @@ const MAX_PANES = 4;
 const GAP = 16;
 const WORDS = 68; // height of what stands above and below a picture
 const SPEEDS = [0.5, 1, 2, 4, 8, 16];
-const CALM = matchMedia("(prefers-reduced-motion: reduce)");
+const REDUCED_MOTION = matchMedia("(prefers-reduced-motion: reduce)");
 
 const ICONS = {
   play: "M5 3l9 6-9 6z",
@@ -17,7 +17,7 @@ const ICONS = {
   remove: "M4.6 3.2L9 7.6l4.4-4.4 1.4 1.4L10.4 9l4.4 4.4-1.4 1.4L9 10.4l-4.4 4.4-1.4-1.4L7.6 9 3.2 4.6z",
 };
 
-function made(tag, attributes = {}, ...content) {
+function createElement(tag, attributes = {}, ...content) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   element.append(...content);
@@ -31,13 +31,13 @@ function icon(name) {
 }
 
 function button(name, label, act) {
-  const element = made("button", { type: "button", class: name, "aria-label": label, title: label }, icon(name));
+  const element = createElement("button", { type: "button", class: name, "aria-label": label, title: label }, icon(name));
   element.addEventListener("click", act);
   return element;
 }
 
 function choice(label, options, chosen) {
-  const element = made("select", { "aria-label": label });
+  const element = createElement("select", { "aria-label": label });
   for (const [value, text] of options) element.append(new Option(text, value, false, value === chosen));
   return element;
 }
@@ -62,15 +62,15 @@ function columnsFor(count, aspect, width, height) {
 class Replay {
   constructor(root, data) {
     this.root = root;
-    this.plans = data.maps.map((map) => new Plan(map, () => this.draw()));
-    this.runs = data.runs.map((run) => new Run(run, this.plans[run.map]));
+    this.arenaMaps = data.maps.map((map) => new ArenaMap(map, () => this.draw()));
+    this.runs = data.runs.map((run) => new Run(run, this.arenaMaps[run.map]));
     this.axes = data.axes;
     this.shown = data.panes.slice(0, MAX_PANES);
     this.playing = false;
     this.show = { cells: true, trajectories: true, goals: true };
     this.time = Infinity;
     this.build();
-    this.fill();
+    this.rebuildPanes();
     new ResizeObserver(() => this.draw()).observe(this.stage);
     const again = () => this.recolor();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
@@ -90,23 +90,23 @@ class Replay {
   }
 
   build() {
-    this.stage = made("div", { class: "stage", tabindex: "0", role: "group" });
+    this.stage = createElement("div", { class: "stage", tabindex: "0", role: "group" });
     this.stage.setAttribute(
       "aria-label",
       "Replay. Space plays and pauses, the arrow keys step, Home and End go to the first and last moment.",
     );
-    this.chart = made("canvas", { class: "chart", role: "img" });
-    this.play = made("button", { type: "button", class: "main" });
+    this.chart = createElement("canvas", { class: "chart", role: "img" });
+    this.play = createElement("button", { type: "button", class: "main" });
     this.play.addEventListener("click", () => this.toggle());
-    this.slider = made("input", { type: "range", min: "0", step: "any", "aria-label": "Time" });
+    this.slider = createElement("input", { type: "range", min: "0", step: "any", "aria-label": "Time" });
     this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
-    this.clock = made("span", { class: "clock" });
+    this.clock = createElement("span", { class: "clock" });
     this.speed = choice("Speed", SPEEDS.map((value) => [String(value), `${value}×`]), "4");
-    this.add = made("button", { type: "button", class: "add" }, icon("add"), "Add a run");
+    this.add = createElement("button", { type: "button", class: "add" }, icon("add"), "Add a run");
     this.add.addEventListener("click", () => this.addPane());
-    this.said = made("p", { class: "said", role: "status" });
+    this.said = createElement("p", { class: "said", role: "status" });
     const boxes = ["cells", "trajectories", "goals"].map((name) => this.checkBox(name));
-    const steps = made("div", { class: "steps" });
+    const steps = createElement("div", { class: "steps" });
     steps.append(
       button("start", "First moment", () => this.seek(0)),
       button("back", "One step back", () => this.stepBy(-1)),
@@ -114,13 +114,13 @@ class Replay {
       button("forward", "One step on", () => this.stepBy(1)),
       button("end", "Last moment", () => this.seek(this.end)),
     );
-    const speed = made("label", { class: "speed" }, "Speed ", this.speed);
-    this.controls = made("div", { class: "controls" });
-    this.controls.append(made("div", { class: "transport" }, steps, this.slider, this.clock));
-    this.controls.append(made("div", { class: "settings" }, speed, ...boxes, this.add));
-    const title = made("p", { class: "axis", "aria-hidden": "true" }, "Mean distance to the nearest robot, m");
-    const curves = made("div", { class: "curves" }, title, this.chart);
-    this.live = made("div", { class: "live" }, this.stage, curves, this.controls, this.said);
+    const speed = createElement("label", { class: "speed" }, "Speed ", this.speed);
+    this.controls = createElement("div", { class: "controls" });
+    this.controls.append(createElement("div", { class: "transport" }, steps, this.slider, this.clock));
+    this.controls.append(createElement("div", { class: "settings" }, speed, ...boxes, this.add));
+    const title = createElement("p", { class: "axis", "aria-hidden": "true" }, "Mean distance to the nearest robot, m");
+    const curves = createElement("div", { class: "curves" }, title, this.chart);
+    this.live = createElement("div", { class: "live" }, this.stage, curves, this.controls, this.said);
     this.root.append(this.live);
     this.root.addEventListener("keydown", (event) => this.press(event));
     this.chart.addEventListener("pointerdown", (event) => {
@@ -133,17 +133,17 @@ class Replay {
   }
 
   checkBox(name) {
-    const box = made("input", { type: "checkbox" });
+    const box = createElement("input", { type: "checkbox" });
     box.checked = this.show[name];
     box.addEventListener("change", () => {
       this.show[name] = box.checked;
       this.draw();
     });
-    return made("label", { class: name }, box, name[0].toUpperCase() + name.slice(1));
+    return createElement("label", { class: name }, box, name[0].toUpperCase() + name.slice(1));
   }
 
   /** Rebuilds the panes after a run was added, removed or chosen. */
-  fill() {
+  rebuildPanes() {
     const { runs, shown } = this;
     this.time = Math.min(this.time, this.end);
     this.panes = shown.map((k, place) => this.pane(runs[k], k, place));
@@ -158,50 +158,50 @@ class Replay {
   }
 
   pane(run, k, place) {
-    const canvas = made("canvas", { role: "img" });
-    const mark = made("canvas", { class: "mark", "aria-hidden": "true" });
-    const head = made("div", { class: "head" }, mark);
+    const canvas = createElement("canvas", { role: "img" });
+    const mark = createElement("canvas", { class: "mark", "aria-hidden": "true" });
+    const head = createElement("div", { class: "head" }, mark);
     if (this.runs.length > 1) {
       const names = this.runs.map((other, i) => [String(i), other.title]);
       const list = choice(`Run in pane ${place + 1}`, names, String(k));
       list.addEventListener("change", () => {
         this.shown[place] = Number(list.value);
-        this.fill();
+        this.rebuildPanes();
         this.panes[place].element.querySelector("select").focus();
       });
       head.append(list);
     } else {
-      head.append(made("strong", {}, run.title));
+      head.append(createElement("strong", {}, run.title));
     }
     if (this.shown.length > 1) {
       head.append(
         button("remove", `Remove pane ${place + 1}`, () => {
           this.shown.splice(place, 1);
-          this.fill();
+          this.rebuildPanes();
           this.stage.focus();
         }),
       );
     }
-    const [value, note] = [made("strong"), made("span")];
-    const element = made("div", { class: "pane" }, head, canvas, made("p", { class: "facts" }, value, note));
-    canvas.style.aspectRatio = `${run.plan.width} / ${run.plan.height}`;
+    const [value, note] = [createElement("strong"), createElement("span")];
+    const element = createElement("div", { class: "pane" }, head, canvas, createElement("p", { class: "facts" }, value, note));
+    canvas.style.aspectRatio = `${run.arenaMap.width} / ${run.arenaMap.height}`;
     return { element, canvas, mark, value, note, run };
   }
 
   addPane() {
     const free = this.runs.map((_, k) => k).filter((k) => !this.shown.includes(k));
-    const { plan } = this.runs[this.shown.at(-1)];
-    this.shown.push(free.find((k) => this.runs[k].plan === plan) ?? free[0]);
-    this.fill();
+    const { arenaMap } = this.runs[this.shown.at(-1)];
+    this.shown.push(free.find((k) => this.runs[k].arenaMap === arenaMap) ?? free[0]);
+    this.rebuildPanes();
     this.panes.at(-1).element.querySelector("select").focus();
   }
 
   /** Shows a run in place of the last pane, unless it is shown already. */
-  present(k) {
+  showRun(k) {
     if (!this.shown.includes(k)) {
       if (this.shown.length < MAX_PANES) this.shown.push(k);
       else this.shown[MAX_PANES - 1] = k;
-      this.fill();
+      this.rebuildPanes();
     }
     this.stage.focus();
   }
@@ -215,18 +215,18 @@ class Replay {
     this.playing = true;
     this.update();
     let before = null;
-    let ahead = this.time;
+    let nextTime = this.time;
     const frame = (now) => {
       if (!this.playing) return;
       // after the page was hidden, the replay continues where it was
       const passed = before === null ? 0 : Math.min((now - before) / 1000, 0.1);
       before = now;
-      ahead = Math.min(ahead + passed * Number(this.speed.value), this.end);
+      nextTime = Math.min(nextTime + passed * Number(this.speed.value), this.end);
       // readers who prefer reduced motion get one still picture after another
-      const held = CALM.matches && ahead < this.end && ahead - this.time < Number(this.speed.value) * 0.5;
-      if (!held) this.time = ahead;
-      if (!held) this.update();
-      if (ahead >= this.end) this.stop();
+      const isWaiting = REDUCED_MOTION.matches && nextTime < this.end && nextTime - this.time < Number(this.speed.value) * 0.5;
+      if (!isWaiting) this.time = nextTime;
+      if (!isWaiting) this.update();
+      if (nextTime >= this.end) this.stop();
       else requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
@@ -306,7 +306,7 @@ class Replay {
       const distance = Number.isFinite(cost) ? `mean distance to the nearest robot ${cost.toFixed(3)} m` : "cost not known";
       const robots = run.robots === 1 ? "1 robot" : `${run.robots} robots`;
       const events = run.events.map(({ time, said }) => `${said} at ${time.toFixed(1)} s`);
-      canvas.setAttribute("aria-label", `${run.title}: ${robots} on map ${run.plan.name}. ${at}, ${distance}. ${[...events, run.facts].join(". ")}`.trim());
+      canvas.setAttribute("aria-label", `${run.title}: ${robots} on map ${run.arenaMap.name}. ${at}, ${distance}. ${[...events, run.facts].join(". ")}`.trim());
       return `${run.label}: ${distance}`;
     });
     const curves = this.panes.filter(({ run }) => run.cost).map(({ run }) => {
@@ -321,7 +321,7 @@ class Replay {
     if (!this.look) return;
     const width = this.stage.clientWidth;
     if (!width) return;
-    const aspect = Math.min(...this.panes.map(({ run }) => run.plan.width / run.plan.height));
+    const aspect = Math.min(...this.panes.map(({ run }) => run.arenaMap.width / run.arenaMap.height));
     const { columns, wide } = columnsFor(this.panes.length, aspect, width, window.innerHeight);
     const layout = `repeat(${columns}, minmax(0, ${Math.floor(wide)}px))`;
     if (this.stage.style.gridTemplateColumns !== layout) this.stage.style.gridTemplateColumns = layout;

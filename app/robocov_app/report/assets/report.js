@@ -3,22 +3,22 @@
 /** The enlarged picture of a run, from which one can go to the previous and the next run. */
 class Enlarged {
   constructor() {
-    this.title = made("h2");
-    this.canvas = made("canvas", { role: "img" });
-    this.facts = made("p", { class: "facts" });
-    this.watch = made("button", { type: "button", class: "watch-run" }, icon("play"), "Watch in the replay");
-    this.back = button("back", "The run before", () => this.move(-1));
-    this.forward = button("forward", "The next run", () => this.move(1));
+    this.title = createElement("h2");
+    this.canvas = createElement("canvas", { role: "img" });
+    this.facts = createElement("p", { class: "facts" });
+    this.watch = createElement("button", { type: "button", class: "watch-run" }, icon("play"), "Watch in the replay");
+    this.back = button("back", "Previous run", () => this.move(-1));
+    this.forward = button("forward", "Next run", () => this.move(1));
     const close = button("remove", "Close", () => this.dialog.close());
-    const head = made("div", { class: "head" }, this.title, this.back, this.forward, close);
-    this.dialog = made("dialog", { class: "robocov-replay enlarged" }, head, this.canvas, this.facts, this.watch);
+    const head = createElement("div", { class: "head" }, this.title, this.back, this.forward, close);
+    this.dialog = createElement("dialog", { class: "robocov-replay enlarged" }, head, this.canvas, this.facts, this.watch);
     this.dialog.setAttribute("data-live", "");
     document.body.append(this.dialog);
     this.watch.addEventListener("click", () => {
       this.opener = null; // the focus goes to the replay
       this.dialog.close();
-      this.replay.present(this.run);
-      this.replay.root.scrollIntoView({ behavior: CALM.matches ? "auto" : "smooth", block: "start" });
+      this.replay.showRun(this.run);
+      this.replay.root.scrollIntoView({ behavior: REDUCED_MOTION.matches ? "auto" : "smooth", block: "start" });
     });
     this.dialog.addEventListener("close", () => this.opener?.focus());
     this.dialog.addEventListener("click", (event) => {
@@ -35,15 +35,15 @@ class Enlarged {
   open(replay, run, opener) {
     Object.assign(this, { replay, opener, count: replay.runs.length });
     this.dialog.showModal();
-    this.present(run);
+    this.showRun(run);
     this.dialog.querySelector(".remove").focus();
   }
 
   move(turn) {
-    this.present((this.run + turn + this.count) % this.count);
+    this.showRun((this.run + turn + this.count) % this.count);
   }
 
-  present(k) {
+  showRun(k) {
     this.run = k;
     const run = this.replay.runs[k];
     const cost = run.costAt(run.end);
@@ -51,9 +51,9 @@ class Enlarged {
     this.title.textContent = run.title;
     this.facts.textContent = `${final}${run.facts}`;
     this.canvas.setAttribute("aria-label", `${run.title}: trajectories of all robots. ${final}${run.facts}`);
-    this.canvas.style.aspectRatio = `${run.plan.width} / ${run.plan.height}`;
+    this.canvas.style.aspectRatio = `${run.arenaMap.width} / ${run.arenaMap.height}`;
     // as large as the screen allows, whatever the aspect of the map
-    this.canvas.style.maxWidth = `calc((100vh - 210px) * ${run.plan.width / run.plan.height})`;
+    this.canvas.style.maxWidth = `calc((100vh - 210px) * ${run.arenaMap.width / run.arenaMap.height})`;
     this.draw();
   }
 

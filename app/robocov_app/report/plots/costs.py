@@ -81,7 +81,7 @@ def _sample_histories(result: ReportedResult) -> tuple[Array, dict[ReportedRun, 
 def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
     """Build the plot of the bands in a panel."""
     if panel.is_together:
-        label = "mean distance / that of the start"
+        label = "mean distance / initial mean distance"
         unit = ""
     else:
         label = DISTANCE

@@ -128,7 +128,7 @@ class _BranchWriter:
     def _evaluate(self, record: Record, cost: CoverageCost) -> Run:
         """Evaluate the cost of a record. As in the window, failed robots are not obstacles for the cost."""
         bare = replace(record, environment=cost.environment)
-        history = evaluate_record(bare, cost, self.interruption, quiet=self.settings.quiet).history
+        history = evaluate_record(bare, cost, self.interruption, quiet=self.settings.hide_progress).history
         return Run(record, history, summarize(record, history))
 
     def _write_cost_table(self, costs: list[PartCost]) -> None:
@@ -148,7 +148,9 @@ class _BranchWriter:
         path = self.result.staging / get_video_name(len(parts[-1].setups))
         count = count_video_frames(self.branch, settings)
         frames = draw_branch_frames(self.branch, parts, costs, settings)
-        write_frames_and_video(frames, count, path, settings, self.interruption, quiet=self.settings.quiet)
+        write_frames_and_video(
+            frames, count, path, settings, self.interruption, quiet=self.settings.hide_progress
+        )
 
 
 def _build_folder_name(description: str) -> str:

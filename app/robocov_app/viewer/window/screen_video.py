@@ -55,7 +55,7 @@ class ScreenVideo:
         self._due_frames = 0.0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            command = build_encoder_command(path, self._size, VIDEO_FPS, streamed=True)
+            command = build_encoder_command(path, self._size, VIDEO_FPS, is_streamed=True)
             # Opening with "x" fails if the file exists, so that nothing is written through a symbolic link.
             path.open("xb").close()
             self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
