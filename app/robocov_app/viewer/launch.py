@@ -45,12 +45,15 @@ class ViewerSettings(WindowSettings):
         Whether trajectories show only the last seconds.
     suggests : bool
         Whether the window suggests what to try.
+    motion : bool
+        Whether the camera glides when the zoom changes.
     """
 
     tab: str = "parameters"
     shown: tuple[str, ...] | None = None
     fade: bool = False
     suggests: bool = True
+    motion: bool = True
 
 
 @dataclass
@@ -193,6 +196,7 @@ class ViewerLauncher:
         viewer.view.theme = self.theme or settings.theme
         viewer.view.fades_trajectories = settings.fade
         viewer.view.has_suggestions = settings.suggests
+        viewer.view.has_motion = settings.motion
         viewer.files.recent = list(settings.recent)
         return viewer
 
@@ -222,6 +226,7 @@ class ViewerLauncher:
             "theme": view.theme,
             "fade": view.fades_trajectories,
             "suggests": view.has_suggestions,
+            "motion": view.has_motion,
             "recent": tuple(viewer.files.recent),
             "shown": tuple(sorted(layers)),
             "tab": window.panel.tab,

@@ -23,6 +23,8 @@ class ViewState:
         Whether trajectories show only the last `FADE_S` seconds.
     has_suggestions : bool
         Whether the window suggests what to try once the team has settled.
+    has_motion : bool
+        Whether the camera glides when the zoom changes.
     is_recording : bool
         Whether a video of the window is being recorded.
     """
@@ -32,6 +34,7 @@ class ViewState:
     has_panel: bool = True
     fades_trajectories: bool = False
     has_suggestions: bool = True
+    has_motion: bool = True
     is_recording: bool = False
 
     def toggle_layer(self, name: str) -> None:
@@ -68,6 +71,13 @@ class ViewState:
         if self.has_suggestions:
             return "suggestions on"
         return "suggestions off"
+
+    def toggle_motion(self) -> str:
+        """Switch between smooth and instant zooming; return a message."""
+        self.has_motion = not self.has_motion
+        if self.has_motion:
+            return "zooming is smooth"
+        return "zooming is instant"
 
     def toggle_panel(self) -> None:
         """Show or hide the panel."""

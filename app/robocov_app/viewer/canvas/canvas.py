@@ -22,6 +22,7 @@ from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.tools.viewport import REACH_PX, zoom_about
 from robocov_app.toolkit.window.layout import Layout, is_inside
+from robocov_app.viewer.canvas.camera_glide import CameraGlide
 from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX
 from robocov_app.viewer.canvas.tool_overlay import (
     FAILED_RADIUS_PX,
@@ -43,6 +44,8 @@ MAX_RAYS_PER_PANE = 720
 MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
 UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
 MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, its caption states its time
+
+MAX_GLIDE_STEP_S = 0.05
 
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
@@ -82,6 +85,8 @@ class ViewerCanvas:
     ----------
     hovered : HoveredRobot or None
         The robot under the cursor, if there is one.
+    is_animated : bool
+        Whether the camera may glide; False while nobody watches.
     layout : Layout
         Layout of the window, from `arrange`.
     """
@@ -92,12 +97,14 @@ class ViewerCanvas:
         """Build a canvas without painters; `arrange` adds them."""
         self.viewer = viewer
         self.theme = theme
+        self.is_animated = False
         self.hovered: HoveredRobot | None = None
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._environment: Environment | None = None
         self._root: Node | None = None  # of the run that is shown
         self._camera: Camera | None = None  # None while the whole map is shown
+        self._glide: CameraGlide | None = None  # towards `_camera`, while it lasts
         self._color_limit = 1.0  # end of the color scale of distances, m
         self._layers = build_standard_layers()
 
@@ -119,18 +126,53 @@ class ViewerCanvas:
             self._painters.append(painter)
 
     def fit(self) -> None:
-        """Show the whole map."""
+        """Show the whole map at once."""
+        self._glide = None
         self._camera = None
         for painter in self._painters:
             painter.fit()
+
+    def show_whole_map(self) -> None:
+        """Show the whole map, after a smooth change of the camera."""
+        start = self._painters[0].camera
+        self.fit()
+        self._glide_from(start)
 
     def zoom(self, factor: float, pixel: tuple[float, float]) -> None:
         """Zoom by a factor about a pixel."""
         pane = self.find_pane(pixel) or 0
         left, top, _, _ = self.layout.panes[pane]
-        camera = self._painters[pane].camera
+        painter = self._painters[pane]
+        start = painter.camera
+        # Quick turns of the wheel add up, although the map has not yet followed.
+        target = start if self._glide is None else self._glide.end.with_view(start.view)
         map_size = float(np.ptp(self._get_bounds(), axis=0).max())
-        self._set_camera(zoom_about(camera, factor, (pixel[0] - left, pixel[1] - top), map_size))
+        self._set_camera(zoom_about(target, factor, (pixel[0] - left, pixel[1] - top), map_size))
+        self._glide_from(start)
+
+    def _glide_from(self, start: Camera) -> None:
+        """Let the camera glide from `start` to the present one, unless the user prefers no motion."""
+        if self.is_animated and self.viewer.view.has_motion:
+            self._glide = CameraGlide(start, self._painters[0].camera.with_view(start.view))
+            self.update(0.0)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the camera is gliding."""
+        return self._glide is not None
+
+    def update(self, seconds: float) -> None:
+        """Advance a change of the camera by real time, s."""
+        if self._glide is None:
+            return
+        # After a rest, the time since the previous frame may be longer than the whole change.
+        camera = self._glide.advance(min(seconds, MAX_GLIDE_STEP_S))
+        if self._glide.is_over:
+            self._glide = None
+        for painter in self._painters:
+            painter.camera = camera.with_view(painter.camera.view)
+            if self._glide is None and self._camera is None:
+                painter.fit()
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the map by dx and dy pixels; the center of the view stays within the bounds of the map."""
@@ -143,6 +185,7 @@ class ViewerCanvas:
         return np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2))
 
     def _set_camera(self, camera: Camera) -> None:
+        self._glide = None
         self._camera = camera
         for painter in self._painters:
             painter.camera = camera.with_view(painter.camera.view)

@@ -65,7 +65,7 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     pan_up = partial(canvas.pan, 0, PAN_STEP_PX)
     pan_down = partial(canvas.pan, 0, -PAN_STEP_PX)
     group = CommandGroup("View")
-    group.add("fit", "Show the whole map", canvas.fit, "f")
+    group.add("fit", "Show the whole map", canvas.show_whole_map, "f")
     group.add("zoom:in", "Zoom in", zoom_in, "ctrl+=", "ctrl++", repeats=True)
     group.add("zoom:out", "Zoom out", zoom_out, "ctrl+-", repeats=True)
     group.add("pan:left", "Pan left", pan_left, "ctrl+left", repeats=True)

@@ -130,6 +130,7 @@ class ViewerWindow(CommandWindow):
         self.video: ScreenVideo | None = None
         self.run_saver = RunSaver(viewer.costs.lattice)
         self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
+        self.canvas.is_animated = not is_unattended
         self.chart = Chart(viewer)
         self.lesson = LessonGuide(viewer, self.canvas.fit, is_unattended=is_unattended)
         titles = {layer.name: layer.title for layer in build_standard_layers()}
@@ -221,6 +222,7 @@ class ViewerWindow(CommandWindow):
         self._unrecorded_s += seconds
         self._pass_time(seconds)
         set_title(self.viewer.files.title)
+        self.canvas.update(seconds)
         self._cost_curves.update()
         self._arrange()
         self._inspector.update(self.viewer.now)
@@ -237,7 +239,11 @@ class ViewerWindow(CommandWindow):
             and session.timeline.is_live
             and not session.displayed.environment.has_moving_obstacles
         )
-        if self.video is not None or (session.playback.is_playing and not is_at_rest):
+        if (
+            self.video is not None
+            or self.canvas.is_moving
+            or (session.playback.is_playing and not is_at_rest)
+        ):
             return None
         return (
             viewer.revision,

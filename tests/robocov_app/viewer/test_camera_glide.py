@@ -1,0 +1,64 @@
+"""Smooth changes of the camera."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from driven_window import Driver
+
+from robocov_app.render.camera import Camera
+from robocov_app.viewer.canvas.camera_glide import GLIDE_S, CameraGlide
+
+
+def test_the_point_under_the_pointer_stays_there() -> None:
+    start = Camera((2.0, 3.0), 50.0, (0.0, 0.0, 400.0, 300.0))
+    end = start.zoom_at(2.5, (100.0, 40.0))
+    glide = CameraGlide(start, end)
+    point = start.to_world(np.array([100.0, 40.0]))
+    zooms = []
+    for _ in range(6):
+        camera = glide.advance(GLIDE_S / 6)
+        assert camera.to_pixels(point) == pytest.approx([100.0, 40.0])
+        zooms.append(camera.zoom)
+    assert glide.is_over
+    assert zooms == sorted(zooms) and zooms[-1] == end.zoom
+
+
+def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:
+    canvas = driver.window.canvas
+    whole = canvas.to_pixel((1.0, 1.0))
+    canvas.is_animated = True
+    driver.window.do("zoom:in")
+    assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(whole)
+    assert driver.window.build_frame_key() is None
+    driver.run_frames(1)
+    between = canvas.to_pixel((1.0, 1.0))
+    driver.run_frames(15)
+    assert not canvas.is_moving
+    zoomed = canvas.to_pixel((1.0, 1.0))
+    assert len({whole, between, zoomed}) == 3
+    driver.window.do("fit")
+    driver.run_frames(15)
+    assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(whole)
+
+
+def test_quick_turns_of_the_wheel_add_up(driver: Driver) -> None:
+    canvas = driver.window.canvas
+    for _ in range(3):
+        driver.window.do("zoom:in")
+    zoomed = canvas.to_pixel((1.0, 1.0))
+    driver.window.do("fit")
+    canvas.is_animated = True
+    for _ in range(3):
+        driver.window.do("zoom:in")
+        driver.run_frames(1)
+    driver.run_frames(15)
+    assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(zoomed)
+
+
+def test_motion_can_be_switched_off(driver: Driver) -> None:
+    canvas = driver.window.canvas
+    canvas.is_animated = True
+    driver.window.do("motion")
+    driver.window.do("zoom:in")
+    assert not canvas.is_moving
