@@ -177,39 +177,55 @@ def _group_cells(
     A group consists of the cells of the graph within `max_steps` of its first cell, from neighbor to
     neighbor, that are not in an earlier group. They are found by a breadth-first search.
     """
-    rows, columns = is_in_graph.shape
+    columns = is_in_graph.shape[1]
     group = np.full(is_in_graph.shape, NO_VERTEX)
     first_cells = np.empty(is_in_graph.size, dtype=np.intp)
     queue = np.empty(is_in_graph.size, dtype=np.intp)
-    steps = np.empty(is_in_graph.size, dtype=np.intp)
+    step_counts = np.empty(is_in_graph.size, dtype=np.intp)
     group_count = 0
-    for first in range(is_in_graph.size):
-        row = first // columns
-        column = first % columns
-        if not is_in_graph[row, column] or group[row, column] != NO_VERTEX:
-            continue
-        first_cells[group_count] = first
-        group[row, column] = group_count
-        queue[0] = first
-        steps[0] = 0
-        head = 0
-        tail = 1
-        while head < tail:
-            row = queue[head] // columns
-            column = queue[head] % columns
-            step = steps[head]
-            head += 1
-            for k in range(len(neighbor_steps)):
-                i = row + neighbor_steps[k, _UP]
-                j = column + neighbor_steps[k, _RIGHT]
-                is_inside = 0 <= i < rows and 0 <= j < columns
-                if step < max_steps and is_inside and is_in_graph[i, j] and group[i, j] == NO_VERTEX:
-                    group[i, j] = group_count
-                    queue[tail] = i * columns + j
-                    steps[tail] = step + 1
-                    tail += 1
-        group_count += 1
+    for cell in range(is_in_graph.size):
+        row = cell // columns
+        column = cell % columns
+        if is_in_graph[row, column] and group[row, column] == NO_VERTEX:
+            first_cells[group_count] = cell
+            group[row, column] = group_count
+            queue[0] = cell
+            step_counts[0] = 0
+            _fill_group(group, is_in_graph, max_steps, neighbor_steps, queue, step_counts)
+            group_count += 1
     return first_cells[:group_count], group
+
+
+@kernel
+def _fill_group(
+    group: IntArray,
+    is_in_graph: BoolArray,
+    max_steps: int,
+    neighbor_steps: IntArray,
+    queue: IntArray,
+    step_counts: IntArray,
+) -> None:
+    """Add all cells within `max_steps` of the first cell in the queue to its group.
+
+    The queue contains indices of the flattened array, each with its number of steps from the first cell.
+    """
+    rows, columns = is_in_graph.shape
+    head = 0
+    tail = 1
+    while head < tail:
+        row = queue[head] // columns
+        column = queue[head] % columns
+        step_count = step_counts[head]
+        head += 1
+        for k in range(len(neighbor_steps)):
+            i = row + neighbor_steps[k, _UP]
+            j = column + neighbor_steps[k, _RIGHT]
+            is_inside = 0 <= i < rows and 0 <= j < columns
+            if step_count < max_steps and is_inside and is_in_graph[i, j] and group[i, j] == NO_VERTEX:
+                group[i, j] = group[row, column]
+                queue[tail] = i * columns + j
+                step_counts[tail] = step_count + 1
+                tail += 1
 
 
 def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
