@@ -196,8 +196,8 @@ def _find_balancing_forces(forces: dict[str, complex]) -> list[str]:
     strongest = sorted(forces, key=lambda kind: -abs(forces[kind]))
     pair = sum((forces[kind] for kind in strongest[:2]), 0j)
     is_pair = abs(pair) < _PAIR_FRACTION * abs(forces[strongest[0]])
-    chosen = strongest[: 2 if is_pair else MAX_NAMED_FORCES]
-    return [kind for kind in forces if kind in chosen]
+    named = strongest[: 2 if is_pair else MAX_NAMED_FORCES]
+    return [kind for kind in forces if kind in named]
 
 
 def _name_force_with_size(situation: RobotSituation, kind: str) -> str:
