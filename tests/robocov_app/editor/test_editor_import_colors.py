@@ -18,7 +18,7 @@ from robocov_app.editor.ui.import_sheet import (
     list_declared_colors,
     set_role,
 )
-from robocov_app.editor.ui.importing import ImportJob
+from robocov_app.editor.ui.importing import ImportService
 from robocov_app.formats import IMPORTERS, ReadOptions
 from robocov_app.jobs.workers import DirectWorker
 
@@ -37,7 +37,7 @@ def drawing(tmp_path: Path) -> Path:
 
 
 def build_dialog(path: Path, kind: str = "svg") -> ImportDialog:
-    import_dialog = ImportDialog(path, IMPORTERS[kind], DirectWorker(ImportJob()), lambda _: None)
+    import_dialog = ImportDialog(path, IMPORTERS[kind], DirectWorker(ImportService()), lambda _: None)
     import_dialog.poll()
     return import_dialog
 
@@ -53,12 +53,12 @@ def test_clicks_cycle_a_color_through_its_roles(drawing: Path) -> None:
     assert free_area(import_dialog) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
         import_dialog.form.cycle_color((224, 224, 255))
-        assert find_role(import_dialog.form.entries, (224, 224, 255)) == role
+        assert find_role(import_dialog.form.texts, (224, 224, 255)) == role
         assert free_area(import_dialog) == pytest.approx(area)
         # Ignored shapes can still be clicked.
         assert import_dialog.imported is not None and import_dialog.imported.sheet is not None
         assert import_dialog.imported.sheet.find_color(*RUG) == (224, 224, 255)
-    assert import_dialog.form.entries == {}
+    assert import_dialog.form.texts == {}
 
 
 def test_clicked_colors_are_added_to_typed_ones() -> None:
@@ -106,10 +106,10 @@ def test_colors_of_a_picture_ignore_soft_edges(tmp_path: Path) -> None:
     assert color_sheet.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
     assert color_sheet.find_color(25.0, 5.0) is None and color_sheet.find_color(5.0, -0.01) is None
     import_dialog = build_dialog(save_picture(tmp_path), "picture")
-    import_dialog.form.set("cell", "0.1")
+    import_dialog.form.set_text("cell", "0.1")
     split = free_area(import_dialog)
     import_dialog.form.cycle_color((255, 0, 0))
-    assert find_role(import_dialog.form.entries, (255, 0, 0)) == "free"
+    assert find_role(import_dialog.form.texts, (255, 0, 0)) == "free"
     assert free_area(import_dialog) > split + 50
 
 
@@ -166,7 +166,7 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDr
     solid = get_pixel(driver, after)
     driver.click(*before.tolist())
     import_dialog, widgets = get_dialog(driver)
-    assert import_dialog.form.entries == {"free_color": "#e0e0ff"}
+    assert import_dialog.form.texts == {"free_color": "#e0e0ff"}
     # the rows of colors are in sight, and do not move the maps
     chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
@@ -174,7 +174,7 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDr
     # a click into the right map still keeps a part
     driver.click(*import_dialog.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
     import_dialog, _ = get_dialog(driver)
-    assert [float(word) for word in import_dialog.form.entries["inside"].split()] == pytest.approx(
+    assert [float(word) for word in import_dialog.form.texts["inside"].split()] == pytest.approx(
         (8.0, 1.0), abs=0.1
     )
 
@@ -197,11 +197,11 @@ def test_colors_can_be_set_by_keyboard(driver: EditorDriver) -> None:
         driver.run_frames(1)
     driver.press_key("space")
     import_dialog, _ = get_dialog(driver)
-    assert import_dialog.form.entries == {"free_color": "#e0e0ff"}
+    assert import_dialog.form.texts == {"free_color": "#e0e0ff"}
     assert ui.focus is not None and ui.focus == "color:#e0e0ff"
     driver.press_key("space")
     import_dialog, _ = get_dialog(driver)
-    assert import_dialog.form.entries == {"solid_color": "#e0e0ff"}
+    assert import_dialog.form.texts == {"solid_color": "#e0e0ff"}
 
 
 def test_the_report_is_visible(driver: EditorDriver) -> None:

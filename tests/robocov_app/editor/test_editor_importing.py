@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 
 from robocov_app.editor.edits.properties import set_title
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import ImportJob, list_options
+from robocov_app.editor.ui.importing import ImportService, list_options
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping
 from robocov_app.jobs.workers import DirectWorker, LatestWorker
 from robocov_app.toolkit.dialogs import Question
@@ -35,7 +35,7 @@ def plan(tmp_path: Path) -> Path:
 
 
 def build_dialog(path: Path, worker: Any = None, call: Any = None) -> ImportDialog:
-    worker = worker or DirectWorker(ImportJob())
+    worker = worker or DirectWorker(ImportService())
     return ImportDialog(path, IMPORTERS["picture"], worker, call)
 
 
@@ -51,14 +51,14 @@ def test_the_dialog_has_the_options_of_the_format(name: str, tmp_path: Path) -> 
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
-    dialog = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
+    dialog = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportService()), None)
     assert dialog.form.build_settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "position": "1 2", "words": "a, b", "text": "walls"}
     given |= {"colors": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "position": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
     meant |= {"colors": ("red", "#00ff00"), "width": "3px"}
     for option in options:
-        dialog.form.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
+        dialog.form.texts = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (
             {"yes": True}.get(option.choices[-1], option.choices[-1])
             if option.choices
@@ -70,25 +70,25 @@ def test_the_dialog_has_the_options_of_the_format(name: str, tmp_path: Path) -> 
 def test_every_change_updates_the_preview(plan: Path) -> None:
     dialog = build_dialog(plan)
     assert "--cell" in dialog.problem and not dialog.is_ready
-    dialog.form.set("cell", "0.1")
+    dialog.form.set_text("cell", "0.1")
     assert compute_free_area(dialog) == pytest.approx(80 - 1)
-    dialog.form.set("invert", "yes")
+    dialog.form.set_text("invert", "yes")
     assert compute_free_area(dialog) == pytest.approx(200 - 80 - 56)
-    dialog.form.set("invert", "no")
-    dialog.form.set("threshold", "0.3")
+    dialog.form.set_text("invert", "no")
+    dialog.form.set_text("threshold", "0.3")
     assert compute_free_area(dialog) == pytest.approx(80)
-    dialog.form.set("threshold", "0.3x")
+    dialog.form.set_text("threshold", "0.3x")
     assert dialog.problem == "threshold: expected a number, got '0.3x'"
-    dialog.form.set("threshold", "")
-    dialog.form.set("keep", "all")
+    dialog.form.set_text("threshold", "")
+    dialog.form.set_text("keep", "all")
     assert compute_free_area(dialog) == pytest.approx(80 + 56 - 1)
     dialog.form.keep_inside((15.0, 5.0))
     assert compute_free_area(dialog) == pytest.approx(56)
     dialog.form.keep_inside((11.5, 5.0))
     assert "is solid, expected a free position" in dialog.problem
-    dialog.form.set("inside", "")
+    dialog.form.set_text("inside", "")
     assert compute_free_area(dialog) == pytest.approx(80 - 1)
-    assert dialog.form.entries == {"cell": "0.1"}
+    assert dialog.form.texts == {"cell": "0.1"}
 
 
 def wait_for_import(dialog: ImportDialog) -> None:
@@ -102,10 +102,10 @@ def wait_for_import(dialog: ImportDialog) -> None:
 @pytest.mark.slow
 def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
     # every older import is given up
-    worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportJob", "imports", patience=0.0)
+    worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportService", "imports", patience=0.0)
     dialog = build_dialog(plan, worker)
     for text in ("0", "0.", "0.1"):
-        dialog.form.set("cell", text)
+        dialog.form.set_text("cell", text)
     process = worker.process
     wait_for_import(dialog)
     assert compute_free_area(dialog) == pytest.approx(80 - 1)
@@ -138,10 +138,10 @@ def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path
     driver.press_key("return")
     driver.type("0.1")
     dialog, _ = get_dialog(driver)
-    assert dialog.form.entries == {"cell": "0.1"}
+    assert dialog.form.texts == {"cell": "0.1"}
     for camera, place in zip(dialog.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
         driver.click(*camera.to_pixels(np.array(place)).tolist())
-        x, y = (float(word) for word in dialog.form.entries["inside"].split())
+        x, y = (float(word) for word in dialog.form.texts["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
     driver.click(*dialog.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     driver.press_key("return")
@@ -163,19 +163,19 @@ def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> N
     driver.click(*view["menu:invert"].rect.center)
     driver.press_key("down")
     driver.press_key("return")
-    assert dialog.form.entries == {"cell": "0.1", "invert": "yes"} and not dialog.accepted
+    assert dialog.form.texts == {"cell": "0.1", "invert": "yes"} and not dialog.accepted
     menu = get_dialog(driver)[1]["menu:unknown"]
     seen = []
     for _ in range(4):
         driver.click(*menu.rect.center)
         driver.press_key("down")
         driver.press_key("return")
-        seen.append(dialog.form.entries.get("unknown"))
+        seen.append(dialog.form.texts.get("unknown"))
     assert seen == ["obstacle", "free", "cut", "cut"]
     driver.click(*menu.rect.center)
     driver.press_key("home")
     driver.press_key("return")
-    assert "unknown" not in dialog.form.entries, "an option without a default can be left again"
+    assert "unknown" not in dialog.form.texts, "an option without a default can be left again"
     before = driver.sketch
     driver.click(*view["button:cancel"].rect.center)
     assert driver.editor.dialogs.current is None and driver.sketch is before

@@ -10,14 +10,14 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.play_mode import build_trial_change
+from robocov_app.editor.ui.play_mode import build_play_change
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 
 
 def start_trial(driver: EditorDriver):
     driver.press_key("f5")
-    trial = driver.window.trial
+    trial = driver.window.play_window
     assert trial is not None
     return trial
 
@@ -39,7 +39,7 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
         driver.run_frames(10)
         assert trial.viewer.session.displayed.time > 0.0
         driver.press_key("f5")
-        assert driver.window.trial is None
+        assert driver.window.play_window is None
         assert driver.sketch is before and driver.window.canvas.camera == camera
         assert driver.editor.selection == selection
         driver.editor.message = ""
@@ -57,26 +57,26 @@ def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
         driver.press_key("f1")
         assert trial.is_help_open
         driver.press_key("escape")
-        assert driver.window.trial is trial and not trial.is_help_open
+        assert driver.window.play_window is trial and not trial.is_help_open
         driver.press_key("w")
         driver.press_key("escape")
-        assert driver.window.trial is trial
+        assert driver.window.play_window is trial
         driver.press_key("escape")
-        assert driver.window.trial is None
+        assert driver.window.play_window is None
 
 
 def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
     with open_editor(tmp_path, sheet(crossed)) as driver:
         driver.press_key("f5")
-        assert driver.window.trial is None and driver.editor.has_error_message and driver.message
+        assert driver.window.play_window is None and driver.editor.has_error_message and driver.message
     with open_editor(tmp_path, Sketch(boundary=None)) as driver:
         driver.press_key("f5")
-        assert driver.window.trial is None and driver.editor.has_error_message
+        assert driver.window.play_window is None and driver.editor.has_error_message
     with open_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
         driver.editor.robots = 50
         driver.press_key("f5")
-        assert driver.window.trial is None and "space for about" in driver.message
+        assert driver.window.play_window is None and "space for about" in driver.message
 
 
 def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
@@ -97,14 +97,14 @@ def test_another_map_opened_in_a_trial_is_discarded(tmp_path: Path) -> None:
     with open_editor(tmp_path, sheet(PILLAR)) as driver:
         trial = start_trial(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
-        assert trial.viewer.files.has_left_tried_map and "Untitled" in trial.viewer.files.list_maps()
+        assert trial.viewer.files.has_left_edited_map and "Untitled" in trial.viewer.files.list_maps()
         driver.press_key("f5")
         assert driver.shapes == [PILLAR]
         trial = start_trial(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("rooms"))
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("Untitled"))
         assert (
-            not trial.viewer.files.has_left_tried_map
+            not trial.viewer.files.has_left_edited_map
             and len(trial.viewer.session.displayed.environment.obstacles) == 1
         )
         driver.press_key("escape")
@@ -118,7 +118,9 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
         driver.post(pygame.QUIT)
         driver.settle()
         driver.settle()
-        assert driver.window.trial is None and driver.window.dialogs.is_open and not driver.window.closed
+        assert (
+            driver.window.play_window is None and driver.window.dialogs.is_open and not driver.window.closed
+        )
         driver.press_key("d")
         assert driver.window.closed
 
@@ -134,10 +136,10 @@ def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
 def test_a_trial_without_changes_is_no_edit() -> None:
     sketch = sheet(PILLAR, PILLAR)
     environment = sketch.build_environment()
-    assert build_trial_change(sketch, environment, environment) is None
-    assert build_trial_change(sketch, environment, sketch.build_environment()) is None
+    assert build_play_change(sketch, environment, environment) is None
+    assert build_play_change(sketch, environment, sketch.build_environment()) is None
     other = load_sketch("rooms").build_environment()
-    assert build_trial_change(sketch, environment, other) is None
+    assert build_play_change(sketch, environment, other) is None
 
 
 def test_a_held_key_does_not_end_the_trial(tmp_path: Path) -> None:
@@ -148,10 +150,10 @@ def test_a_held_key_does_not_end_the_trial(tmp_path: Path) -> None:
         driver.run_frames(2)
         pygame.event.post(press)
         driver.run_frames(2)
-        trial = driver.window.trial
-        assert trial is not None and not trial.ended
+        trial = driver.window.play_window
+        assert trial is not None and not trial.returns_to_editor
         pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_F5, mod=0, unicode=""))
         pygame.event.post(press)
         pygame.event.post(press)
         driver.run_frames(3)
-        assert driver.window.trial is None
+        assert driver.window.play_window is None

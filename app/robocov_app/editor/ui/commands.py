@@ -39,7 +39,7 @@ class EditorWindowActions(WindowActions):
     ----------
     show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
         See `WindowActions`.
-    try_map : callable
+    start_play_mode : callable
         Opens the map in the viewer.
     edit_name : callable
         Puts the text cursor into the field for the name.
@@ -49,7 +49,7 @@ class EditorWindowActions(WindowActions):
         Makes the left button pan while the key is held down.
     """
 
-    try_map: Action
+    start_play_mode: Action
     edit_name: Action
     open_menu: Action
     hold_pan: Action
@@ -110,26 +110,26 @@ def list_commands(
         Actions of the window.
     """
     groups = (
-        _list_file_commands(editor, documents, window),
-        _list_edit_commands(editor, window),
-        _list_arrange_commands(editor),
-        _list_combine_commands(editor),
-        _list_vertex_commands(editor),
-        _list_grid_commands(editor),
-        _list_view_commands(editor, canvas, window),
-        _list_robot_commands(editor),
-        _list_help_commands(editor, window),
-        _list_tool_commands(editor),
-        _list_snap_commands(editor),
-        _list_layer_commands(editor),
+        _build_file_group(editor, documents, window),
+        _build_edit_group(editor, window),
+        _build_arrange_group(editor),
+        _build_combine_group(editor),
+        _build_vertex_group(editor),
+        _build_grid_group(editor),
+        _build_view_group(editor, canvas, window),
+        _build_robot_group(editor),
+        _build_help_group(editor, window),
+        _build_tool_group(editor),
+        _build_snap_group(editor),
+        _build_layer_group(editor),
     )
     return [command for group in groups for command in group.commands]
 
 
-def _list_file_commands(
+def _build_file_group(
     editor: Editor, documents: FileCommands, window: EditorWindowActions
 ) -> EditorCommandGroup:
-    """Return the commands on files, on the picture under the map, and on the window as a whole."""
+    """Build the group of commands on files, on the picture under the map, and on the whole window."""
     ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
     ask_picture = partial(
         documents.ask_path, "Picture under the map", documents.open_background, PICTURE_SUFFIXES
@@ -147,15 +147,15 @@ def _list_file_commands(
     group.add("export", "Export to another format", documents.ask_export, "ctrl+e")
     group.add("background", "Picture under the map", ask_picture, "ctrl+b")
     group.add("background:none", "Remove the picture under the map", remove_picture)
-    group.add("reload", "Read the file again", documents.reload, "ctrl+r")
-    group.add("try", "Try it in the demo, and back", window.try_map, "f5")
+    group.add("reload", "Reload the file", documents.reload, "ctrl+r")
+    group.add("try", "Try the map in the viewer", window.start_play_mode, "f5")
     group.add("screenshot", "Screenshot", window.save_screenshot, "f12")
     group.add("quit", "Quit", documents.quit, "ctrl+q")
     return group
 
 
-def _list_edit_commands(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
-    """Return the commands to undo, copy, select, move and delete, and those that control a drawing."""
+def _build_edit_group(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
+    """Build the group of commands to undo, copy, select, move and delete, and to control a drawing."""
 
     def select_all() -> None:
         editor.select(Selection.select_all(editor.sketch))
@@ -194,16 +194,16 @@ def _list_edit_commands(editor: Editor, window: EditorWindowActions) -> EditorCo
     return group
 
 
-def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
-    """Return the commands to rotate, mirror, align, distribute, restack, group, lock and hide objects."""
+def _build_arrange_group(editor: Editor) -> EditorCommandGroup:
+    """Build the group of commands to rotate, mirror, align, restack, group, lock and hide objects."""
 
-    def release_all() -> None:
+    def unlock_and_show_all() -> None:
         editor.apply(properties.unlock_and_show_all(editor.sketch))
 
     group = EditorCommandGroup("Arrange", editor)
-    turn = transform.rotate
-    group.add_edit("rotate:left", "Turn by 90° to the left", turn, "q", value=90.0, repeats=True)
-    group.add_edit("rotate:right", "Turn by 90° to the right", turn, "e", value=-90.0, repeats=True)
+    rotate = transform.rotate
+    group.add_edit("rotate:left", "Rotate left by 90°", rotate, "q", value=90.0, repeats=True)
+    group.add_edit("rotate:right", "Rotate right by 90°", rotate, "e", value=-90.0, repeats=True)
     group.add(
         "level",
         "Level: rotate the map so that the measured line is horizontal or vertical",
@@ -215,22 +215,22 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     group.add("align:right", "Align right sides", partial(actions.align, editor, "right"), "alt+right")
     group.add("align:top", "Align tops", partial(actions.align, editor, "top"), "alt+up")
     group.add("align:bottom", "Align bottoms", partial(actions.align, editor, "bottom"), "alt+down")
-    group.add("align:center", "Align middles across", partial(actions.align, editor, "center"), "alt+c")
-    group.add("align:middle", "Align middles in height", partial(actions.align, editor, "middle"), "alt+m")
-    group.add_edit("distribute:x", "Equal gaps across", transform.distribute, "alt+x", value="x")
-    group.add_edit("distribute:y", "Equal gaps in height", transform.distribute, "alt+y", value="y")
+    group.add("align:center", "Align centers horizontally", partial(actions.align, editor, "center"), "alt+c")
+    group.add("align:middle", "Align centers vertically", partial(actions.align, editor, "middle"), "alt+m")
+    group.add_edit("distribute:x", "Equal horizontal gaps", transform.distribute, "alt+x", value="x")
+    group.add_edit("distribute:y", "Equal vertical gaps", transform.distribute, "alt+y", value="y")
     group.add_edit("raise", "To the top", properties.restack, "page up", value="top")
     group.add_edit("lower", "To the bottom", properties.restack, "page down", value="bottom")
     group.add_edit("group", "Group: a click selects all of it", properties.group, "ctrl+g")
     group.add_edit("ungroup", "Remove from its group", properties.ungroup, "ctrl+shift+g")
     group.add_edit("lock", "Lock: the mouse does not select it", properties.lock, "ctrl+l")
     group.add_edit("hide", "Hide in the editor", properties.hide, "ctrl+h")
-    group.add("release", "Unlock and show all", release_all, "ctrl+shift+l")
+    group.add("release", "Unlock and show all", unlock_and_show_all, "ctrl+shift+l")
     return group
 
 
-def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
-    """Return the commands that combine obstacles, or convert them to something else."""
+def _build_combine_group(editor: Editor) -> EditorCommandGroup:
+    """Build the group of commands that combine obstacles, or convert them to something else."""
 
     def clip() -> None:
         selection = editor.selection.without_vertices()
@@ -243,10 +243,10 @@ def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
     group.add_edit("unite", "Unite", boolean.unite, "alt+u")
     group.add_edit("subtract", "Subtract the upper ones", boolean.subtract, "alt+s")
     group.add_edit("intersect", "Keep their common area", boolean.intersect, "alt+i")
-    group.add_edit("divide", "Cut along each other", boolean.divide, "alt+d")
+    group.add_edit("divide", "Divide", boolean.divide, "alt+d")
     group.add("clip", "Cut off outside the boundary", clip, "alt+b")
     group.add_edit("join", "Join walls end to end", vertices.join_walls, "alt+j")
-    group.add_edit("polygons", "Turn into polygons", properties.convert_to_polygons, "alt+p")
+    group.add_edit("polygons", "Convert to polygons", properties.convert_to_polygons, "alt+p")
     group.add_edit("boundary:of", "Make it the boundary", properties.convert_to_boundary)
     group.add_edit("repair", "Repair crossing outlines", boolean.repair_outlines, "alt+r")
     group.add("density:area", "Make it an area of the density", partial(actions.convert_to_areas, editor))
@@ -254,8 +254,8 @@ def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_vertex_commands(editor: Editor) -> EditorCommandGroup:
-    """Return the commands on corners, walls, outlines and paths of obstacles."""
+def _build_vertex_group(editor: Editor) -> EditorCommandGroup:
+    """Build the group of commands on corners, walls, outlines and paths of obstacles."""
     bevel = partial(actions.trim_corners, editor, vertices.bevel_corners)
     round_corners = partial(actions.trim_corners, editor, vertices.round_corners)
     widen = partial(actions.scale_wall_width, editor, WALL_WIDTH_STEP)
@@ -279,7 +279,7 @@ def _list_vertex_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_grid_commands(editor: Editor) -> EditorCommandGroup:
+def _build_grid_group(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Snap", editor)
     group.add("grid:finer", "Finer grid", editor.refine_grid, "-", repeats=True)
     group.add("grid:coarser", "Coarser grid", editor.coarsen_grid, "=", "+", repeats=True)
@@ -287,10 +287,10 @@ def _list_grid_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_view_commands(
+def _build_view_group(
     editor: Editor, canvas: EditorCanvas, window: EditorWindowActions
 ) -> EditorCommandGroup:
-    """Return the commands that change the view, the window, or what is shown."""
+    """Build the group of commands that change the view, the window, or what is shown."""
 
     def fit_selection() -> None:
         canvas.fit(editor.selection)
@@ -304,12 +304,12 @@ def _list_view_commands(
     group.add("zoom:in", "Zoom in", partial(canvas.zoom, ZOOM_STEP), "ctrl+=", "ctrl++", repeats=True)
     group.add("zoom:out", "Zoom out", partial(canvas.zoom, 1 / ZOOM_STEP), "ctrl+-", repeats=True)
     group.add_arrows("pan:{}", "Pan (all arrows)", pan, "ctrl+{}")
-    group.add("pan:hold", "Pan while it is held down", window.hold_pan, "space")
+    group.add("pan:hold", "Hold to pan", window.hold_pan, "space")
     group.add("theme", "Light or dark", editor.switch_theme, "t")
     group.add("panel", "Hide or show the panel", editor.toggle_panel, "h")
     group.add("tab", "Next page of the panel", window.show_next_tab, "ctrl+tab")
     group.add("fullscreen", "Full screen", window.toggle_fullscreen, "f11")
-    group.add("path:play", "Show obstacles in motion, or still", partial(actions.toggle_motion, editor), "l")
+    group.add("path:play", "Start or stop moving obstacles", partial(actions.toggle_motion, editor), "l")
     show_next_problem = partial(actions.show_next_problem, editor)
     group.add("problem:next", "Go to the next problem", show_next_problem, "f8", "n", repeats=True)
     fix_problem = partial(actions.fix_problem, editor)
@@ -317,30 +317,30 @@ def _list_view_commands(
     return group
 
 
-def _list_robot_commands(editor: Editor) -> EditorCommandGroup:
-    """Return the commands on starts and the team."""
+def _build_robot_group(editor: Editor) -> EditorCommandGroup:
+    """Build the group of commands on starts and the team."""
 
     def add_uniform_start() -> None:
         editor.apply(create.add_uniform_start(editor.sketch))
 
     group = EditorCommandGroup("Robots", editor)
     group.add("start:uniform", "A start anywhere in the free space", add_uniform_start, "shift+u")
-    group.add("start:next", "Next start of the map", partial(actions.select_next_start, editor), "shift+n")
+    group.add("start:next", "Select the next start", partial(actions.select_next_start, editor), "shift+n")
     make_default = partial(actions.make_default_start, editor)
-    group.add("start:default", "Make it the default start", make_default, "shift+d")
+    group.add("start:default", "Make the selected start the default", make_default, "shift+d")
     group.add("more", "Add a robot", partial(editor.add_robots, 1), "shift+=", "shift++", repeats=True)
     group.add("fewer", "Remove a robot", partial(editor.add_robots, -1), "shift+-", repeats=True)
     return group
 
 
-def _list_help_commands(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
+def _build_help_group(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
     group = EditorCommandGroup("Help", editor)
     group.add("help", "Keys", window.toggle_help, "f1", "shift+/")
     group.add("palette", "Commands by name", window.open_palette, "ctrl+k", "/")
     return group
 
 
-def _list_tool_commands(editor: Editor) -> EditorCommandGroup:
+def _build_tool_group(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Tools", editor)
     for tool in editor.toolbox.by_name.values():
         choose = partial(editor.choose_tool, tool.name)
@@ -348,7 +348,7 @@ def _list_tool_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_snap_commands(editor: Editor) -> EditorCommandGroup:
+def _build_snap_group(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Snap", editor)
     for number, (name, mode) in enumerate(SNAPS.items(), 1):
         toggle = partial(editor.toggle_snap, name)
@@ -356,7 +356,7 @@ def _list_snap_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_layer_commands(editor: Editor) -> EditorCommandGroup:
+def _build_layer_group(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("View", editor)
     for name, layer in LAYERS.items():
         group.add(f"show:{name}", layer.title, partial(editor.toggle_layer, name), layer.key)

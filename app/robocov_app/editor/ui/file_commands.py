@@ -21,7 +21,7 @@ from robocov_app.editor.model.map_file import SUFFIX, FileChangedError
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import MAX_RECENT
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import Imported, ImportJob
+from robocov_app.editor.ui.importing import Imported, ImportService
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file
@@ -35,6 +35,7 @@ HEADER_BYTES = 4096  # first bytes of a file, in which the format of a map is na
 OPEN_SUFFIXES = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 _CANCEL = ("Cancel", "c", lambda: None)
+# Errors that decoders raise for files that are not pictures, are broken, or are too large.
 _PICTURE_ERRORS = (
     OSError,
     UnidentifiedImageError,
@@ -73,9 +74,9 @@ class FileCommands:
         self._fit = fit
         self._waits_for_workers = waits_for_workers
         # A document that is open, but not shown until the current one may be closed.
-        self._pending: Document | None = None
+        self._document_to_open: Document | None = None
 
-    def leave(self, then: Action) -> None:
+    def close_document_then(self, then: Action) -> None:
         """Run an action and close the document, after asking the user about unsaved changes."""
         document = self.editor.document
 
@@ -87,25 +88,25 @@ class FileCommands:
         if not document.history.has_unsaved_changes:
             discard()
             return
-        save = partial(self.save, then=lambda: self.leave(then))
+        save = partial(self.save, then=lambda: self.close_document_then(then))
         text = f"“{document.title}” has changes that are not saved."
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask_question("Save the changes?", text, *answers)
 
-    def _leave_for(self, document: Document, message: str) -> None:
+    def _open_when_closed(self, document: Document, message: str) -> None:
         """Show a document as soon as the current one may be closed, which may need an answer of the user."""
-        self._pending = document
-        self.leave(lambda: self._show(document, message))
+        self._document_to_open = document
+        self.close_document_then(lambda: self._show(document, message))
 
-    def _close_pending(self) -> None:
+    def _close_document_to_open(self) -> None:
         """Close a document that was opened but never shown, because the user kept the current one."""
-        if self._pending is not None:
-            self._pending.close(discard=True)
-            self._pending = None
+        if self._document_to_open is not None:
+            self._document_to_open.close(discard=True)
+            self._document_to_open = None
 
     def _show(self, document: Document, message: str) -> None:
-        if document is self._pending:
-            self._pending = None
+        if document is self._document_to_open:
+            self._document_to_open = None
         self.editor.open_document(document)
         self._fit()
         if document.path is not None:
@@ -118,12 +119,12 @@ class FileCommands:
         def allow_closing() -> None:
             self.may_close = True
 
-        self.leave(allow_closing)
+        self.close_document_then(allow_closing)
 
     def new(self) -> None:
         """Open a new map in place of the current one."""
         message = "a new map: 10 x 10 m; B draws another boundary"
-        self.leave(lambda: self._show(Document.new(self.drafts), message))
+        self.close_document_then(lambda: self._show(Document.new(self.drafts), message))
 
     def ask_path(
         self, title: str, action: Callable[[Path], object], suffixes: Sequence[str], text: str = ""
@@ -171,12 +172,12 @@ class FileCommands:
         if present is not None and present.exists() and path.exists() and path.samefile(present):
             self.reload()
             return
-        self._close_pending()
+        self._close_document_to_open()
         if is_open_elsewhere(self.drafts, path=path):
             raise MapError(f"{path.name}: another editor has it open")
         result = open_or_detect(path, self.drafts)
         if isinstance(result, Document):
-            self._leave_for(result, describe_opening(result))
+            self._open_when_closed(result, describe_opening(result))
         else:
             self.ask_import(path, result)
 
@@ -188,20 +189,23 @@ class FileCommands:
 
         def accept(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
-            self._close_pending()
+            self._close_document_to_open()
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
-            self._leave_for(document, f"imported: {path.name}, not saved yet")
+            self._open_when_closed(document, f"imported: {path.name}, not saved yet")
 
-        worker: Worker[Imported] = DirectWorker(ImportJob())
-        if not self._waits_for_workers:
-            job = f"{ImportJob.__module__}:{ImportJob.__name__}"
-            worker = LatestWorker(job, "imports", patience=IMPORT_PATIENCE_S)
-        self.editor.dialogs.ask(ImportDialog(path, importer, worker, accept))
+        self.editor.dialogs.ask(ImportDialog(path, importer, self._create_import_worker(), accept))
+
+    def _create_import_worker(self) -> Worker[Imported]:
+        """Create the worker that imports, in a separate process unless the editor waits for it."""
+        if self._waits_for_workers:
+            return DirectWorker(ImportService())
+        service = f"{ImportService.__module__}:{ImportService.__name__}"
+        return LatestWorker(service, "imports", patience=IMPORT_PATIENCE_S)
 
     def recover(self, draft: MapDraft) -> None:
         """Open the map of a draft that another editor left behind."""
         message = f"recovered: {draft.describe()}"
-        self.leave(lambda: self._show(Document.recover(draft, self.drafts), message))
+        self.close_document_then(lambda: self._show(Document.recover(draft, self.drafts), message))
 
     def remember(self, path: Path) -> None:
         """Move a path to the top of the recent maps."""
@@ -347,12 +351,13 @@ def _describe_picture_path(path: Path, map_path: Path | None) -> str:
     path = path.resolve()
     if map_path is not None:
         try:
-            relative = os.path.relpath(path, map_path.resolve().parent)
+            relative = Path(os.path.relpath(path, map_path.resolve().parent))
         except ValueError:
             # The picture is on another drive.
             return path.as_posix()
-        if relative.count("..") <= MAX_PARENT_FOLDERS:
-            return Path(relative).as_posix()
+        parent_folders = relative.parts.count("..")
+        if parent_folders <= MAX_PARENT_FOLDERS:
+            return relative.as_posix()
     return path.as_posix()
 
 

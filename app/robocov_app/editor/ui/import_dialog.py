@@ -1,7 +1,8 @@
 """The import dialog: options on the left, the map before and after on the right, the report below them."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +34,16 @@ REPORT_LINE_PX = 17
 OPTIONS_MARGIN_PX = 44  # below the options, for the buttons
 HELP_MARGIN_PX = 40  # below the help of an option
 BUTTONS_HEIGHT_PX = 30
-CHIP_WIDTH_PX = 78  # of a button that shows a color and its role
-CHIP_GAP_PX = 6
+COLOR_BUTTON_WIDTH_PX = 78  # of a button that shows a color and its role
+COLOR_BUTTON_GAP_PX = 6
 SWATCH_PX = 12
+SWATCH_LEFT_PX = 7  # from the edge of the button
+CLICK_LABEL_WIDTH_PX = 56
+CLICK_BUTTON_WIDTH_PX = 84
+SMALL_BUTTON_HEIGHT_PX = 24
+BUTTON_WIDTH_PX = 92
+STATUS_TEXT_PX = 13
+BOTTOM_MARGIN_PX = 8
 MAPS_GAP_PX = 14  # between maps and report
 
 MIN_REPORT_LINES = 7
@@ -46,6 +54,17 @@ HINTS = {
     SET_COLOR: "click into the left map, or Space on a color: free, solid, ignored · Enter imports",
 }
 _ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
+
+
+@contextmanager
+def _column(ui: Ui, left: float, top: float, width: float) -> Iterator[None]:
+    """Show widgets in a column, px at scale 1, and return to the previous one afterwards."""
+    previous = (ui.x, ui.y, ui.width)
+    ui.x = left
+    ui.y = top
+    ui.width = width
+    yield
+    ui.x, ui.y, ui.width = previous
 
 
 class ImportDialog(Dialog):
@@ -161,20 +180,18 @@ class ImportDialog(Dialog):
         left = ui.x
         top = ui.y
         width = ui.width
-        height = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
-        ui.width = OPTIONS_WIDTH_PX
-        self._draw_options(ui, top + height)
-        ui.x = left + OPTIONS_WIDTH_PX + OPTIONS_GAP_PX
-        ui.y = top
-        ui.width = width - OPTIONS_WIDTH_PX - OPTIONS_GAP_PX
-        if self.sheet is not None:
-            self._draw_click_actions(ui)
-        report_height = REPORT_LINE_PX * (MIN_REPORT_LINES + 1) + MAPS_GAP_PX
-        self._draw_maps(ui, top + height - ui.y - report_height)
-        self._draw_report(ui, top + height)
-        ui.x = left
-        ui.y = top + height
-        ui.width = width
+        height = pygame.display.get_window_size()[1] / ui.scale - 2 * top - BOTTOM_MARGIN_PX
+        bottom = top + height
+        with _column(ui, left, top, OPTIONS_WIDTH_PX):
+            self._draw_options(ui, bottom)
+        maps_left = left + OPTIONS_WIDTH_PX + OPTIONS_GAP_PX
+        with _column(ui, maps_left, top, left + width - maps_left):
+            if self.sheet is not None:
+                self._draw_click_actions(ui)
+            report_height = REPORT_LINE_PX * (MIN_REPORT_LINES + 1) + MAPS_GAP_PX
+            self._draw_maps(ui, bottom - ui.y - report_height)
+            self._draw_report(ui, bottom)
+        ui.y = bottom
 
     def _draw_maps(self, ui: Ui, height: float) -> None:
         """Draw the two maps in a given height, px, or a text if there is no map yet; handle clicks."""
@@ -187,7 +204,7 @@ class ImportDialog(Dialog):
                 text = "reading…"
                 if self.problem:
                     text = "nothing to show"
-                image = render_text(text, ui.px(13), ui.theme.faint)
+                image = render_text(text, ui.px(STATUS_TEXT_PX), ui.theme.faint)
                 ui.surface.blit(image, image.get_rect(center=box.center))
             return
         maps_height = self.preview.arrange(box, self.imported, ui.scale)
@@ -202,11 +219,11 @@ class ImportDialog(Dialog):
         self.preview.draw(surface, imported, ui.scale, ui.theme, self._shown_sheet)
         if self.problem:
             # The maps belong to earlier settings.
-            self.preview.veil(surface, ui.theme)
+            self.preview.draw_veil(surface, ui.theme)
             return
-        position = self.form.find_inside()
+        position = self.form.find_kept_position()
         if position is not None:
-            self.preview.mark(surface, position, ui.scale, ui.theme)
+            self.preview.draw_mark(surface, position, ui.scale, ui.theme)
 
     def _click(self, pixel: tuple[int, int]) -> None:
         """Handle a click on a map: keep the part of the free space there, or change the role of the color."""
@@ -226,7 +243,14 @@ class ImportDialog(Dialog):
 
     def _draw_click_actions(self, ui: Ui) -> None:
         """Draw the buttons that choose the effect of a click, and the colors with their roles."""
-        ui.row(56, 84, 84, 0, height=24, below=6)
+        ui.row(
+            CLICK_LABEL_WIDTH_PX,
+            CLICK_BUTTON_WIDTH_PX,
+            CLICK_BUTTON_WIDTH_PX,
+            0,
+            height=SMALL_BUTTON_HEIGHT_PX,
+            below=6,
+        )
         ui.label("A click", style="unit")
         part_tip = "A click into a map keeps that part of the free space"
         color_tip = "A click into the left map makes its color free, solid or ignored"
@@ -234,25 +258,25 @@ class ImportDialog(Dialog):
         self._draw_click_action(ui, SET_COLOR, "sets a color", color_tip)
         ui.end_row()
         if self._shown_sheet is not None:
-            self._draw_chips(ui, self._shown_sheet)
+            self._draw_color_buttons(ui, self._shown_sheet)
 
     def _draw_click_action(self, ui: Ui, action: str, text: str, tip: str) -> None:
         is_chosen = self.click_action == action
         if ui.button(text, key=f"clicks:{action}", selected=is_chosen, small=True, tip=tip):
             self.click_action = action
 
-    def _draw_chips(self, ui: Ui, sheet: ColorSheet) -> None:
-        colors = list(dict.fromkeys([*list_declared_colors(self.form.entries), *sheet.colors]))
-        columns = int((ui.width + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
+    def _draw_color_buttons(self, ui: Ui, sheet: ColorSheet) -> None:
+        colors = list(dict.fromkeys([*list_declared_colors(self.form.texts), *sheet.colors]))
+        columns = int((ui.width + COLOR_BUTTON_GAP_PX) // (COLOR_BUTTON_WIDTH_PX + COLOR_BUTTON_GAP_PX))
         colors = colors[: max(columns, 1)]
-        ui.row(*[CHIP_WIDTH_PX] * len(colors), 0, height=24, below=8)
+        ui.row(*[COLOR_BUTTON_WIDTH_PX] * len(colors), 0, height=SMALL_BUTTON_HEIGHT_PX, below=8)
         for color in colors:
-            self._draw_chip(ui, color)
+            self._draw_color_button(ui, color)
         ui.end_row()
 
-    def _draw_chip(self, ui: Ui, color: Color) -> None:
+    def _draw_color_button(self, ui: Ui, color: Color) -> None:
         """Draw the button of a color, which shows its role; a click changes the role."""
-        role = find_role(self.form.entries, color)
+        role = find_role(self.form.texts, color)
         name = name_color(color)
         key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
@@ -262,19 +286,21 @@ class ImportDialog(Dialog):
         button = ui.find("button", key)
         if ui.surface is not None and button is not None:
             side = ui.px(SWATCH_PX)
-            swatch = Rect(button.rect.left + ui.px(7), button.rect.centery - side // 2, side, side)
+            swatch = Rect(
+                button.rect.left + ui.px(SWATCH_LEFT_PX), button.rect.centery - side // 2, side, side
+            )
             pygame.draw.rect(ui.surface, color, swatch)
             pygame.draw.rect(ui.surface, ui.theme.faint, swatch, 1)
 
-    def _draw_options(self, ui: Ui, foot: float) -> None:
-        """Draw the options, the help of the focused option and the buttons, above the lower edge `foot`."""
+    def _draw_options(self, ui: Ui, bottom: float) -> None:
+        """Draw the options, the help of the focused option and the buttons, above the lower edge `bottom`."""
         ui.paragraph(f"Import {self.path.name}", size=16, bold=True)
         ui.label(self.importer.title, style="unit")
         ui.end_row()
-        self.form.show(ui, foot - OPTIONS_MARGIN_PX)
-        self.form.show_help(ui, foot - HELP_MARGIN_PX)
-        ui.y = foot - BUTTONS_HEIGHT_PX
-        ui.row(92, 92, height=BUTTONS_HEIGHT_PX, below=0)
+        self.form.show(ui, bottom - OPTIONS_MARGIN_PX)
+        self.form.show_help(ui, bottom - HELP_MARGIN_PX)
+        ui.y = bottom - BUTTONS_HEIGHT_PX
+        ui.row(BUTTON_WIDTH_PX, BUTTON_WIDTH_PX, height=BUTTONS_HEIGHT_PX, below=0)
         if ui.button("Import", selected=self.is_ready, key="import", tip=self.problem):
             self.accepted = True
         if ui.button("Cancel", key="cancel"):
@@ -289,23 +315,23 @@ class ImportDialog(Dialog):
             return []
         return self.imported.report.format_lines()
 
-    def _draw_report(self, ui: Ui, foot: float) -> None:
-        """Draw the report of the import or the problem, and a hint, above the lower edge `foot`."""
+    def _draw_report(self, ui: Ui, bottom: float) -> None:
+        """Draw the report of the import or the problem, and a hint, above the lower edge `bottom`."""
         lines: list[str] = []
         for text in self._list_report_lines():
             lines += wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))
-        max_lines = int((foot - ui.y) / REPORT_LINE_PX) - 1
+        max_lines = int((bottom - ui.y) / REPORT_LINE_PX) - 1
         if len(lines) > max_lines:
             lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
         ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
             color = ui.theme.ink
             if self.problem:
-                color = ui.theme.trajectory
+                color = ui.theme.error
             for line in lines:
                 ui.surface.blit(render_text(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
         ui.end_row()
-        ui.y = foot - REPORT_LINE_PX
+        ui.y = bottom - REPORT_LINE_PX
         hint = HINTS[KEEP_PART]
         if self._shown_sheet is not None:
             hint = HINTS[SET_COLOR]

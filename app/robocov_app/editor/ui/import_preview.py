@@ -22,6 +22,8 @@ from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
+MAP_COUNT = 2  # as read and as imported
+
 # Lengths in pixels at scale 1.
 CAPTION_HEIGHT_PX = 40  # above each map
 MAPS_GAP_PX = 20
@@ -77,9 +79,9 @@ class ImportPreview:
         aspect = (high_x - low_x) / (high_y - low_y)
         caption_height = round(CAPTION_HEIGHT_PX * scale)
         gap = round(MAPS_GAP_PX * scale)
-        columns = choose_column_count(2, aspect, box.size, row_margin=caption_height)
+        columns = choose_column_count(MAP_COUNT, aspect, box.size, row_margin=caption_height)
         width = (box.width - (columns - 1) * gap) // columns
-        rows = 2 // columns
+        rows = MAP_COUNT // columns
         free_height = (box.height - (rows - 1) * gap) // rows
         height = min(free_height - caption_height, round(width / aspect))
         second_top = box.top + (rows - 1) * (caption_height + height + gap)
@@ -128,18 +130,18 @@ class ImportPreview:
         facts = shorten_to_width(caption.facts, text_size, self._width)
         screen.blit(render_text(facts, text_size, theme.faint), (x, y + round(20 * scale)))
 
-    def mark(self, screen: Surface, position: Point, scale: float, theme: Theme) -> None:
+    def draw_mark(self, screen: Surface, position: Point, scale: float, theme: Theme) -> None:
         """Draw a cross at a position, m, on both maps."""
         for camera in self.cameras:
             x, y = camera.to_pixels(np.array(position)).tolist()
             # A wide line in the background color under a thin one makes the cross visible everywhere.
-            for line_width, color in ((5, theme.background), (2, theme.final)):
+            for line_width, color in ((5, theme.background), (2, theme.accent)):
                 arm = MARK_ARM_PX * scale + line_width / 2
                 width = round(line_width * scale)
                 pygame.draw.line(screen, color, (x - arm, y), (x + arm, y), width)
                 pygame.draw.line(screen, color, (x, y - arm), (x, y + arm), width)
 
-    def veil(self, screen: Surface, theme: Theme) -> None:
+    def draw_veil(self, screen: Surface, theme: Theme) -> None:
         """Cover both maps with a translucent veil, to show that they are outdated."""
         for camera in self.cameras:
             left, top, width, height = camera.view
@@ -159,9 +161,9 @@ def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) ->
     if comparison.gap is not None:
         facts_after += f", narrowest passage {comparison.gap.width:.3g} m"
     if has_own_colors:
-        before = _Caption("in its colors", facts_before, "", theme.trajectory)
+        before = _Caption("in its colors", facts_before, "", theme.error)
     else:
-        before = _Caption("as read", facts_before, lost, theme.trajectory)
+        before = _Caption("as read", facts_before, lost, theme.error)
     return [before, _Caption("as imported", facts_after, opened, theme.start)]
 
 
@@ -178,15 +180,15 @@ def _draw_comparison(
     picture = Surface(size, pygame.SRCALPHA)
     before, after = cameras
     _draw_map(picture, before, comparison, comparison.before, theme)
-    _draw_marked_area(picture, before, comparison.lost, theme.trajectory)
+    _draw_marked_area(picture, before, comparison.lost, theme.error)
     _draw_map(picture, after, comparison, comparison.after, theme)
     _draw_marked_area(picture, after, comparison.opened, theme.start)
     if comparison.gap is not None:
         ends = after.to_pixels(np.array(comparison.gap.between))
         width = round(2 * scale)
-        pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), width)
+        pygame.draw.line(picture, theme.accent, ends[0].tolist(), ends[1].tolist(), width)
         if math.dist(*ends) < MIN_GAP_LENGTH_PX * scale:
-            pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, width)
+            pygame.draw.circle(picture, theme.accent, ends.mean(axis=0).tolist(), 10 * scale, width)
     return picture
 
 

@@ -165,19 +165,19 @@ def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, co
     surface.blit(layer, box)
 
 
-def find_role(entries: MutableMapping[str, str], color: Color) -> Role | None:
+def find_role(texts: MutableMapping[str, str], color: Color) -> Role | None:
     """Return the role that the options give to exactly this color; None if it has no role."""
     for role in ROLES:
-        if color in map(parse_css_color_on_white, _list_words(entries, role)):
+        if color in map(parse_css_color_on_white, _list_words(texts, role)):
             return role
     return None
 
 
-def list_declared_colors(entries: MutableMapping[str, str]) -> list[Color]:
+def list_declared_colors(texts: MutableMapping[str, str]) -> list[Color]:
     """Return the colors to which the options give a role."""
     colors: list[Color] = []
     for role in ROLES:
-        for word in _list_words(entries, role):
+        for word in _list_words(texts, role):
             color = parse_css_color_on_white(word)
             if color is not None and color not in colors:
                 colors.append(color)
@@ -189,21 +189,19 @@ def choose_next_role(role: Role | None) -> Role | None:
     return _ROLE_CYCLE[(_ROLE_CYCLE.index(role) + 1) % len(_ROLE_CYCLE)]
 
 
-def set_role(entries: MutableMapping[str, str], color: Color, role: Role | None) -> None:
+def set_role(texts: MutableMapping[str, str], color: Color, role: Role | None) -> None:
     """Change the options so that a color has the given role, or no role."""
     for option_role in ROLES:
-        words = [
-            word for word in _list_words(entries, option_role) if parse_css_color_on_white(word) != color
-        ]
+        words = [word for word in _list_words(texts, option_role) if parse_css_color_on_white(word) != color]
         if option_role == role:
             words.append(name_color(color))
         name = f"{option_role}_color"
         if words:
-            entries[name] = ", ".join(words)
+            texts[name] = ", ".join(words)
         else:
-            entries.pop(name, None)
+            texts.pop(name, None)
 
 
-def _list_words(entries: MutableMapping[str, str], role: Role) -> Sequence[str]:
-    words = entries.get(f"{role}_color", "").split(",")
+def _list_words(texts: MutableMapping[str, str], role: Role) -> Sequence[str]:
+    words = texts.get(f"{role}_color", "").split(",")
     return [word.strip() for word in words if word.strip()]

@@ -30,6 +30,8 @@ ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
 
 ON = "yes"  # value of a switch that is on
 OFF = "no"
+_KINDS_BY_METAVAR: dict[str, OptionKind] = {"X Y": "position", "COLOR ...": "colors", "NAME ...": "words"}
+_STROKE_WIDTH_OPTION = "min_stroke"
 
 
 @dataclass(frozen=True)
@@ -104,11 +106,11 @@ def _read_field_docstrings(settings: ImportSettings) -> dict[str, str]:
     texts: dict[str, str] = {}
     (definition,) = ast.parse(inspect.getsource(settings)).body
     assert isinstance(definition, ast.ClassDef)
-    for statement, following in pairwise(definition.body):
-        if not isinstance(statement, ast.AnnAssign) or not isinstance(statement.target, ast.Name):
+    for field, docstring in pairwise(definition.body):
+        if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
             continue
-        if isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
-            texts[statement.target.id] = str(following.value.value)
+        if isinstance(docstring, ast.Expr) and isinstance(docstring.value, ast.Constant):
+            texts[field.target.id] = str(docstring.value.value)
     return texts
 
 
@@ -128,19 +130,14 @@ def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
         # False sorts before True, so the default comes first.
         choices = tuple(sorted(get_args(hint), key=lambda choice: bool(default) and choice != default))
         return ImportOption(name, "choice", choices, default, help_text)
-    return ImportOption(name, _choose_kind(name, hint), (), default, help_text)
+    return ImportOption(name, _choose_kind(field, hint), (), default, help_text)
 
 
-def _choose_kind(name: str, hint: Any) -> OptionKind:
-    """Return the kind of an option that is not a choice, by its name and type."""
+def _choose_kind(field: Field[Any], hint: Any) -> OptionKind:
+    """Return the kind of an option that is not a choice, by its metavar on the command line and its type."""
     if get_origin(hint) is tuple:
-        # Tuples of a fixed length are positions.
-        if ... not in get_args(hint):
-            return "position"
-        if name.endswith("_color"):
-            return "colors"
-        return "words"
-    if name == "min_stroke":
+        return _KINDS_BY_METAVAR[field.metadata["metavar"]]
+    if field.name == _STROKE_WIDTH_OPTION:
         return "width"
     if hint is float:
         return "number"
@@ -177,7 +174,7 @@ class _ReadKey(NamedTuple):
     options: ReadOptions
 
 
-class ImportJob:
+class ImportService:
     """Service that imports maps. The latest file is cached, because shaping is faster than reading."""
 
     failure_message = "the map could not be imported"
@@ -188,7 +185,8 @@ class ImportJob:
 
     def __call__(self, questions: list[ImportRequest], channel: Channel) -> Imported:
         """Import the file of the newest request."""
-        path, format_name, options, shaping = questions[-1]
+        newest = questions[-1]
+        path, format_name, options, shaping = newest
         key = _ReadKey(path, format_name, options)
         foreign = self._read_map(key)
         sheet = self._build_sheet(key, foreign)

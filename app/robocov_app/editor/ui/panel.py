@@ -35,7 +35,22 @@ ROW_HEIGHT_PX = 20.0  # height of a row in a list
 LABEL_WIDTH_PX = 62.0
 SHORT_LABEL_WIDTH_PX = 14.0
 MEDIUM_LABEL_WIDTH_PX = 48.0
+LONG_LABEL_WIDTH_PX = 64.0
 UNIT_WIDTH_PX = 16.0
+TEAM_LABEL_WIDTH_PX = 44.0
+TEAM_FIELD_WIDTH_PX = 44.0
+STEP_BUTTON_WIDTH_PX = 23.0
+BADGE_COLUMN_PX = 20.0
+PROBLEM_MARGIN_PX = 44.0  # to the left and right of the message of a problem, together
+FIX_BUTTON_WIDTH_PX = 54.0
+FIX_COLUMN_PX = 66.0  # width of the button with its margins
+PROBLEM_LINE_GAP_PX = 5
+PROBLEM_PADDING_PX = 8
+BADGE_TOP_PX = 13  # from the top of a problem to the middle of its badge
+CHECK_HEIGHT_PX = 20.0
+FACT_HEIGHT_PX = 18.0
+MAX_SHORT_LABEL = 2  # number of characters
+MAX_MEDIUM_LABEL = 6
 MAX_PROBLEMS = 200  # number of problems that are listed
 MAX_PROBLEM_COUNT = 99  # largest number of problems in the title of their page
 NOTHING_SELECTED = (
@@ -262,7 +277,11 @@ class EditorPanel(CommandPanel):
 
     def _draw_field_pair(self, ui: Ui, *cells: FieldCell) -> None:
         longest = max(len(cell.label) for cell in cells)
-        label_width = SHORT_LABEL_WIDTH_PX if longest < 3 else MEDIUM_LABEL_WIDTH_PX
+        label_width = LONG_LABEL_WIDTH_PX
+        if longest <= MAX_SHORT_LABEL:
+            label_width = SHORT_LABEL_WIDTH_PX
+        elif longest <= MAX_MEDIUM_LABEL:
+            label_width = MEDIUM_LABEL_WIDTH_PX
         ui.row(label_width, 0.0, UNIT_WIDTH_PX, label_width, 0.0, UNIT_WIDTH_PX)
         for cell in cells:
             self._draw_field(ui, cell)
@@ -276,13 +295,21 @@ class EditorPanel(CommandPanel):
         with ui.scroll("map"):
             self._draw_wide_field(ui, "title", "Name")
             self._draw_wide_field(ui, "description", "About")
-            ui.row(LABEL_WIDTH_PX, 0, height=18, below=2)
+            ui.row(LABEL_WIDTH_PX, 0, height=FACT_HEIGHT_PX, below=2)
             for fact in list_map_facts(self.editor):
                 ui.label(fact.label, style="unit", tip=fact.tip)
                 ui.label(fact.text, key=f"fact:{fact.label}")
             ui.space(4)
             ui.header("ROBOTS")
-            ui.row(48, 0, 16, 44, 44, 23, 23)
+            ui.row(
+                MEDIUM_LABEL_WIDTH_PX,
+                0,
+                UNIT_WIDTH_PX,
+                TEAM_LABEL_WIDTH_PX,
+                TEAM_FIELD_WIDTH_PX,
+                STEP_BUTTON_WIDTH_PX,
+                STEP_BUTTON_WIDTH_PX,
+            )
             self._draw_field(ui, FieldCell("radius", "Radius", "m"))
             self._draw_field(ui, FieldCell("robots", "Team"))
             self.show_button(ui, "−", "fewer", small=True)
@@ -326,21 +353,21 @@ class EditorPanel(CommandPanel):
         if kind in ("circle", "disc"):
             self._draw_field_pair(ui, FieldCell("size:radius", "Radius", "m"))
         elif kind in _SIZED_KINDS:
-            self._draw_field_pair(ui, FieldCell("wide", "Wide", "m"), FieldCell("high", "High", "m"))
+            self._draw_field_pair(ui, FieldCell("wide", "Width", "m"), FieldCell("high", "Height", "m"))
         if kind == "wall":
-            self._draw_field_pair(ui, FieldCell("width", "Thick", "m"))
+            self._draw_field_pair(ui, FieldCell("width", "Thickness", "m"))
 
     def _draw_snap_page(self, ui: Ui) -> None:
         """Draw the page "snap": snap modes, grid, visible layers, and the picture under the map."""
         with ui.scroll("snap"):
             ui.header("SNAP TO")
-            ui.row(0, 0, height=20, below=3)
+            ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
             for name, mode in SNAPS.items():
                 self._draw_check(ui, f"snap:{name}", mode.title, is_on=name in self.editor.snaps)
             ui.row()
             self._draw_field_pair(ui, FieldCell("grid", "Grid", "m"), FieldCell("angle", "Angle", "°"))
             ui.header("SHOW")
-            ui.row(0, 0, height=20, below=3)
+            ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
             for name in LAYERS:
                 # The team has its check box next to the starts.
                 if name != "robots":
@@ -386,17 +413,17 @@ class EditorPanel(CommandPanel):
         """Draw a problem with its badge and fix; return whether the user has applied the fix."""
         editor = self.editor
         fix = FIXES.get(problem.kind)
-        text_width = ui.width - 44
-        columns = [20, 0]
+        text_width = ui.width - PROBLEM_MARGIN_PX
+        columns = [BADGE_COLUMN_PX, 0.0]
         if fix is not None:
-            text_width -= 66
-            columns = [20, 0, 54]
+            text_width -= FIX_COLUMN_PX
+            columns.append(FIX_BUTTON_WIDTH_PX)
         lines = wrap_text(problem.message, ui.px(TEXT_PX), ui.px(text_width))
-        ui.row(*columns, height=(TEXT_PX + 5) * len(lines) + 8, below=2)
+        ui.row(*columns, height=(TEXT_PX + PROBLEM_LINE_GAP_PX) * len(lines) + PROBLEM_PADDING_PX, below=2)
         badge = ui.cell()
         if ui.surface is not None:
             canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
-            draw_badge(canvas, badge.centerx, badge.top + ui.px(13), is_error=problem.is_error)
+            draw_badge(canvas, badge.centerx, badge.top + ui.px(BADGE_TOP_PX), is_error=problem.is_error)
         if ui.option("\n".join(lines), key=f"problem:{number}", highlighted=problem is editor.problem):
             editor.problem = problem
             if problem.owner is not None:
@@ -417,7 +444,7 @@ class EditorPanel(CommandPanel):
         steps: list[tuple[str, int]] = []  # description, and number of changes to undo (negative: redo)
         steps += [(text, k - len(undone)) for k, text in enumerate(reversed(undone))]
         steps += [(text, k) for k, text in enumerate(history.undo_descriptions)]
-        steps.append(("as it was opened", len(history.undo_descriptions)))
+        steps.append(("opened", len(history.undo_descriptions)))
         with ui.scroll("history"):
             for number in ui.visible_rows(len(steps), ROW_HEIGHT_PX + 2):
                 text, count = steps[number]

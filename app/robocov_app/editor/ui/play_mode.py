@@ -1,5 +1,6 @@
 """Play mode: the viewer opens the edited map in the same window, and later returns to the editor."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -32,26 +33,26 @@ class PlayFiles(FileActions):
 
     Attributes
     ----------
-    tried : Environment
+    edited_map : Environment
         The map as it was in the editor.
-    has_left_tried_map : bool
+    has_left_edited_map : bool
         Whether another map is open in the viewer.
     """
 
     def __init__(self, viewer: Presenter, folder: Path, title: str) -> None:
         super().__init__(viewer, folder, map_name=title)
-        self.tried = viewer.session.displayed.environment
-        self.has_left_tried_map = False
+        self.edited_map = viewer.session.displayed.environment
+        self.has_left_edited_map = False
         self._title = title
 
     def open_map(self, name: str) -> None:
         """Open a map by name, or the edited map by its title."""
         if name == self._title:
-            self._viewer.session.restart(environment=self.tried)
+            self._viewer.session.restart(environment=self.edited_map)
             self.map_name = name
         else:
             super().open_map(name)
-        self.has_left_tried_map = name != self._title
+        self.has_left_edited_map = name != self._title
 
     def list_maps(self) -> list[str]:
         """Return the names of the maps that can be opened."""
@@ -68,31 +69,31 @@ class PlayPresenter(Presenter):
         self.files = PlayFiles(self, folder, title)
 
 
-class TrialDrafts:
+class PlayDrafts:
     """Saves drafts of the edited map with the changes made in the viewer, at most once a second.
 
     Parameters
     ----------
     document : Document
         Document of the edited map.
-    tried : Environment
+    edited_map : Environment
         The map as it was in the editor.
     """
 
-    def __init__(self, document: Document, tried: Environment) -> None:
+    def __init__(self, document: Document, edited_map: Environment) -> None:
         self._document = document
-        self._tried = tried
-        self._drafted = tried
+        self._edited_map = edited_map
+        self._drafted = edited_map
         self._due = 0.0
 
-    def update(self, environment: Environment, *, at_once: bool) -> None:
-        """Save a draft if the map has changed; unless `at_once`, not too soon after the previous one."""
+    def save(self, environment: Environment, *, force: bool) -> None:
+        """Save a draft if the map has changed; with `force`, even soon after the previous one."""
         now = monotonic()
-        if environment is self._drafted or (now < self._due and not at_once):
+        if environment is self._drafted or (now < self._due and not force):
             return
         self._drafted = environment
         self._due = now + DRAFT_PAUSE_S
-        change = build_trial_change(self._document.history.sketch, self._tried, environment)
+        change = build_play_change(self._document.history.sketch, self._edited_map, environment)
         if change is None:
             self._document.update_draft()
         else:
@@ -104,11 +105,11 @@ class PlayWindow(ViewerWindow):
 
     Attributes
     ----------
-    ended : bool
+    returns_to_editor : bool
         Whether to return to the editor.
-    held : int or None
+    ignored_key : int or None
         The key that started play mode, until it is released. Its repetitions are ignored.
-    drafts : TrialDrafts
+    drafts : PlayDrafts
         Saves drafts of the map.
     """
 
@@ -118,47 +119,47 @@ class PlayWindow(ViewerWindow):
     def __init__(
         self,
         viewer: PlayPresenter,
-        drafts: TrialDrafts,
+        drafts: PlayDrafts,
         screen: pygame.Surface,
         scale: float,
         *,
         is_unattended: bool,
     ) -> None:
-        self.ended = False
-        self.held: int | None = None
+        self.returns_to_editor = False
+        self.ignored_key: int | None = None
         self.drafts = drafts
         super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; F5 returns to the editor."""
-        is_released = event.type == pygame.KEYUP and event.key == self.held
+        is_released = event.type == pygame.KEYUP and event.key == self.ignored_key
         if event.type == pygame.WINDOWFOCUSLOST or is_released:
-            self.held = None
-        if event.type == pygame.KEYDOWN and event.key == self.held:
+            self.ignored_key = None
+        if event.type == pygame.KEYDOWN and event.key == self.ignored_key:
             return
         if event.type == pygame.KEYDOWN and get_key_name(event) == "f5":
-            self.ended = True
+            self.returns_to_editor = True
         else:
             super().handle_event(event)
 
-    def keep_draft(self, *, at_once: bool = False) -> None:
+    def save_draft(self, *, force: bool = False) -> None:
         """Save a draft of the map with the changes made here, unless another map was opened."""
-        if not self.viewer.files.has_left_tried_map:
-            self.drafts.update(self.viewer.session.displayed.environment, at_once=at_once)
+        if not self.viewer.files.has_left_edited_map:
+            self.drafts.save(self.viewer.session.displayed.environment, force=force)
 
     def do(self, name: str) -> None:
         """Run a command; Escape returns to the editor if there is nothing to cancel."""
         is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
         viewer = self.viewer
-        hand = viewer.toolbox.hand
-        is_idle = not is_open and viewer.tool is hand and viewer.selected_robot is None
+        drag_tool = viewer.toolbox.hand
+        is_idle = not is_open and viewer.tool is drag_tool and viewer.selected_robot is None
         if name == "cancel" and is_idle:
-            self.ended = not hand.cancel(viewer.session)
+            self.returns_to_editor = not drag_tool.cancel(viewer.session)
         else:
             super().do(name)
 
 
-def start_trial(
+def open_play_window(
     editor: Editor, screen: pygame.Surface, scale: float, *, waits_for_workers: bool
 ) -> PlayWindow:
     """Open the map of an editor in the viewer.
@@ -193,24 +194,24 @@ def start_trial(
     session = Session(scenario)
     if waits_for_workers:
         # The simulation may take as long as it needs in each frame.
-        session.playback.clock.budget = float("inf")
+        session.playback.clock.budget = math.inf
     costs = Costs(DEFAULT_LATTICE, direct=waits_for_workers)
     try:
         shown = {layer.name for layer in build_standard_layers() if layer.is_default}
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
         viewer.view.theme = editor.theme
-        drafts = TrialDrafts(editor.document, viewer.files.tried)
-        trial = PlayWindow(viewer, drafts, screen, scale, is_unattended=waits_for_workers)
+        drafts = PlayDrafts(editor.document, viewer.files.edited_map)
+        play_window = PlayWindow(viewer, drafts, screen, scale, is_unattended=waits_for_workers)
     except BaseException:
         costs.close()
         raise
     # Without this update, the first frame would have no panel.
-    trial.panel.update(FIRST_UPDATE_S)
+    play_window.panel.update(FIRST_UPDATE_S)
     viewer.show_message(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
-    return trial
+    return play_window
 
 
-def build_trial_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
+def build_play_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
     """Build one change of all obstacles that were drawn, moved or deleted in the viewer.
 
     Parameters

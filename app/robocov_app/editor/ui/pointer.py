@@ -88,13 +88,15 @@ class EditorPointer(Pointer):
 
     def _press_tool(self, event: pygame.event.Event, now: float) -> None:
         editor = self.editor
-        # The third of three quick clicks is a single click again.
-        is_double = self.count_clicks(event, now) % 2 == 0
         pointer = self._build_event(event.pos)
         handle = editor.tool.press
-        if is_double:
+        if self._is_double_click(event, now):
             handle = editor.tool.double_click
         editor.attempt(lambda: handle(editor, pointer))
+
+    def _is_double_click(self, event: pygame.event.Event, now: float) -> bool:
+        """Return whether a press completes a double click; a third quick press is a single click again."""
+        return self.count_clicks(event, now) % 2 == 0
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
         """Handle a click of a button that pans: a right click completes a drawing or opens the menu."""

@@ -8,8 +8,8 @@ from robocov_app.toolkit.window.input import get_key_name
 MAX_TYPED_CHARACTERS = 40
 _VALUE_CHARACTERS = frozenset("0123456789.,-+@<*/%°×x; ")
 _UNIT_CHARACTERS = frozenset("mcm'\"rad")  # only after the first character
-_NEVER_FIRST = frozenset("x×*/ ;%")
-_NEVER_FIRST_WHEN_IDLE = frozenset("x×*/ ;%,-+@<°")
+_INVALID_FIRST_CHARACTERS = frozenset("x×*/ ;%")
+_INVALID_FIRST_CHARACTERS_WHEN_IDLE = frozenset("x×*/ ;%,-+@<°")
 _COMMAND_MODIFIERS = pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
 
 
@@ -51,5 +51,7 @@ def _continues_value(editor: Editor, character: str) -> bool:
         return False
     if editor.typed:
         return character in _VALUE_CHARACTERS or character in _UNIT_CHARACTERS
-    never_first = _NEVER_FIRST if editor.tool.is_busy else _NEVER_FIRST_WHEN_IDLE
-    return character in _VALUE_CHARACTERS and character not in never_first
+    invalid_characters = (
+        _INVALID_FIRST_CHARACTERS if editor.tool.is_busy else _INVALID_FIRST_CHARACTERS_WHEN_IDLE
+    )
+    return character in _VALUE_CHARACTERS and character not in invalid_characters

@@ -2,25 +2,32 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pygame
 
+from robocov.environment import Point
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.hit_test import find_owners
+from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.team import TeamRequest, TeamSampler
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.validation import Problem
+from robocov_app.editor.team import Team, TeamRequest, TeamSampler
+from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.editor.ui.commands import GROUPS, PALETTE_HINT, EditorWindowActions, list_commands
 from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel
-from robocov_app.editor.ui.play_mode import PlayWindow, build_trial_change, start_trial
+from robocov_app.editor.ui.play_mode import PlayWindow, build_play_change, open_play_window
 from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
+from robocov_app.render.camera import Camera
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
@@ -33,6 +40,32 @@ from robocov_app.toolkit.window.layout import build_layout
 
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
+
+
+class FrameState(NamedTuple):
+    """Everything that can change the frame without an event; a frame with an equal state is not redrawn."""
+
+    revision: int
+    message: str
+    has_error_message: bool
+    typed: str
+    is_measuring: bool
+    problem: Problem | None
+    sketch: Sketch
+    selection: Selection
+    measurement: Measurement | None
+    tool: EditorTool
+    cursor: Point | None
+    shown: frozenset[str]
+    grid: float
+    snaps: frozenset[str]
+    team: Team | None
+    camera: Camera
+    hovered: Problem | None
+    is_help_open: bool
+    dialog_id: int
+    layout_key: tuple[object, ...] | None
+    caption: tuple[str, ...]
 
 
 class EditorWindow(CommandWindow):
@@ -63,7 +96,7 @@ class EditorWindow(CommandWindow):
         The panel.
     pointer : EditorPointer
         The mouse over the map.
-    trial : PlayWindow or None
+    play_window : PlayWindow or None
         The viewer in play mode; None while the map is being edited.
     team_sampler : TeamSampler
         Computes the positions of the team at a start.
@@ -87,7 +120,7 @@ class EditorWindow(CommandWindow):
     ) -> None:
         super().__init__(editor, editor.dialogs, size, scale)
         self.editor = editor
-        self.trial: PlayWindow | None = None
+        self.play_window: PlayWindow | None = None
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, waits_for_workers=waits_for_workers)
         commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
@@ -97,7 +130,7 @@ class EditorWindow(CommandWindow):
         self.team_sampler = TeamSampler()
         self._waits_for_workers = waits_for_workers
         editor.snapper.waits_for_targets = waits_for_workers
-        self._arranged: tuple[object, ...] | None = None
+        self._layout_key: tuple[object, ...] | None = None
         self._arrange()
         self.canvas.fit()
         editor.request_measurement()
@@ -106,7 +139,7 @@ class EditorWindow(CommandWindow):
     def _build_actions(self) -> EditorWindowActions:
         """Build the actions of the window for the commands that run them."""
         return EditorWindowActions(
-            try_map=self.try_it,
+            start_play_mode=self.start_play_mode,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
             open_menu=lambda: self.open_menu(self.pointer.pixel),
@@ -148,9 +181,9 @@ class EditorWindow(CommandWindow):
 
     def close(self) -> None:
         """End play mode and all background work."""
-        if self.trial is not None:
-            self.trial.keep_draft(at_once=True)
-            self.trial.close()
+        if self.play_window is not None:
+            self.play_window.save_draft(force=True)
+            self.play_window.close()
         self.team_sampler.close()
         self.dialogs.close()
         self.editor.snapper.close()
@@ -163,28 +196,28 @@ class EditorWindow(CommandWindow):
         is_importing = isinstance(dialog, ImportDialog) and dialog.is_busy
         if self.panel.ui.needs_redraw or editor.moves_since is not None or is_importing:
             return None
-        return (
-            editor.revision,
-            editor.message,
-            editor.has_error_message,
-            editor.typed,
-            editor.measurement_worker.is_busy,
-            editor.problem,
-            editor.sketch,
-            editor.selection,
-            editor.measurement,
-            editor.tool,
-            editor.cursor,
-            frozenset(editor.shown),
-            editor.grid,
-            frozenset(editor.snaps),
-            canvas.team,
-            canvas.camera,
-            canvas.hovered,
-            self.is_help_open,
-            id(dialog),
-            self._arranged,
-            pygame.display.get_caption(),
+        return FrameState(
+            revision=editor.revision,
+            message=editor.message,
+            has_error_message=editor.has_error_message,
+            typed=editor.typed,
+            is_measuring=editor.measurement_worker.is_busy,
+            problem=editor.problem,
+            sketch=editor.sketch,
+            selection=editor.selection,
+            measurement=editor.measurement,
+            tool=editor.tool,
+            cursor=editor.cursor,
+            shown=frozenset(editor.shown),
+            grid=editor.grid,
+            snaps=frozenset(editor.snaps),
+            team=canvas.team,
+            camera=canvas.camera,
+            hovered=canvas.hovered,
+            is_help_open=self.is_help_open,
+            dialog_id=id(dialog),
+            layout_key=self._layout_key,
+            caption=pygame.display.get_caption(),
         )
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
@@ -194,13 +227,13 @@ class EditorWindow(CommandWindow):
         if panel is not None:
             self.editor.shows_panel = panel
         self.editor.revision += 1
-        if self.trial is not None:
-            self.trial.set_appearance(scale, theme, panel=panel)
+        if self.play_window is not None:
+            self.play_window.set_appearance(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
         """Advance the clock, poll files and workers, and update layout, panel, cursor and title."""
-        if self.trial is not None:
-            self._update_trial(self.trial, seconds)
+        if self.play_window is not None:
+            self._update_play_window(self.play_window, seconds)
             return
         if self.documents.may_close:
             self.closed = True
@@ -248,9 +281,9 @@ class EditorWindow(CommandWindow):
         """Update the layout after a change of size, scale, panel or theme; otherwise do nothing."""
         editor = self.editor
         key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.theme)
-        if key == self._arranged:
+        if key == self._layout_key:
             return
-        self._arranged = key
+        self._layout_key = key
         self.theme = get_theme(editor.theme)
         self.layout = build_layout(key[0], self.scale, 1, 1.0, panel=editor.shows_panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
@@ -264,8 +297,7 @@ class EditorWindow(CommandWindow):
         self.canvas.draw(self.screen)
         status = list_status(editor, self.frame_rate, self.canvas.team)
         draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
-        _, _, panel_width, _ = layout.panel
-        if panel_width:
+        if layout.has_panel:
             self.panel.draw(self.screen)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
@@ -304,40 +336,44 @@ class EditorWindow(CommandWindow):
         commands = [self.commands[name] if name else None for name in list_menu_commands(editor)]
         self.dialogs.ask(Menu(commands, pixel, self.do))
 
-    def try_it(self) -> None:
+    def start_play_mode(self) -> None:
         """Open the map in the viewer, in this window."""
         if self.editor.toolbox.selector.is_busy:
             # A drag is cancelled, but an unfinished drawing is kept.
             self.editor.toolbox.selector.cancel(self.editor)
-        trial = start_trial(self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers)
-        trial.windowed_size = self.windowed_size
-        trial.cursor = self.cursor
-        self.trial = trial
-        self.replacement = trial
+        play_window = open_play_window(
+            self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers
+        )
+        play_window.windowed_size = self.windowed_size
+        play_window.cursor = self.cursor
+        self.play_window = play_window
+        self.replacement = play_window
 
-    def _update_trial(self, trial: PlayWindow, seconds: float) -> None:
-        trial.screen = self.screen
-        trial.frame_rate = self.frame_rate
-        if not trial.ended and not trial.closed:
-            trial.update(seconds)
-        if trial.ended or trial.closed:
-            self._end_trial(trial)
+    def _update_play_window(self, play_window: PlayWindow, seconds: float) -> None:
+        play_window.screen = self.screen
+        play_window.frame_rate = self.frame_rate
+        if not play_window.returns_to_editor and not play_window.closed:
+            play_window.update(seconds)
+        if play_window.returns_to_editor or play_window.closed:
+            self._end_play_mode(play_window)
         else:
-            trial.keep_draft()
+            play_window.save_draft()
 
-    def _end_trial(self, trial: PlayWindow) -> None:
+    def _end_play_mode(self, play_window: PlayWindow) -> None:
         """Return to the editor with the changes made in the viewer."""
-        trial.close()
-        trial.run_saver.finish()
-        self.trial = None
+        play_window.close()
+        play_window.run_saver.finish()
+        self.play_window = None
         self.replacement = None
         self.adopt_display()
-        self.windowed_size = trial.windowed_size
+        self.windowed_size = play_window.windowed_size
         editor = self.editor
-        viewer = trial.viewer
+        viewer = play_window.viewer
         editor.theme = viewer.view.theme
-        change = build_trial_change(editor.sketch, viewer.files.tried, viewer.session.displayed.environment)
-        if change is not None and not viewer.files.has_left_tried_map:
+        change = build_play_change(
+            editor.sketch, viewer.files.edited_map, viewer.session.displayed.environment
+        )
+        if change is not None and not viewer.files.has_left_edited_map:
             editor.apply(change)
         editor.document.update_draft()
         # If the key is still held down, its repetitions must not start play mode again.
@@ -347,7 +383,7 @@ class EditorWindow(CommandWindow):
             self.commands.reset_keys()
         self._arrange()
         editor.revision += 1
-        if trial.ended:
+        if play_window.returns_to_editor:
             self.draw()
         else:
             self.do("quit")
@@ -384,5 +420,5 @@ class EditorWindow(CommandWindow):
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press, as input or as the key of a command."""
         super().press_key(event)
-        if self.trial is not None:
-            self.trial.held = event.key
+        if self.play_window is not None:
+            self.play_window.ignored_key = event.key
