@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import ViewerLauncher
+    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.start.cards import StartChoice
     from robocov_app.viewer.start.launch import StartLauncher
@@ -245,7 +246,6 @@ def build_session(options: Arguments) -> Session:
     from robocov_app.viewer.session.controller_choice import ControllerChoice
     from robocov_app.viewer.session.robot_properties import RobotProperties
     from robocov_app.viewer.session.scenario import SessionScenario
-    from robocov_app.viewer.session.session import Session
 
     robots = options.robots
     properties = RobotProperties(radius=options.radius)
@@ -267,18 +267,24 @@ def build_session(options: Arguments) -> Session:
         dt=options.dt,
         conditions=conditions,
     )
-    try:
-        session = Session(scenario)
-    except StartError:
-        if options.start is not None:
-            raise
-        start_name = scenario.start_name
-        scenario = replace(scenario, start="uniform")
-        session = Session(scenario)
-        problem = f"not enough space for {robots} robots at start '{start_name}'"
-        echo(f"robocov: {problem}; using --start uniform", to_stderr=True)
+    session = _start_session(scenario, can_change_start=options.start is None)
     session.playback.clock.speed = options.speed
     session.playback.is_playing = not options.paused
+    return session
+
+
+def _start_session(scenario: SessionScenario, *, can_change_start: bool) -> Session:
+    """Start a session; with `can_change_start`, robots start uniformly if the start has not enough space."""
+    from robocov_app.viewer.session.session import Session
+
+    try:
+        return Session(scenario)
+    except StartError:
+        if not can_change_start:
+            raise
+    session = Session(replace(scenario, start="uniform"))
+    problem = f"not enough space for {scenario.robots} robots at start '{scenario.start_name}'"
+    echo(f"robocov: {problem}; using --start uniform", to_stderr=True)
     return session
 
 

@@ -43,6 +43,28 @@ _MIN_MARK_PT = 3.2
 """Sizes of starts and goals: of each if there is enough space, and of both in the densest crowd."""
 _ARROW_PT = 16.0
 """Length of the arrow on a moving obstacle."""
+_OBSTACLE_WIDTH_PT = 0.8
+_PATH_WIDTH_PT = 0.8
+_MOVING_WIDTH_PT = 1.4
+_LINE_WIDTH_PT = 1.6
+"""Width of the boundary of the known region, and of trajectories of a small team."""
+_CELL_EDGE_WIDTH_PT = 0.8
+_MAX_RING_WIDTH_PT = 1.1
+_MAX_RING_WIDTH_FRACTION = 0.25
+"""Maximum width of the ring of a robot, as a fraction of its radius."""
+# Order of what is drawn, from the lowest to the topmost.
+_CELLS_ORDER = 1
+_DENSITY_ORDER = 1.5
+_OBSTACLES_ORDER = 2
+_MOVING_ORDER = 2.1
+_PATHS_ORDER = 2.2
+_ARROWS_ORDER = 2.3
+_BOUNDARY_ORDER = 3
+_TRAJECTORIES_ORDER = 4
+_STARTS_ORDER = 5
+_GOALS_ORDER = 6
+_ROBOTS_ORDER = 7
+_NUMBERS_ORDER = 8
 _DENSITY_DOTS = 400
 """Number of dots of a density image along the longer side of the map."""
 
@@ -61,13 +83,13 @@ def _build_obstacle_style(theme: Theme) -> dict[str, Any]:
     return {
         "facecolor": to_plot_color(theme.obstacle),
         "edgecolor": to_plot_color(theme.obstacle_edge),
-        "linewidth": 0.8,
+        "linewidth": _OBSTACLE_WIDTH_PT,
     }
 
 
 def _build_path_style(theme: Theme) -> dict[str, Any]:
     """Return the matplotlib properties of the paths of moving obstacles."""
-    return {"color": to_plot_color(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
+    return {"color": to_plot_color(theme.ink), "linewidth": _PATH_WIDTH_PT, "linestyle": (0, (4, 3))}
 
 
 def draw_map(
@@ -93,7 +115,7 @@ def draw_map(
             Path(np.asarray(ring.coords), closed=True) for ring in (polygon.exterior, *polygon.interiors)
         ]
         outline = Path.make_compound_path(*rings)
-        axes.add_patch(PathPatch(outline, zorder=2, **_build_obstacle_style(theme)))
+        axes.add_patch(PathPatch(outline, zorder=_OBSTACLES_ORDER, **_build_obstacle_style(theme)))
     for obstacle in list_moving_obstacles(environment, time):
         _draw_moving_obstacle(axes, environment, obstacle, theme)
     boundary = Polygon(
@@ -101,10 +123,10 @@ def draw_map(
         closed=True,
         fill=False,
         edgecolor=to_plot_color(theme.boundary),
-        linewidth=1.6,
+        linewidth=_LINE_WIDTH_PT,
         joinstyle="miter",
         clip_on=False,
-        zorder=3,
+        zorder=_BOUNDARY_ORDER,
     )
     axes.add_patch(boundary)
 
@@ -117,7 +139,7 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
         extent=(low_x, high_x, low_y, high_y),
         origin="lower",
         interpolation="bilinear",
-        zorder=1.5,
+        zorder=_DENSITY_ORDER,
     )
     image.set_data(shade_density(environment, _DENSITY_DOTS, theme))
     axes.add_image(image)
@@ -136,18 +158,18 @@ def _draw_moving_obstacle(
         np.asarray(obstacle.polygon.exterior.coords),
         facecolor=fill,
         edgecolor=to_plot_color(theme.obstacle_edge),
-        linewidth=1.4,
-        zorder=2.1,
+        linewidth=_MOVING_WIDTH_PT,
+        zorder=_MOVING_ORDER,
     )
     axes.add_patch(shape)
     shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
-    axes.plot(*obstacle.path.T, zorder=2.2, **_build_path_style(theme))
+    axes.plot(*obstacle.path.T, zorder=_PATHS_ORDER, **_build_path_style(theme))
     ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     points_per_meter = abs(float(ends[1, 0] - ends[0, 0]))
     half_arrow = 0.5 * _ARROW_PT * obstacle.heading / points_per_meter
     arrow = {
         "arrowstyle": "-|>",
-        "linewidth": 1.4,
+        "linewidth": _MOVING_WIDTH_PT,
         "shrinkA": 0.0,
         "shrinkB": 0.0,
         "color": to_plot_color(theme.ink),
@@ -157,7 +179,7 @@ def _draw_moving_obstacle(
         xy=(obstacle.middle + half_arrow).tolist(),
         xytext=(obstacle.middle - half_arrow).tolist(),
         arrowprops=arrow,
-        zorder=2.3,
+        zorder=_ARROWS_ORDER,
     )
 
 
@@ -214,7 +236,11 @@ def _draw_cells(
             polygons.append(outline)
             faces.append(to_plot_color(get_color(int(hues[int(owner)]))))
     collection = PolyCollection(
-        polygons, facecolors=faces, edgecolors=to_plot_color(theme.cell_edge), linewidths=0.8, zorder=1
+        polygons,
+        facecolors=faces,
+        edgecolors=to_plot_color(theme.cell_edge),
+        linewidths=_CELL_EDGE_WIDTH_PT,
+        zorder=_CELLS_ORDER,
     )
     axes.add_collection(collection, autolim=False)
 
@@ -226,10 +252,10 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
     collection = LineCollection(
         trajectories,
         colors=[to_plot_color(color) for color in colors],
-        linewidths=1.6 * choose_width_factor(robots),
+        linewidths=_LINE_WIDTH_PT * choose_width_factor(robots),
         capstyle="round",
         joinstyle="round",
-        zorder=4,
+        zorder=_TRAJECTORIES_ORDER,
     )
     axes.add_collection(collection, autolim=False)
 
@@ -240,7 +266,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     first_rows = np.argmax(record.present, axis=0)[present]
     starts = record.positions[first_rows, present]
     size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
-    axes.plot(*starts.T, zorder=5, **_build_start_style(theme, size))
+    axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
 
 
 def _draw_final_positions(
@@ -287,7 +313,7 @@ def _draw_headings(
             mec="none",
             c=to_plot_color(theme.ink),
             ls="",
-            zorder=6,
+            zorder=_GOALS_ORDER,
             clip_on=False,
         )
 
@@ -306,7 +332,7 @@ def _draw_goals(
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
     # Of a goal that is reached, only the ends of the cross would stick out from under the disc.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
-    axes.plot(*goals[is_away].T, zorder=6, **_build_goal_style(is_centroid, theme, size))
+    axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, **_build_goal_style(is_centroid, theme, size))
 
 
 def draw_robots(
@@ -347,8 +373,8 @@ def draw_robots(
         s=[(2 * disc) ** 2 for disc in radii],
         c=[to_plot_color(fill) for fill in fills],
         edgecolors=to_plot_color(theme.robot_ring),
-        linewidths=[min(1.1, 0.25 * disc) for disc in radii],
-        zorder=7,
+        linewidths=[min(_MAX_RING_WIDTH_PT, _MAX_RING_WIDTH_FRACTION * disc) for disc in radii],
+        zorder=_ROBOTS_ORDER,
         clip_on=False,
     )
     if numbers is None:
@@ -366,7 +392,7 @@ def draw_robots(
                 color=to_plot_color(choose_text_color(fill)),
                 ha="center",
                 va="center_baseline",
-                zorder=8,
+                zorder=_NUMBERS_ORDER,
             )
     return radii
 
@@ -424,7 +450,9 @@ def get_label(handle: Artist) -> str:
 def build_map_handles(environment: Environment, theme: Theme, *, has_density: bool = True) -> list[Artist]:
     """Build the legend entries for what `draw_map` draws; the first one is the boundary."""
     handles: list[Artist] = [
-        Line2D([], [], color=to_plot_color(theme.boundary), linewidth=1.6, label=legend.KNOWN_REGION)
+        Line2D(
+            [], [], color=to_plot_color(theme.boundary), linewidth=_LINE_WIDTH_PT, label=legend.KNOWN_REGION
+        )
     ]
     if not environment.blocked.is_empty:
         handles.append(Patch(label=legend.UNKNOWN_OBSTACLE, **_build_obstacle_style(theme)))
@@ -471,7 +499,7 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
         final_color = theme.final
     handles: list[Artist] = [
         Line2D([], [], label=legend.START, **_build_start_style(theme, _START_PT)),
-        Line2D([], [], color=to_plot_color(trail_color), linewidth=1.6, label=legend.TRAJECTORY),
+        Line2D([], [], color=to_plot_color(trail_color), linewidth=_LINE_WIDTH_PT, label=legend.TRAJECTORY),
         build_robot_handle(legend.FINAL_POSITION, final_color, theme),
     ]
     if (record.present[-1] & ~record.working[-1]).any():

@@ -1,5 +1,6 @@
 """A page about the coverage cost: its curves, and maps of the distance to the nearest robot."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -51,14 +52,41 @@ MAX_MAP_HEIGHT_PX = 760
 MAX_ASPECT_BESIDE = 1.9
 """Maximum width / height of a map to the right of the curves; a wider map is below them."""
 _DEFAULT_SCALE = 1.3
+_MIN_ASPECT_SIDE_BY_SIDE = 2.4
+"""Minimum width / height of a box in which mean distances and mean times are next to each other."""
+_HATCH_PX = 9
+"""Distance between the lines that hatch areas that no robot can reach."""
 _BORDER_WIDTH = 1.4
 _BAR_LABEL = "distance to the nearest robot"
+_MAX_MAPS_IN_ROW = 3
+"""Maximum number of maps side by side; more maps form a grid."""
+_GRID_ASPECT = 1.6
+"""Approximate width / height of a grid of maps."""
+_MIN_HEIGHT_PX = 320.0
+_MIN_HEIGHT_BESIDE = 480
+"""Minimum height of a page with a map next to the curves, px at scale 1."""
+_MAX_CURVES_FRACTION = 0.4
+"""Maximum height of curves above maps, as a fraction of the height of both."""
 # Heights at scale 1, px.
 _HEAD = 46
 _CURVES_HEIGHT = 290
 _CAPTION_HEIGHT = 50
 _PANEL_GAP = 16
+_TITLE_ROW = 26
 _BAR_ROW = 26
+_BAR_ROW_BELOW_CURVES = 24
+_CAPTION_TITLE_ROW = 35
+_CAPTION_FACTS_ROW = 14
+"""Distances of the rows of a caption above its map."""
+_BAR_WIDTH = 190
+_BAR_HEIGHT = 10
+_BAR_RISE = 9
+"""Distance of the top of the color scale above the middle of its row, whose lower part has the ticks."""
+_BAR_INDENT = 14
+"""Space between the color scale and the right edge of the maps."""
+_BAR_LABEL_GAP = 12
+_BAR_LABEL_RISE = 4
+"""Distance of the label above the middle of the row, at the height of the color scale."""
 _CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
 
 
@@ -200,7 +228,7 @@ def plot_coverage(
     title_end: float = page.size[0]
     if not arrangement.is_below:
         title_end = bar_left
-    page.write_title(title, 26, title_end - 2 * page.margin)
+    page.write_title(title, _TITLE_ROW, title_end - 2 * page.margin)
     if curves:
         distance_label = DISTANCE
         if any(describe_density(snapshot.environment) for snapshot in snapshots):
@@ -254,25 +282,29 @@ def _create_page(
 
 
 def _choose_height(
-    page: FigurePage, extent: Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
+    page: FigurePage,
+    extent: Extent,
+    map_count: int,
+    maps_width: float,
+    footer_height: float,
+    *,
+    is_below: bool,
 ) -> int:
-    """Return the height that a page of the default width needs for `maps` maps, px."""
+    """Return the height that a page of the default width needs for a number of maps, px."""
     scale = page.scale
-    columns = maps
-    # Up to three maps are side by side; more form a grid that is about 1.6 times as wide as high.
-    if maps > 3:
-        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / extent.aspect))))
+    columns = map_count
+    if map_count > _MAX_MAPS_IN_ROW:
+        columns = min(map_count, max(1, round(np.sqrt(map_count * _GRID_ASPECT / extent.aspect))))
     slot_width = (maps_width - (columns - 1) * _PANEL_GAP * scale) / columns
     slot_height = min(slot_width / extent.aspect, MAX_MAP_HEIGHT_PX) + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
-    # Rounded up.
-    rows = -(-maps // columns)
+    rows = math.ceil(map_count / columns)
     maps_height = rows * slot_height - _PANEL_GAP * scale
     head_height = _HEAD * scale
     if is_below:
         head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale
-    min_height = 320.0
-    if maps == 1 and extent.aspect < MAX_ASPECT_BESIDE:
-        min_height = 480 * scale
+    min_height = _MIN_HEIGHT_PX
+    if map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE:
+        min_height = _MIN_HEIGHT_BESIDE * scale
     return int(np.clip(head_height + maps_height + footer_height, min_height, MAX_HEIGHT_PX))
 
 
@@ -285,12 +317,12 @@ def _arrange_below(
     head = _HEAD * scale
     curves_height = _CURVES_HEIGHT * scale
     if has_fixed_size:
-        curves_height = min(curves_height, 0.4 * (height - head - footer_height))
+        curves_height = min(curves_height, _MAX_CURVES_FRACTION * (height - head - footer_height))
     curves_end = head + curves_height
     return _Arrangement(
         curves=(page.margin, head, width - 2 * page.margin, curves_height),
         maps=(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
-        bar_row=curves_end + 24 * scale,
+        bar_row=curves_end + _BAR_ROW_BELOW_CURVES * scale,
         bar_min_left=page.margin,
         is_below=True,
     )
@@ -387,7 +419,7 @@ def _draw_curves(
     left, top, width, height = box
     if not times:
         _draw_curve_panel(page, curves, box, distance_label, "m")
-    elif width > 2.4 * height:
+    elif width > _MIN_ASPECT_SIDE_BY_SIDE * height:
         _draw_curve_panel(page, curves, (left, top, width / 2, height), distance_label, "m")
         _draw_curve_panel(page, times, (left + width / 2, top, width / 2, height), TIME, "s")
     else:
@@ -413,8 +445,8 @@ def _draw_maps(
         axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
         left, top, _, _ = box
-        title_row = top - 35 * scale
-        facts_row = top - 14 * scale
+        title_row = top - _CAPTION_TITLE_ROW * scale
+        facts_row = top - _CAPTION_FACTS_ROW * scale
         page.write(snapshot.title, left, title_row, points=TEXT + 1.5, bold=True, max_width=caption_width)
         page.write(snapshot.facts, left, facts_row, color=page.theme.faint, max_width=caption_width)
     return [box for box, _ in panels]
@@ -443,8 +475,7 @@ def _arrange_panels(
     panel_width = 0.0
     columns = 1
     for candidate in range(1, count + 1):
-        # Rounded up.
-        rows = -(-count // candidate)
+        rows = math.ceil(count / candidate)
         max_width = (width - (candidate - 1) * gap) / candidate
         max_height = (height - (rows - 1) * gap) / rows - caption_height
         candidate_width = min(max_width, max(max_height, 1.0) * aspect)
@@ -516,7 +547,7 @@ def _paint_distances(
     zoom : float, dots/m
     border_width : float, px
     """
-    pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
+    pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * _HATCH_PX)]
     width = DOTS_PER_PIXEL * border_width
     borders = field.compute_borders(x, y, width / zoom)
     opacity = compute_line_opacities(borders, zoom, width)[:, None]
@@ -545,9 +576,10 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     middle = arrangement.bar_row
     theme = page.theme
     scale = page.scale
-    right = maps[0] + maps[2] - 14 * scale
-    width = 190 * scale
-    axes = page.add_axes((right - width, middle - 9 * scale, width, 10 * scale))
+    right = maps[0] + maps[2] - _BAR_INDENT * scale
+    width = _BAR_WIDTH * scale
+    box = (right - width, middle - _BAR_RISE * scale, width, _BAR_HEIGHT * scale)
+    axes = page.add_axes(box)
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for spine in axes.spines.values():
         spine.set(edgecolor=to_plot_color(theme.faint), linewidth=0.6)
@@ -559,9 +591,9 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     axes.tick_params(
         colors=to_plot_color(theme.faint), labelcolor=to_plot_color(theme.ink), length=2.5, pad=1.5
     )
-    left = right - width - 12 * scale
+    left = right - width - _BAR_LABEL_GAP * scale
     label_width = page.measure_text(_BAR_LABEL)
     if left - label_width <= arrangement.bar_min_left:
         return left
-    page.write(_BAR_LABEL, left, middle - 4 * scale, align="right")
+    page.write(_BAR_LABEL, left, middle - _BAR_LABEL_RISE * scale, align="right")
     return left - label_width

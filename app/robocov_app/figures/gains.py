@@ -266,8 +266,8 @@ def _draw_dependence(axes: Axes, dependence: Dependence, positions: Array, *, is
     style = dependence.style
     label = _shorten_name(dependence.label)
     color = to_plot_color(style.get_color(LIGHT))
-    # Draw every step-th run; rounded up.
-    step = -(-len(positions) // MAX_DRAWN_RUNS)
+    # Only every step-th run is drawn.
+    step = math.ceil(len(positions) / MAX_DRAWN_RUNS)
     points: dict[str, Any] = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}
     axes.plot(positions[::step], dependence.values[::step], style.mark, markersize=3.6, alpha=0.5, **points)
     levels = np.unique(positions)

@@ -1,5 +1,6 @@
 """The page of a plot: a matplotlib figure of an exact size, with positions in pixels from the top left."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
@@ -42,7 +43,18 @@ _MAX_SCALE_BAR = 120
 _SCALE_BAR_LABEL = 80
 _PANEL_GAP = 14
 _LEGEND_GAP = 24
+# Heights of the footer, and distances below the maps in it.
 _ONE_LINE_FOOTER = 46
+_ONE_LINE_MIDDLE = 24
+_UPPER_LINE_MIDDLE = 20
+_LEGEND_TOP = 38
+_SPACE_ABOVE_LEGEND = 36
+_SPACE_BELOW_LEGEND = 14
+_HALF_TICK = 4
+"""Half the height of the ticks at the ends of the scale bar."""
+_SCALE_BAR_LABEL_GAP = 8
+_MIN_SCALE_BAR_PX = 20.0
+"""Minimum length of the longest scale bar, whatever the scale."""
 
 
 def to_plot_color(color: Color) -> PlotColor:
@@ -186,7 +198,7 @@ class FigurePage:
         self.scale = scale
         self.margin = _MARGIN * scale
         self.content_width = width - 2 * self.margin
-        self._max_bar_length = max(min(_MAX_SCALE_BAR * scale, width / 7), 20.0)
+        self._max_bar_length = max(min(_MAX_SCALE_BAR * scale, width / 7), _MIN_SCALE_BAR_PX)
         dpi = 100.0 * scale
         # matplotlib truncates the number of pixels, so rounding errors could turn 900 into 899.
         inches = ((width + 1e-3) / dpi, (height + 1e-3) / dpi)
@@ -320,8 +332,7 @@ class FigurePage:
         """
         page_width, page_height = self.size
         gap = _PANEL_GAP * self.scale
-        # Rounded up.
-        rows = -(-count // columns)
+        rows = math.ceil(count / columns)
         max_width = (page_width - self.margin) / columns - self.margin
         max_height = (page_height - top - bottom + gap) / rows - caption_height - gap
         width = min(max_width, max_height * aspect)
@@ -344,7 +355,7 @@ class FigurePage:
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), start):
             return _ONE_LINE_FOOTER * self.scale
-        return 36 * self.scale + legend.height + 14 * self.scale
+        return _SPACE_ABOVE_LEGEND * self.scale + legend.height + _SPACE_BELOW_LEGEND * self.scale
 
     def draw_footer(
         self, handles: Sequence[Artist], boxes: Sequence[PageBox], zoom: float, start: float = 0
@@ -369,14 +380,14 @@ class FigurePage:
         bottom = max(box_top + height for _, box_top, _, height in boxes)
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), start):
-            y = bottom + 24 * self.scale
+            y = bottom + _ONE_LINE_MIDDLE * self.scale
             max_left = end - legend.width - (end - start - self._compute_legend_space(start))
             bar_end = self._draw_scale_bar(max(min(left, max_left), start), y, zoom)
             x = min(max(right, bar_end + _LEGEND_GAP * self.scale + legend.width), end)
             self._draw_legend(handles, legend.columns, "center right", (x, y))
         else:
-            self._draw_scale_bar(left, bottom + 20 * self.scale, zoom)
-            middle = ((start + end) / 2, bottom + 38 * self.scale)
+            self._draw_scale_bar(left, bottom + _UPPER_LINE_MIDDLE * self.scale, zoom)
+            middle = ((start + end) / 2, bottom + _LEGEND_TOP * self.scale)
             self._draw_legend(handles, legend.columns, "upper center", middle)
 
     def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, start: float) -> bool:
@@ -392,12 +403,12 @@ class FigurePage:
         """Draw a scale bar of a round length; return the right end of its label, px."""
         length = round_down(self._max_bar_length / zoom)
         right = left + length * zoom
-        half_tick = 4 * self.scale
+        half_tick = _HALF_TICK * self.scale
         self._draw_line((left, y), (right, y))
         for x in (left, right):
             self._draw_line((x, y - half_tick), (x, y + half_tick))
         label = format_scale_length(length)
-        label_left = right + 8 * self.scale
+        label_left = right + _SCALE_BAR_LABEL_GAP * self.scale
         self.write(label, label_left, y, points=SMALL, bold=True)
         return label_left + self.measure_text(label, points=SMALL, bold=True)
 
@@ -413,8 +424,7 @@ class FigurePage:
         max_width = self.size[0] - start
         rows = 1
         while True:
-            # Rounded up.
-            columns = -(-len(handles) // rows)
+            columns = math.ceil(len(handles) / rows)
             legend = self._draw_legend(handles, columns, "upper left", (0.0, 0.0))
             extent = legend.get_window_extent(self._get_renderer())
             legend.remove()

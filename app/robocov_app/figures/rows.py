@@ -163,7 +163,7 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
         size = _SINGLE_POINT_PT
         opacity = 1.0
     else:
-        offsets = _scatter(len(values))
+        offsets = _compute_scatter_offsets(len(values))
         size = _POINT_PT
         opacity = _POINT_OPACITY
     axes.plot(
@@ -179,7 +179,7 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
     )
 
 
-def _scatter(count: int) -> Array:
+def _compute_scatter_offsets(count: int) -> Array:
     """Return vertical offsets of points, (count,), from the van der Corput sequence.
 
     Neighbors in the sequence differ widely.

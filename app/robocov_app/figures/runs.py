@@ -1,5 +1,6 @@
 """Figures of maps and runs: trajectories, cost curves, comparisons and metrics, without pyplot."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -49,6 +50,24 @@ _PANEL_GAP = 14
 _ONE_LINE_CAPTION = 30
 _TWO_LINE_CAPTION = 54
 _CAPTION_GAP = 16
+# Rows of text above a panel or a map at scale 1, px.
+_NAME_ROW = 38
+_FACTS_ROW = 16
+_HEADING_RISE = 20
+"""Distance of the heading above the captions of a comparison."""
+_TOP_WITHOUT_HEADING = 8
+_TOP_WITH_HEADING = 50
+_SHEET_CAPTION_HEIGHT = 26
+_SHEET_NAME_ROW = 12
+_SHEET_HEADING_RISE = 18
+_SHEET_TOP_WITH_HEADING = 46
+_SHEET_SHAPE_PX = (1600, 1200)
+"""Width and height of the area that the maps of a sheet should about fill."""
+# Size of a page with one map, px.
+_MIN_MAP_PAGE_WIDTH_PX = 840
+_MAX_MAP_PAGE_WIDTH_PX = 1400
+_MIN_MAP_PAGE_HEIGHT_PX = 300
+_MAX_MAP_PAGE_HEIGHT_PX = 1300
 _COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
 """Space around the curves on a page without maps; the title is above them."""
 _MAP_HEAD = 58
@@ -226,7 +245,7 @@ def plot_comparison(
         else:
             _write_two_lines(page, captions, number, panel)
     first_box = panels[0].box
-    _write_heading(page, captions.shared, first_box, layout.caption_height + 20 * page.scale)
+    _write_heading(page, captions.shared, first_box, layout.caption_height + _HEADING_RISE * page.scale)
     footer_boxes = [_widen_box(panel) if layout.is_one_line else panel.box for panel in panels]
     page.draw_footer(handles, footer_boxes, first_box[2] / extent.width)
     return page.figure
@@ -260,8 +279,7 @@ class _ComparisonLayout:
 
     def compute_page_height(self, count: int, aspect: float, footer_height: float) -> int:
         """Return the height of a page for a number of panels with an aspect, px."""
-        # Rounded up.
-        rows = -(-count // self.columns)
+        rows = math.ceil(count / self.columns)
         panels_height = rows * (self.caption_height + self.column_width / aspect + self.gap)
         height = self.top + panels_height + footer_height
         return int(np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX))
@@ -270,9 +288,9 @@ class _ComparisonLayout:
 def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) -> _ComparisonLayout:
     """Choose the layout of panels with an aspect; captions are in one line if they all fit."""
     scale = page.scale
-    top = 8 * scale
+    top = _TOP_WITHOUT_HEADING * scale
     if captions.shared:
-        top = 50 * scale
+        top = _TOP_WITH_HEADING * scale
     columns = _choose_columns(page, captions, aspect, top)
     column_width = (page.size[0] - page.margin) / columns - page.margin
     is_one_line = captions.max_joined_width <= column_width
@@ -350,7 +368,7 @@ def _write_one_line(
 ) -> None:
     """Write the name of a run above its panel on the left, and its facts on the right."""
     left, top, panel_width, _ = panel.box
-    row = top - 16 * page.scale
+    row = top - _FACTS_ROW * page.scale
     right = left + max(panel_width, min(panel.caption_width, width))
     page.write(captions.names[number], left, row, points=TITLE, bold=True)
     page.write(captions.facts[number], right, row, color=page.theme.faint, align="right")
@@ -359,8 +377,8 @@ def _write_one_line(
 def _write_two_lines(page: FigurePage, captions: _Captions, number: int, panel: PagePanel) -> None:
     """Write the name of a run above its panel, and its facts below the name."""
     left, top, _, _ = panel.box
-    name_row = top - 38 * page.scale
-    facts_row = top - 16 * page.scale
+    name_row = top - _NAME_ROW * page.scale
+    facts_row = top - _FACTS_ROW * page.scale
     max_width = panel.caption_width
     page.write(captions.names[number], left, name_row, points=TITLE, bold=True, max_width=max_width)
     page.write(captions.facts[number], left, facts_row, color=page.theme.faint, max_width=max_width)
@@ -448,19 +466,21 @@ def _create_map_page(
     width = min(page.content_width, free_height * aspect)
     height = width / aspect
     box = ((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
-    _write_above_map(page, title, box, up=38, points=TITLE, is_title=True)
-    _write_above_map(page, facts, box, up=16, points=TEXT, is_title=False)
+    _write_above_map(page, title, box, up=_NAME_ROW, points=TITLE, is_title=True)
+    _write_above_map(page, facts, box, up=_FACTS_ROW, points=TEXT, is_title=False)
     page.draw_footer(handles, [box], width / (high_x - low_x))
     return page.add_map_axes(box, low_x, low_y, high_x, high_y)
 
 
 def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]) -> tuple[int, int]:
     """Return the width and height of a page that suits a map with an aspect, px."""
-    # A page of the maximum width serves to measure the footer.
-    page = FigurePage((1400, 1000), theme, _MAP_SCALE)
+    # A page of the maximum width and any height serves to measure the footer.
+    page = FigurePage((_MAX_MAP_PAGE_WIDTH_PX, 1000), theme, _MAP_SCALE)
     surroundings = _MAP_HEAD * page.scale + page.measure_footer(handles)
-    width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
-    height = float(np.clip((width - 2 * page.margin) / aspect + surroundings, 300, 1300))
+    widest = (_MAX_MAP_PAGE_HEIGHT_PX - surroundings) * aspect + 2 * page.margin
+    width = float(np.clip(widest, _MIN_MAP_PAGE_WIDTH_PX, _MAX_MAP_PAGE_WIDTH_PX))
+    highest = (width - 2 * page.margin) / aspect + surroundings
+    height = float(np.clip(highest, _MIN_MAP_PAGE_HEIGHT_PX, _MAX_MAP_PAGE_HEIGHT_PX))
     return int(width), int(height)
 
 
@@ -524,11 +544,11 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     # A page of the maximum height serves to measure; its final height is chosen below.
     page = FigurePage((_SHEET_WIDTH_PX, _MAX_SHEET_HEIGHT_PX), theme, _SHEET_SCALE)
     scale = page.scale
-    above = 26 * scale
-    top = (46 if title else 8) * scale
-    columns = choose_column_count(len(drawn), aspect, (1600, 1200), row_margin=above)
+    above = _SHEET_CAPTION_HEIGHT * scale
+    top = (_SHEET_TOP_WITH_HEADING if title else _TOP_WITHOUT_HEADING) * scale
+    columns = choose_column_count(len(drawn), aspect, _SHEET_SHAPE_PX, row_margin=above)
     slot = (_SHEET_WIDTH_PX - page.margin) / columns - page.margin
-    rows = -(-len(drawn) // columns)
+    rows = math.ceil(len(drawn) / columns)
     panels_height = rows * (above + slot * map_height / map_width + _PANEL_GAP * scale)
     height = int(
         np.clip(top + panels_height + page.measure_footer(handles), _MIN_HEIGHT_PX, _MAX_SHEET_HEIGHT_PX)
@@ -548,10 +568,10 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
         low_x, low_y, _, _ = environment.region.bounds
         axes = page.add_map_axes(panel.box, low_x, low_y, low_x + map_width, low_y + map_height)
         arena.draw_map(axes, environment, theme)
-        name_row = map_top - 12 * scale
+        name_row = map_top - _SHEET_NAME_ROW * scale
         page.write(environment.name, left, name_row, bold=True, max_width=panel.caption_width)
     first_box, _ = panels[0]
-    _write_heading(page, title, first_box, above + 18 * scale)
+    _write_heading(page, title, first_box, above + _SHEET_HEADING_RISE * scale)
     page.draw_footer(handles, [box for box, _ in panels], first_box[2] / map_width)
     return page.figure
 

@@ -144,40 +144,40 @@ def bootstrap_statistic(
 
 def _bootstrap(statistic: _BatchStatistic, clusters: Sequence[object], resamples: int) -> Interval:
     """Return a statistic of all rows, with its percentiles over resampled clusters as limits."""
-    rows_by_cluster: dict[object, list[int]] = {}
+    cluster_rows: dict[object, list[int]] = {}
     for row, cluster in enumerate(clusters):
-        rows_by_cluster.setdefault(cluster, []).append(row)
-    members = [np.array(rows) for rows in rows_by_cluster.values()]
+        cluster_rows.setdefault(cluster, []).append(row)
+    rows_by_cluster = [np.array(rows) for rows in cluster_rows.values()]
     all_rows = np.arange(len(clusters))
     estimate = float(np.asarray(statistic(all_rows[None]))[0])
-    if len(members) < 2:
+    if len(rows_by_cluster) < 2:
         return Interval(estimate, float("nan"), float("nan"))
-    values = _resample(statistic, members, resamples)
+    values = _resample(statistic, rows_by_cluster, resamples)
     # Resamples without a value are ignored.
     low, high = _compute_limits(values[~np.isnan(values)])
     return Interval(estimate, low, high, values)
 
 
-def _resample(statistic: _BatchStatistic, members: Sequence[IntArray], resamples: int) -> Array:
+def _resample(statistic: _BatchStatistic, rows_by_cluster: Sequence[IntArray], resamples: int) -> Array:
     """Return the values of a statistic for samples of whole clusters, (resamples,).
 
     Parameters
     ----------
     statistic : callable
-    members : sequence of int array
+    rows_by_cluster : sequence of int array
         Row numbers of each cluster.
     resamples : int
     """
-    count = len(members)
+    count = len(rows_by_cluster)
     choices = np.random.default_rng(0).integers(0, count, (resamples, count))
-    sizes = {len(rows) for rows in members}
+    sizes = {len(rows) for rows in rows_by_cluster}
     # Clusters of equal size fit into a table, so that many samples can be evaluated at once.
     if len(sizes) == 1:
-        table = np.array(members)
+        table = np.array(rows_by_cluster)
         batches = np.array_split(choices, 1 + table.size * resamples // _MAX_BATCH_VALUES)
         values = [statistic(table[batch].reshape(len(batch), -1)) for batch in batches]
     else:
-        samples = [np.concatenate([members[cluster] for cluster in choice]) for choice in choices]
+        samples = [np.concatenate([rows_by_cluster[cluster] for cluster in choice]) for choice in choices]
         values = [statistic(rows[None]) for rows in samples]
     return np.concatenate([np.asarray(batch_values) for batch_values in values])
 

@@ -29,6 +29,13 @@ MIN_TIME_LIMIT_S = 10.0
 """A growing time axis shows at least this many seconds."""
 _FREE_TIME_FRACTION = 0.03
 """Free space after the present on a growing time axis, as a fraction of the time so far."""
+_MIN_TIME_LIMIT_FRACTION = 0.96
+"""Fraction of `MIN_TIME_LIMIT_S` up to which a growing time axis has this length."""
+_EARLY_TIME_S = 40.0
+_EARLY_INTERVALS = 4.0
+"""Before the early time, half a round quarter of the time so far is the step of a growing time axis."""
+_LATE_INTERVALS = 5.0
+"""From then on, the step is a round fifth of the time so far."""
 _MIN_TIME_STEP_S = 5.0
 """A growing time axis ends at a multiple of at least this step."""
 _MIN_VALUE = 1e-3
@@ -159,12 +166,12 @@ def choose_growing_time_limit(end_s: float) -> float:
     >>> [choose_growing_time_limit(t) for t in (0.0, 9.0, 9.9, 61.0)]
     [10.0, 10.0, 15.0, 70.0]
     """
-    if end_s <= 0.96 * MIN_TIME_LIMIT_S:
+    if end_s <= _MIN_TIME_LIMIT_FRACTION * MIN_TIME_LIMIT_S:
         return MIN_TIME_LIMIT_S
     # The end is a multiple of a round step of about an eighth of the time so far, then of a fifth.
-    if end_s < 40.0:
-        step = round_down(max(end_s / 4.0, 1.0)) / 2.0
+    if end_s < _EARLY_TIME_S:
+        step = round_down(max(end_s / _EARLY_INTERVALS, 1.0)) / 2.0
     else:
-        step = round_down(end_s / 5.0)
+        step = round_down(end_s / _LATE_INTERVALS)
     step = max(step, _MIN_TIME_STEP_S)
     return float(math.ceil((end_s * (1.0 + _FREE_TIME_FRACTION) + 1e-9) / step) * step)

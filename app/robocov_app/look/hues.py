@@ -17,8 +17,15 @@ MAX_OWN_HUES = 9
 """Maximum number of robots that each have a hue of their own."""
 N_SHARED_HUES = 6
 """Number of hues in a larger team."""
+_MAX_VISITS = 6
+"""Maximum number of changes of the hue of one cell before the repair of hues is given up."""
 MIN_TRAIL_CONTRAST = 2.4
 """Minimum contrast ratio between the trajectory of a robot and its cell."""
+_MIN_TRAIL_INK_FRACTION = 0.12
+_TRAIL_INK_STEP = 0.04
+"""Fraction of ink in the color of a trajectory: the least, and the step by which it grows."""
+_CROWDED_TRAIL_BACKGROUND_FRACTION = 0.25
+"""Fraction of the background in the color of the trajectories of a large team."""
 
 ColorScheme: TypeAlias = Literal["paper", "robots"]
 """Colors of robots and trajectories.
@@ -71,16 +78,16 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
     flat = adjacency.ravel()
     hue_pairs = hues[adjacency]
     is_conflict = hue_pairs[:, 0] == hue_pairs[:, 1]
-    waiting = np.unique(adjacency[is_conflict]).tolist()
-    while waiting:
-        cell = waiting.pop()
+    cells_to_check = np.unique(adjacency[is_conflict]).tolist()
+    while cells_to_check:
+        cell = cells_to_check.pop()
         # Flat indices 2 k and 2 k + 1 are the ends of edge k, so flipping the last bit gives the other end.
         neighbors = flat[np.flatnonzero(flat == cell) ^ 1]
         neighbor_hues = hues[neighbors].tolist()
         if hues[cell] not in neighbor_hues:
             continue
         visits[cell] += 1
-        if visits[cell] > N_SHARED_HUES:
+        if visits[cell] > _MAX_VISITS:
             return None
         offset = cell + int(visits[cell])
         # Break ties differently at each visit, otherwise two cells could swap hues forever.
@@ -88,7 +95,7 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
             range(N_SHARED_HUES),
             key=lambda hue: (neighbor_hues.count(hue), (hue + offset) % N_SHARED_HUES),
         )
-        waiting += neighbors[hues[neighbors] == hues[cell]].tolist()
+        cells_to_check += neighbors[hues[neighbors] == hues[cell]].tolist()
     return hues
 
 
@@ -143,16 +150,17 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
     if scheme == "paper":
         return [theme.trajectory] * len(hues)
     if len(hues) > MAX_OWN_HUES:
-        return [mix(theme.trajectory, theme.background, 0.25)] * len(hues)
+        color = mix(theme.trajectory, theme.background, _CROWDED_TRAIL_BACKGROUND_FRACTION)
+        return [color] * len(hues)
     return [choose_trail_color(theme, hue) for hue in hues]
 
 
 def choose_trail_color(theme: Theme, hue: int) -> Color:
     """Choose the color of a trajectory: the robot's hue, mixed with ink until it contrasts with the cell."""
     cell_color = theme.get_cell_color(hue)
-    fraction = 0.12
+    fraction = _MIN_TRAIL_INK_FRACTION
     color = mix(theme.robots[hue], theme.ink, fraction)
     while compute_contrast(color, cell_color) < MIN_TRAIL_CONTRAST:
-        fraction += 0.04
+        fraction += _TRAIL_INK_STEP
         color = mix(theme.robots[hue], theme.ink, fraction)
     return color

@@ -24,6 +24,18 @@ _DASH_FRACTION = 0.55
 _MIN_CIRCLE_SIDES = 24
 _MAX_CIRCLE_SIDES = 720
 _SWATCH_PX = 11
+_HEAD_LENGTH_FACTOR = 2.6
+_MIN_HEAD_LENGTH_PX = 4
+"""The head of an arrow is this long for a shaft of width 0, and longer by the factor times the width."""
+_HEAD_WIDTH_FACTOR = 0.48
+"""Half the width of the head of an arrow, as a fraction of its length."""
+_SHAFT_INSET_FACTOR = 0.7
+"""Part of a full head that the shaft does not reach, so that its blunt end does not show at the tip."""
+_BAR_FACTOR = 1.1
+_MIN_HALF_BAR_PX = 1.7
+"""Half the length of the bar at the end of an arrow, for a shaft of width 0; the factor is as for heads."""
+_DOT_FACTOR = 1.5
+"""Radius of the dot at the end of an arrow, compared with the width of the shaft."""
 _OUTSIDE_PX = 500
 """Sprites and arrows that start farther outside the surface are left out."""
 
@@ -243,32 +255,23 @@ class Canvas:
         if length < 1.0 or is_outside.any():
             return
         along = (tip - tail) / length
-        across = np.array([-along[1], along[0]])
-        # The size of the head grows with the width of the shaft, but short arrows are only a head.
-        head_length = min(2.6 * width + 4 * self.scale, length)
-        if head == "bar":
-            half_bar = 1.1 * width + 1.7 * self.scale
-            barbs = [(tip - half_bar * across).tolist(), (tip + half_bar * across).tolist()]
-        else:
-            base = tip - head_length * along
-            half_width = 0.48 * head_length
-            barbs = [
-                (base + half_width * across).tolist(),
-                tip.tolist(),
-                (base - half_width * across).tolist(),
-            ]
+        # Short arrows are only a head.
+        head_length = min(_HEAD_LENGTH_FACTOR * width + _MIN_HEAD_LENGTH_PX * self.scale, length)
+        half_bar = _BAR_FACTOR * width + _MIN_HALF_BAR_PX * self.scale
+        barbs = (
+            _list_bar_ends(tip, along, half_bar) if head == "bar" else _list_barbs(tip, along, head_length)
+        )
         sketch = sprites.Sketch.from_points([tail.tolist(), *barbs], 2 * width)
         if sketch is None:
             return
         shaft_end = tip
         if head == "full":
-            # The shaft ends inside the head, so that its blunt end does not show at the tip.
-            shaft_end = tip - 0.7 * head_length * along
+            shaft_end = tip - _SHAFT_INSET_FACTOR * head_length * along
         sketch.draw_path([tail.tolist(), shaft_end.tolist()], color, width)
         if head == "full":
             sketch.fill_polygon(barbs, color)
         elif head == "dot":
-            sketch.draw_dot(barbs[1], 1.5 * width, color)
+            sketch.draw_dot(barbs[1], _DOT_FACTOR * width, color)
         else:
             sketch.draw_path(barbs, color, width)
         sketch.draw_on(self.surface)
@@ -365,3 +368,21 @@ class Canvas:
         if size is None:
             size = self.theme.text
         return measure_text(text, self.scale_text_size(size), bold)
+
+
+def _list_bar_ends(tip: Array, along: Array, half_bar: float) -> list[list[float]]:
+    """Return the two ends of the bar across the tip of an arrow, px; `along` is its direction."""
+    across = np.array([-along[1], along[0]])
+    return [(tip - half_bar * across).tolist(), (tip + half_bar * across).tolist()]
+
+
+def _list_barbs(tip: Array, along: Array, head_length: float) -> list[list[float]]:
+    """Return the corners of the head of an arrow, px: one barb, the tip and the other barb."""
+    across = np.array([-along[1], along[0]])
+    base = tip - head_length * along
+    half_width = _HEAD_WIDTH_FACTOR * head_length
+    return [
+        (base + half_width * across).tolist(),
+        tip.tolist(),
+        (base - half_width * across).tolist(),
+    ]

@@ -18,14 +18,14 @@ _MAX_LINES_AT_FULL_WIDTH = 20
 _MIN_WIDTH_FACTOR = 0.5
 
 
-def compute_nearest_distances(points: Array, step: int = 1) -> Array:
+def compute_nearest_distances(points: Array, sample_step: int = 1) -> Array:
     """Return the distance of each point to the nearest other one.
 
     Parameters
     ----------
     points : (n, 2) array
-    step : int
-        Evaluate only every `step`-th point, if there are more than `_MAX_POINTS_WITHOUT_TREE`.
+    sample_step : int
+        Evaluate only every `sample_step`-th point, if there are more than `_MAX_POINTS_WITHOUT_TREE`.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def compute_nearest_distances(points: Array, step: int = 1) -> Array:
         np.fill_diagonal(squares, np.inf)
         return np.asarray(np.sqrt(squares.min(axis=1)))
     # The nearest point in the tree is the point itself, so the second nearest is asked for.
-    distances, _ = KDTree(points).query(points[::step], k=[2])
+    distances, _ = KDTree(points).query(points[::sample_step], k=[2])
     return np.asarray(distances).ravel()
 
 
@@ -82,7 +82,8 @@ def fit_mark_size(points: Array, low: float, high: float) -> float:
     """
     if not len(points):
         return high
-    distances = compute_nearest_distances(points, 1 + len(points) // _MAX_SAMPLED_POINTS)
+    sample_step = 1 + len(points) // _MAX_SAMPLED_POINTS
+    distances = compute_nearest_distances(points, sample_step)
     return float(np.clip(np.median(distances), low, high))
 
 

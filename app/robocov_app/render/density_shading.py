@@ -82,7 +82,7 @@ def compute_density_fractions(density: Density, bounds: Bounds, x: Array, y: Arr
     (h, w) array
         From 0 for the lowest density to 1 for the highest; 0 everywhere if the density is constant.
     """
-    low, high = measure_density_range(density, bounds)
+    low, high = compute_density_range(density, bounds)
     values = density.evaluate(_build_grid(x, y)).reshape(len(y), len(x))
     if high <= low:
         return np.zeros_like(values)
@@ -109,15 +109,15 @@ def color_density(fractions: Array, theme: Theme) -> NDArray[np.uint8]:
     return colors
 
 
-def compute_density_range(environment: Environment) -> tuple[float, float]:
+def get_density_range(environment: Environment) -> tuple[float, float]:
     """Return the lowest and the highest density of an environment; without a density, both are 1."""
     if environment.density is None:
         return 1.0, 1.0
-    return measure_density_range(environment.density, environment.region.bounds)
+    return compute_density_range(environment.density, environment.region.bounds)
 
 
 @lru_cache(maxsize=16)
-def measure_density_range(density: Density, bounds: Bounds) -> tuple[float, float]:
+def compute_density_range(density: Density, bounds: Bounds) -> tuple[float, float]:
     """Return the lowest and the highest density of a grid of samples within bounds."""
     low = np.array(bounds[:2])
     high = np.array(bounds[2:])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from robocov.environment import Environment
-from robocov_app.render.density_shading import compute_density_range
+from robocov_app.render.density_shading import get_density_range
 
 
 def describe_density(environment: Environment) -> str:
@@ -11,7 +11,7 @@ def describe_density(environment: Environment) -> str:
     density = environment.density
     if density is None or density.is_uniform:
         return ""
-    low, high = compute_density_range(environment)
+    low, high = get_density_range(environment)
     return describe_density_range(low, high)
 
 
@@ -38,7 +38,7 @@ def list_density_lines(environment: Environment) -> list[str]:
     density = environment.density
     if density is None or density.is_uniform:
         return []
-    low, high = compute_density_range(environment)
+    low, high = get_density_range(environment)
     return [f"weighted by φ   {density.kind}, {low:.3g} to {high:.3g}"]
 
 

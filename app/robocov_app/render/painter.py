@@ -1,7 +1,7 @@
 """The painter: draws the layers of a scene on a pygame surface, with or without a display."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
 
@@ -43,13 +43,21 @@ def choose_scale(size: tuple[int, int]) -> float:
     return min(max(rounded, _MIN_SCALE), _MAX_SCALE)
 
 
+@dataclass(frozen=True)
+class _View:
+    """Everything on which the space for the legend and the color scale depends, apart from the scene."""
+
+    size: tuple[int, int]
+    """px"""
+    scale: float
+    visible_layers: frozenset[str]
+
+
 class _Margins(NamedTuple):
-    """Space that the legend and the color scale have needed so far.
+    """Space that the legend and the color scale have needed so far."""
 
-    `key` holds the size, the scale and the visible layers for which it was measured.
-    """
-
-    key: object
+    view: _View | None
+    """View for which the space was measured; None before the first frame."""
     legend_rows: int
     color_bar_width: float
     """px"""
@@ -232,11 +240,11 @@ class Painter:
         elif "legend" in names:
             rows = len(arrange_legend_rows(canvas, canvas.legend))
         color_bar_width = measure_color_bar(canvas, scene)
-        key = (self.size, self.scale, canvas.visible_layers)
-        if key == self._margins.key:
+        view = _View(self.size, self.scale, canvas.visible_layers)
+        if view == self._margins.view:
             rows = max(rows, self._margins.legend_rows)
             color_bar_width = max(color_bar_width, self._margins.color_bar_width)
-        self._margins = _Margins(key, rows, color_bar_width)
+        self._margins = _Margins(view, rows, color_bar_width)
 
     def render_frame(self, scene: Scene) -> NDArray[np.uint8]:
         """Render a scene as an array, without a display.

@@ -12,7 +12,7 @@ from robocov_app.render.density_shading import (
     color_density,
     compute_density_fractions,
     compute_density_range,
-    measure_density_range,
+    get_density_range,
 )
 from robocov_app.render.density_text import describe_density, get_cost_name
 
@@ -30,9 +30,9 @@ def test_only_nonuniform_densities_are_described():
 
 def test_the_range_finds_narrow_hot_spots():
     narrow = Gaussians((Gaussian((3.21, 4.56), 7.0, sigma=0.01), Gaussian((90.0, 0.0), 50.0, sigma=0.1)), 0.5)
-    low, high = measure_density_range(narrow, BOUNDS)
+    low, high = compute_density_range(narrow, BOUNDS)
     assert low == pytest.approx(0.5) and high == pytest.approx(7.5)
-    assert compute_density_range(SQUARE) == (1.0, 1.0)
+    assert get_density_range(SQUARE) == (1.0, 1.0)
 
 
 def test_the_more_the_stronger():

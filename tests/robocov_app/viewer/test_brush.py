@@ -14,7 +14,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
-from robocov_app.render.density_shading import compute_density_range
+from robocov_app.render.density_shading import get_density_range
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.map_edits import (
     MAX_PAINTED_DENSITY,
@@ -67,11 +67,11 @@ def test_the_painted_density_is_limited():
     session = start_session()
     for _ in range(60):
         paint_stroke(brush, session, (5.0, 3.0), (5.2, 3.0), lowers=True)
-    low, _ = compute_density_range(session.displayed.environment)
+    low, _ = get_density_range(session.displayed.environment)
     assert low == pytest.approx(MIN_PAINTED_DENSITY, abs=0.02)
     for _ in range(90):
         paint_stroke(brush, session, (5.0, 3.0), (5.2, 3.0))
-    _, high = compute_density_range(session.displayed.environment)
+    _, high = get_density_range(session.displayed.environment)
     assert high == pytest.approx(MAX_PAINTED_DENSITY, rel=0.1)
 
 

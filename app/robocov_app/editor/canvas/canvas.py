@@ -25,7 +25,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import legend_strip, scale_bar
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density_shading import measure_density_range
+from robocov_app.render.density_shading import compute_density_range
 from robocov_app.render.density_text import describe_density_range
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.render.layers.density import build_density_entry
@@ -151,7 +151,7 @@ class EditorCanvas:
         density = sketch.density
         if density is not None and not density.is_uniform and sketch.boundary:
             xs, ys = zip(*sketch.boundary, strict=True)
-            low, high = measure_density_range(density, (min(xs), min(ys), max(xs), max(ys)))
+            low, high = compute_density_range(density, (min(xs), min(ys), max(xs), max(ys)))
             entries.append(build_density_entry(describe_density_range(low, high)))
         return entries
 

@@ -17,7 +17,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov_app.render.distance_map.lattice import FieldLattice
 
-_MIN_BORDER_ANGLE = 0.05
+_MIN_DISTANCE_GROWTH = 0.05
 """Minimum growth of the difference of two distances per meter, so that the division below stays finite.
 
 For small angles it is the angle between the directions of the paths, rad.
@@ -107,9 +107,9 @@ class DistanceField:
         # below; -1 without a robot) give the same distances.
         sources = np.where(last_corners >= 0, last_corners, -2 - owners)
         corner_sites = lattice.corner_sites
-        is_mixed = _has_differences(sources[corner_sites])
+        is_mixed = _find_rows_with_differences(sources[corner_sites])
         self._distance_candidates = self._build_candidates(is_mixed, corner_sites[is_mixed])
-        is_divided = _has_differences(owners[corner_sites])
+        is_divided = _find_rows_with_differences(owners[corner_sites])
         is_selected, sites = lattice.collect_sites(is_divided)
         self._border_candidates = self._build_candidates(
             is_selected, _select_different(sites, sources[sites])
@@ -157,7 +157,7 @@ class DistanceField:
         distances = self._compute_distances(candidates.sites[indices], x[:, None], y[:, None])
         x_steps, y_steps = self.lattice.to_steps(x, y)
         # Corners 0 to 3: lower left, lower right, upper left, upper right.
-        nearest_corners = 2 * _is_in_upper_half(y_steps) + _is_in_upper_half(x_steps)
+        nearest_corners = 2 * _get_half_index(y_steps) + _get_half_index(x_steps)
         return np.where(candidates.is_free[indices, nearest_corners], distances, np.inf)
 
     @property
@@ -282,29 +282,49 @@ class DistanceField:
         """
         square_columns, square_rows = self.lattice.find_squares(x, y)
         indices = self._border_candidates.indices[square_rows[rows], square_columns[columns]]
-        chosen = (indices >= 0).nonzero()[0]
-        indices = indices[chosen]
-        rows = rows[chosen]
-        columns = columns[chosen]
-        pixel_x = x[columns]
-        pixel_y = y[rows]
+        has_candidates = (indices >= 0).nonzero()[0]
+        rows = rows[has_candidates]
+        columns = columns[has_candidates]
+        owners, distances = self._compare_owners(indices[has_candidates], x[columns], y[rows])
+        return BorderPixels(rows, columns, owners, distances)
+
+    def _compare_owners(self, indices: IntArray, pixel_x: Array, pixel_y: Array) -> tuple[IntArray, Array]:
+        """Return the nearest robot of pixels, and the distance to the border with the second nearest.
+
+        Parameters
+        ----------
+        indices : (k,) int array
+            Row of the candidates of each pixel's square.
+        pixel_x, pixel_y : (k,) array, m
+
+        Returns
+        -------
+        owners : (k,) int array
+        border_distances : (k,) array, m
+            inf if there is no border.
+        """
         sites = self._border_candidates.sites[indices]
         distances = self._compare_candidates(self._border_candidates, indices, pixel_x, pixel_y)
         owners = self._owners[sites]
-        points = np.arange(len(sites))
-        nearest = distances.argmin(axis=1)
-        nearest_owners = owners[points, nearest]
+        pixel_indices = np.arange(len(sites))
+        nearest_candidates = distances.argmin(axis=1)
+        nearest_owners = owners[pixel_indices, nearest_candidates]
         other_distances = np.where(owners == nearest_owners[:, None], np.inf, distances)
-        second = other_distances.argmin(axis=1)
-        nearest_dx, nearest_dy = self._compute_directions(sites[points, nearest], pixel_x, pixel_y)
-        second_dx, second_dy = self._compute_directions(sites[points, second], pixel_x, pixel_y)
+        second_candidates = other_distances.argmin(axis=1)
+        nearest_sites = sites[pixel_indices, nearest_candidates]
+        second_sites = sites[pixel_indices, second_candidates]
+        nearest_dx, nearest_dy = self._compute_directions(nearest_sites, pixel_x, pixel_y)
+        second_dx, second_dy = self._compute_directions(second_sites, pixel_x, pixel_y)
         # Away from the border, the difference of the two distances grows by this much per meter.
-        growth = np.maximum(np.hypot(nearest_dx - second_dx, nearest_dy - second_dy), _MIN_BORDER_ANGLE)
+        growth = np.maximum(np.hypot(nearest_dx - second_dx, nearest_dy - second_dy), _MIN_DISTANCE_GROWTH)
         # inf - inf is nan: without a second robot, or without any, there is no border.
         with np.errstate(invalid="ignore"):
-            gaps = (other_distances[points, second] - distances[points, nearest]) / growth
-        gaps = np.nan_to_num(gaps, nan=np.inf, posinf=np.inf)
-        return BorderPixels(rows, columns, nearest_owners, gaps)
+            differences = (
+                other_distances[pixel_indices, second_candidates]
+                - distances[pixel_indices, nearest_candidates]
+            )
+            border_distances = differences / growth
+        return nearest_owners, np.nan_to_num(border_distances, nan=np.inf, posinf=np.inf)
 
     def _compute_directions(self, sites: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
         """Return dx and dy of the unit vectors from the last bends of the paths of sites to points."""
@@ -381,13 +401,13 @@ def compute_block_middles(coordinates: Array, size: int) -> Array:
     return np.asarray(coordinates[::size] + 0.5 * (size - 1) * step)
 
 
-def _has_differences(values: IntArray) -> BoolArray:
+def _find_rows_with_differences(values: IntArray) -> BoolArray:
     """Return which rows of an array, (..., k), contain different values."""
     return np.asarray((values[..., 1:] != values[..., :1]).any(axis=-1))
 
 
-def _is_in_upper_half(steps: Array) -> IntArray:
-    """Return 1 for coordinates, in lattice steps, that round up to the next whole number, else 0."""
+def _get_half_index(steps: Array) -> IntArray:
+    """Return 1 for coordinates, in lattice steps, in the upper half of a square, and 0 in its lower half."""
     return (np.floor(steps - 0.5) - np.floor(steps)).astype(np.intp) + 1
 
 

@@ -31,7 +31,7 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
         canvas.draw_polygons(corners, ends.tolist(), fills, edge_color)
         return
     canvas.draw_polygons(corners, ends.tolist(), fills)
-    edges = np.hstack([corners, corners[_find_next_corners(sizes, ends)]])
+    edges = np.hstack([corners, corners[_find_successors(sizes, ends)]])
     if "boundary" in canvas.visible_layers:
         edges = _select_one_direction(edges)
     else:
@@ -51,7 +51,7 @@ def _choose_fills(canvas: Canvas, scene: Scene) -> list[Color | None]:
     return [tints[hue] for hue in hues.tolist()]
 
 
-def _find_next_corners(sizes: IntArray, ends: IntArray) -> IntArray:
+def _find_successors(sizes: IntArray, ends: IntArray) -> IntArray:
     """Return, for the corners of all cells in one array, the row of the next corner of the same cell.
 
     Parameters

@@ -18,6 +18,12 @@ from robocov_app.render.scene import Scene
 # Lengths in pixels at scale 1.
 _LINE_WIDTH_PX = 2.0
 _HALO_WIDTH_PX = 4.5
+_START_RADIUS_PX = 3.6
+_START_HALO_RADIUS_PX = 5.0
+_SYMBOL_HALF_PX = 9
+_SYMBOL_START_INSET_PX = 2
+"""Distance of the dot from the end of the line in the symbol of the legend."""
+_TAG_CORNER_PX = 4
 _TAG_PADDING_PX = 12
 _TAG_HEIGHT_PX = 20
 _TAG_GAP_PX = 6
@@ -44,7 +50,7 @@ def draw_cursor_path(canvas: Canvas, scene: Scene) -> None:
     _draw_path_start(canvas, float(corners[0, 0]), float(corners[0, 1]))
     text = _format_length(float(np.hypot(*np.diff(path, axis=0).T).sum()))
     box = _place_tag(canvas, scene, corners, canvas.measure_text(text, bold=True))
-    radius = round(4 * canvas.scale)
+    radius = round(_TAG_CORNER_PX * canvas.scale)
     edge = mix(theme.background, theme.final, 0.5)
     pygame.draw.rect(canvas.surface, theme.background, box, border_radius=radius)
     pygame.draw.rect(canvas.surface, edge, box, canvas.scale_width(1.0), border_radius=radius)
@@ -103,14 +109,16 @@ def _rate_hidden(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect)
 
 def _draw_path_start(canvas: Canvas, x: float, y: float) -> None:
     """Draw the dot at the cursor, with a halo in the background color."""
-    canvas.draw_sprite(partial(sprites.render_dot, 5.0 * canvas.scale, canvas.theme.background), (x, y))
-    canvas.draw_sprite(partial(sprites.render_dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
+    halo = partial(sprites.render_dot, _START_HALO_RADIUS_PX * canvas.scale, canvas.theme.background)
+    dot = partial(sprites.render_dot, _START_RADIUS_PX * canvas.scale, canvas.theme.final)
+    canvas.draw_sprite(halo, (x, y))
+    canvas.draw_sprite(dot, (x, y))
 
 
 def _draw_path_symbol(canvas: Canvas, x: float, y: float) -> None:
-    start, end = canvas.get_symbol_line(x, y, 9)
+    start, end = canvas.get_symbol_line(x, y, _SYMBOL_HALF_PX)
     canvas.draw_line(start, end, canvas.theme.final, canvas.scale_width(_LINE_WIDTH_PX))
-    _draw_path_start(canvas, x - 9 * canvas.scale + 2 * canvas.scale, y)
+    _draw_path_start(canvas, start[0] + _SYMBOL_START_INSET_PX * canvas.scale, y)
 
 
 def _has_path(scene: Scene) -> bool:

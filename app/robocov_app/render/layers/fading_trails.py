@@ -14,6 +14,8 @@ from robocov_app.render.sprites import Sketch, find_visible_box
 
 FADE_STEPS = 24
 """Number of shades, and of times that a section is drawn again until it has faded away."""
+MARGIN_PX = 5.0
+"""Space around trajectories, px, in addition to their width."""
 FADE_PIECE_PX = 4.0
 """Distance that the fastest robot covers between two drawn corners, at scale 1."""
 _FINENESS = 2
@@ -61,7 +63,7 @@ def draw_fading_trails(
     """
     first_row = int(np.searchsorted(times, times[-1] - fade))
     pixels = limit_pixels(canvas.camera.to_pixels(trail[first_row:]))
-    box = find_visible_box(pixels, 5.0 + pen.width, page)
+    box = find_visible_box(pixels, MARGIN_PX + pen.width, page)
     if box is None:
         return
     ages = np.ceil((times[-1] - times[first_row:]) / fade * FADE_STEPS)

@@ -21,6 +21,14 @@ _START_SIZE_PX = 9.0
 _CENTROID_SIZE_PX = 11.0
 _START_SYMBOL_RADIUS_PX = 4.5
 _GOAL_ARM_PX = 5.5
+_RING_WIDTH_PX = 1.6
+_MAX_RING_WIDTH_FRACTION = 0.4
+"""Maximum width of the ring of a start, as a fraction of its radius."""
+_GOAL_WIDTH_PX = 1.8
+_MAX_GOAL_WIDTH_FRACTION = 0.4
+_CENTROID_WIDTH_PX = 1.3
+_MAX_CENTROID_WIDTH_FRACTION = 0.3
+"""Maximum width of the lines of a cross, as a fraction of half its size."""
 
 
 class StartsLayer:
@@ -46,7 +54,7 @@ class StartsLayer:
 
 
 def _build_start_ring(canvas: Canvas, radius: float) -> Sprite:
-    width = min(1.6 * canvas.scale, 0.4 * radius)
+    width = min(_RING_WIDTH_PX * canvas.scale, _MAX_RING_WIDTH_FRACTION * radius)
     return partial(sprites.render_ring, radius, canvas.theme.start, width)
 
 
@@ -124,10 +132,10 @@ def _build_cross(canvas: Canvas, name: str, arm: float) -> Sprite:
     is_goal = name == legend.GOAL
     if is_goal:
         color = theme.final
-        width = min(1.8 * canvas.scale, 0.4 * arm)
+        width = min(_GOAL_WIDTH_PX * canvas.scale, _MAX_GOAL_WIDTH_FRACTION * arm)
     else:
         color = theme.ink
-        width = min(1.3 * canvas.scale, 0.3 * arm)
+        width = min(_CENTROID_WIDTH_PX * canvas.scale, _MAX_CENTROID_WIDTH_FRACTION * arm)
     return partial(
         sprites.render_cross,
         arm,

@@ -16,6 +16,12 @@ from robocov_app.render.sprites import Pixel
 # Lengths in pixels at scale 1.
 _RANGE_SYMBOL_RADIUS_PX = 6.5
 _POINT_RADIUS_PX = 3.0
+_DASH_PX = 3.0
+_LINK_SYMBOL_HALF_PX = 9.0
+_RANGE_INK_FRACTION = 0.15
+"""Fraction of ink in the colors of ranges, so that they contrast with the cells of the robots."""
+_LINK_STRENGTH = 0.7
+"""Fraction of the color of final positions in that of links, which are paler."""
 
 
 def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> Layer:
@@ -35,8 +41,7 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
         radii = (get_ranges(scene) * canvas.camera.zoom).tolist()
         for center, radius, hue in zip(centers, radii, canvas.hues.tolist(), strict=True):
             if np.isfinite(radius):
-                # Slightly darker than the robot, for contrast with its cell.
-                color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
+                color = mix(canvas.theme.robots[hue], canvas.theme.ink, _RANGE_INK_FRACTION)
                 canvas.draw_circle(center, radius, color, is_dashed=is_dashed)
 
     def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
@@ -70,13 +75,13 @@ def _list_links(scene: Scene) -> IntArray | None:
 
 
 def _draw_link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
-    """Draw the line between two neighbors, in a color that is paler than final positions."""
-    color = mix(canvas.theme.background, canvas.theme.final, 0.7)
+    """Draw the line between two neighbors."""
+    color = mix(canvas.theme.background, canvas.theme.final, _LINK_STRENGTH)
     canvas.draw_line(start, end, color, canvas.scale_width(canvas.theme.line))
 
 
 def _draw_link_symbol(canvas: Canvas, x: float, y: float) -> None:
-    start, end = canvas.get_symbol_line(x, y, 9)
+    start, end = canvas.get_symbol_line(x, y, _LINK_SYMBOL_HALF_PX)
     _draw_link(canvas, start, end)
 
 
@@ -90,7 +95,7 @@ def draw_obstacle_points(canvas: Canvas, scene: Scene) -> None:
     is_sensed = np.isfinite(points).all(axis=1)
     color = canvas.theme.forces["repulsion_obstacle"]
     for point, center in zip(points[is_sensed].tolist(), centers[is_sensed].tolist(), strict=True):
-        canvas.draw_dashed_line(center, point, color, dash=3.0)
+        canvas.draw_dashed_line(center, point, color, dash=_DASH_PX)
         _draw_obstacle_point(canvas, point[0], point[1])
 
 

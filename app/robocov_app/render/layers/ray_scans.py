@@ -22,6 +22,16 @@ _MIN_RAY_GAP_PX = 5.0
 """Minimum distance between rays, at scale 1; nearer to the robot, every second ray is left out."""
 _FIRST_RAY_PX = 12.0
 """Distance from the robot at which rays start, at scale 1."""
+_MARGIN_PX = 3.0
+"""Space around scans, px, for the width of their outlines."""
+_RAY_WIDTH_PX = 0.5
+_SYMBOL_SIZE_PX = 8
+"""Half the length of the rays in the symbol of the legend."""
+_SYMBOL_ANGLES_RAD = (-0.6, -0.3, 0.0, 0.3, 0.6)
+_SYMBOL_STRETCH = 1.15
+"""Factor of the height of the symbol."""
+_SYMBOL_RAY_STRENGTH = 0.55
+"""Fraction of the color of final positions in that of the rays of the symbol."""
 _MAX_RANGE_TOLERANCE = 1e-6
 _AREA_OPACITY = 0.11
 _RAY_OPACITY = 0.3
@@ -69,7 +79,7 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     to_pixels = canvas.camera.to_pixels
     scans = [_Scan(to_pixels(position), to_pixels(ends)) for position, ends in scene.scans]
     all_ends = np.concatenate([scan.ends for scan in scans])
-    box = sprites.find_visible_box(limit_pixels(all_ends), 3.0, canvas.surface)
+    box = sprites.find_visible_box(limit_pixels(all_ends), _MARGIN_PX, canvas.surface)
     if box is None:
         return
     sketch = sprites.Sketch(box, _FINENESS)
@@ -110,7 +120,7 @@ def _draw_rays(large: pygame.Surface, scan: _Scan, canvas: Canvas) -> None:
     fractions = starts[is_visible] / lengths[is_visible]
     first_points = scan.position + along[is_visible] * fractions[:, None]
     color = premultiply(canvas.theme.final, _RAY_OPACITY)
-    width = max(1, round(0.5 * canvas.scale * _FINENESS))
+    width = max(1, round(_RAY_WIDTH_PX * canvas.scale * _FINENESS))
     for start, end in zip(first_points.tolist(), scan.ends[is_visible].tolist(), strict=True):
         visible_ends = clip_segment(start, end)
         if visible_ends:
@@ -128,10 +138,12 @@ def _choose_ray_starts(n_rays: int) -> Array:
 
 
 def _draw_scan_symbol(canvas: Canvas, x: float, y: float) -> None:
-    size = 8 * canvas.scale
-    angles = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-    ends = np.column_stack([x - size + 2 * size * np.cos(angles), y + 1.15 * size * np.sin(angles)])
-    ray_color = mix(canvas.theme.background, canvas.theme.final, 0.55)
+    size = _SYMBOL_SIZE_PX * canvas.scale
+    angles = np.array(_SYMBOL_ANGLES_RAD)
+    ends_x = x - size + 2 * size * np.cos(angles)
+    ends_y = y + _SYMBOL_STRETCH * size * np.sin(angles)
+    ends = np.column_stack([ends_x, ends_y])
+    ray_color = mix(canvas.theme.background, canvas.theme.final, _SYMBOL_RAY_STRENGTH)
     for end in ends.tolist():
         canvas.draw_line((x - size, y), end, ray_color)
     draw_dots(canvas, ends, _HIT_RADIUS_PX * canvas.scale, canvas.theme.final)

@@ -24,6 +24,30 @@ MIN_NUMBER_SIZE_PX = 6.6
 _MAX_RADIUS_PX = 400.0
 """Maximum radius, px of the surface."""
 _RING_WIDTH_PX = 1.6
+_MAX_RING_WIDTH_FRACTION = 0.3
+"""Maximum width of the ring of a robot, as a fraction of its radius."""
+_SYMBOL_RADIUS_PX = 6.5
+_SYMBOL_RING_WIDTH_PX = 1.4
+_EDGE_INK_FRACTION = 0.55
+"""Fraction of ink in the color of the edges of robots; the rest is the background."""
+_FAILED_EDGE_INK_FRACTION = 0.75
+_FAILED_FILL_INK_FRACTION = 0.3
+_FAILED_RING_WIDTH_PX = 1.2
+_MAX_FAILED_RING_WIDTH_FRACTION = 0.25
+_FAILED_SYMBOL_RADIUS_PX = 6.0
+_CROSS_SIZE_FACTOR = 1.1
+"""Half the size of the cross on a failed robot, as a fraction of its radius."""
+_CROSS_WIDTH_PX = 1.7
+_MAX_CROSS_WIDTH_FRACTION = 0.35
+_SELECTION_GAP_PX = 4.0
+"""Space between the selected robot and its ring."""
+_SELECTION_WIDTH_PX = 2.2
+_BELIEVED_CELL_WIDTH_FACTOR = 1.6
+"""Width of the outline of the believed cell, compared with other lines."""
+_BELIEF_INK_FRACTION = 0.2
+_BELIEF_RING_RADIUS_PX = 5.0
+_BELIEF_RING_WIDTH_PX = 1.6
+_BELIEF_DASH_PX = 3.0
 _FAILED_SIZE_FACTOR = 0.85
 """Size of failed robots compared with working ones."""
 _NUMBER_GAP_PX = 3.0
@@ -71,7 +95,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
         # The first column of the steering is the heading, rad.
         headings = scene.now.steering[:, 0]
         _draw_noses(canvas, centers, radii, headings, np.flatnonzero(scene.team.is_unicycle))
-    ring_widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(0.3 * radii))
+    ring_widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(_MAX_RING_WIDTH_FRACTION * radii))
     numbers = _choose_numbers(canvas, scene, radii - ring_widths)
     # Robots that look the same share a sprite, which saves time in a crowd.
     indices_by_look: dict[tuple[float, float, int, int], int] = {}
@@ -127,13 +151,14 @@ def _build_disc(canvas: Canvas, radius: float, ring_width: float, hue: int, text
         fill=theme.robots[hue],
         ring=theme.robot_ring,
         ring_width=ring_width,
-        edge=mix(theme.background, theme.ink, 0.55),
+        edge=mix(theme.background, theme.ink, _EDGE_INK_FRACTION),
         text=text,
     )
 
 
 def _draw_robot_symbol(canvas: Canvas, x: float, y: float) -> None:
-    disc = _build_disc(canvas, 6.5 * canvas.scale, 1.4 * canvas.scale, 0, "")
+    radius = _SYMBOL_RADIUS_PX * canvas.scale
+    disc = _build_disc(canvas, radius, _SYMBOL_RING_WIDTH_PX * canvas.scale, hue=0, text="")
     canvas.draw_sprite(disc, (x, y))
 
 
@@ -159,13 +184,15 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
     all_radii = np.concatenate([failed_radii, compute_drawn_radii(canvas, scene)])
     for number, center, radius in zip(scene.failed, failed_centers, failed_radii.tolist(), strict=True):
         _draw_failed_robot(canvas, center[0], center[1], radius)
-        position = _choose_number_position(canvas, str(number), center, radius, (centers, all_radii))
+        position = _choose_number_position(
+            canvas, str(number), center=center, radius=radius, centers=centers, radii=all_radii
+        )
         size = canvas.theme.small_text
         canvas.draw_text(str(number), position, size=size, bold=True, anchor="middle")
 
 
 def _choose_number_position(
-    canvas: Canvas, text: str, center: Array, radius: float, robots: tuple[Array, Array]
+    canvas: Canvas, text: str, *, center: Array, radius: float, centers: Array, radii: Array
 ) -> list[float]:
     """Choose where the number of a failed robot is written, beside its disc.
 
@@ -179,15 +206,16 @@ def _choose_number_position(
         The number.
     center : (2,) array, px
     radius : float, px
-    robots : ((n, 2) array, (n,) array), px
-        Centers and radii of all robots.
+    centers : (n, 2) array, px
+        Centers of all robots.
+    radii : (n,) array, px
+        Radii of all robots.
 
     Returns
     -------
     list of float, px
         Middle of the number.
     """
-    centers, radii = robots
     size = canvas.theme.small_text
     half_width = canvas.measure_text(text, size, bold=True) / 2
     half_height = _INK_HALF_HEIGHT * canvas.scale_text_size(size)
@@ -211,30 +239,30 @@ def _choose_number_position(
 def _draw_failed_robot(canvas: Canvas, x: float, y: float, radius: float) -> None:
     """Draw a gray disc with a cross, around a pixel."""
     theme = canvas.theme
-    edge = mix(theme.background, theme.ink, 0.75)
+    edge = mix(theme.background, theme.ink, _FAILED_EDGE_INK_FRACTION)
     disc = partial(
         sprites.render_disc,
         radius,
-        fill=mix(theme.background, theme.ink, 0.3),
+        fill=mix(theme.background, theme.ink, _FAILED_FILL_INK_FRACTION),
         ring=edge,
-        ring_width=min(1.2 * canvas.scale, 0.25 * radius),
+        ring_width=min(_FAILED_RING_WIDTH_PX * canvas.scale, _MAX_FAILED_RING_WIDTH_FRACTION * radius),
         edge=edge,
     )
     canvas.draw_sprite(disc, (x, y))
     # The cross extends beyond the edge; inside, the disc would look like a close button.
     cross = partial(
         sprites.render_cross,
-        round_to_half(1.1 * radius),
+        round_to_half(_CROSS_SIZE_FACTOR * radius),
         color=theme.ink,
         halo=theme.background,
-        width=min(1.7 * canvas.scale, 0.35 * radius),
+        width=min(_CROSS_WIDTH_PX * canvas.scale, _MAX_CROSS_WIDTH_FRACTION * radius),
         is_diagonal=True,
     )
     canvas.draw_sprite(cross, (x, y))
 
 
 def _draw_failed_symbol(canvas: Canvas, x: float, y: float) -> None:
-    _draw_failed_robot(canvas, x, y, 6.0 * canvas.scale)
+    _draw_failed_robot(canvas, x, y, _FAILED_SYMBOL_RADIUS_PX * canvas.scale)
 
 
 build_failed_robots_legend = build_legend(legend.FAILED_ROBOT, _draw_failed_symbol)
@@ -251,8 +279,8 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
     if scene.now.seen.reported_positions is not None:
         _draw_believed_cell(canvas, scene, robot)
         _draw_believed_positions(canvas, scene, robot, positions)
-    radius = compute_drawn_radii(canvas, scene)[robot] + 4.0 * canvas.scale
-    ring = partial(sprites.render_ring, radius, canvas.theme.ink, 2.2 * canvas.scale)
+    radius = compute_drawn_radii(canvas, scene)[robot] + _SELECTION_GAP_PX * canvas.scale
+    ring = partial(sprites.render_ring, radius, canvas.theme.ink, _SELECTION_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, positions[robot])
 
 
@@ -261,7 +289,8 @@ def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
     cells = scene.now.decision.cells
     if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
         corners = canvas.camera.to_pixels(cells.polygons[robot])
-        canvas.draw_outline(corners, canvas.theme.ink, canvas.scale_width(1.6 * canvas.theme.line))
+        width = canvas.scale_width(_BELIEVED_CELL_WIDTH_FACTOR * canvas.theme.line)
+        canvas.draw_outline(corners, canvas.theme.ink, width)
 
 
 def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions: list[list[float]]) -> None:
@@ -271,17 +300,20 @@ def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions
     believed = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
     for other, position in zip(robots, canvas.camera.to_pixels(believed).tolist(), strict=True):
         hue = int(canvas.hues[other])
-        canvas.draw_dashed_line(positions[other], position, _get_belief_color(canvas, hue), dash=3.0)
+        canvas.draw_dashed_line(
+            positions[other], position, _get_belief_color(canvas, hue), dash=_BELIEF_DASH_PX
+        )
         _draw_belief_ring(canvas, hue, position[0], position[1])
 
 
 def _get_belief_color(canvas: Canvas, hue: int) -> Color:
-    return mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
+    return mix(canvas.theme.robots[hue], canvas.theme.ink, _BELIEF_INK_FRACTION)
 
 
 def _draw_belief_ring(canvas: Canvas, hue: int, x: float, y: float) -> None:
     color = _get_belief_color(canvas, hue)
-    ring = partial(sprites.render_ring, 5.0 * canvas.scale, color, 1.6 * canvas.scale)
+    radius = _BELIEF_RING_RADIUS_PX * canvas.scale
+    ring = partial(sprites.render_ring, radius, color, _BELIEF_RING_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, (x, y))
 
 

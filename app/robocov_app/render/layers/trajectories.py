@@ -16,7 +16,7 @@ from robocov_app.look.hues import ColorScheme, choose_trail_colors
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.clipping import limit_pixels
 from robocov_app.render.crowding import choose_width_factor
-from robocov_app.render.layers.fading_trails import FADE_STEPS, Pen, draw_fading_trails
+from robocov_app.render.layers.fading_trails import FADE_STEPS, MARGIN_PX, Pen, draw_fading_trails
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch, find_visible_box
 from robocov_app.render.surface_cache import LatestValue
@@ -27,6 +27,9 @@ SECTION_PX = 16.0
 """Length of the sections that are added to the page; shorter ends are drawn again in each frame."""
 MIN_CROWD = 400
 """With at least this many robots, the ends of trajectories are not antialiased."""
+_WAVE_PX_PER_RAD = 2.9
+_WAVE_HEIGHT_PX = 3
+"""Length per radian and amplitude of the wave in the legend, at scale 1."""
 _MIN_MOVE_PX = 1.0
 """Robots that have moved less have no trajectory yet."""
 
@@ -184,7 +187,7 @@ class TrajectoriesLayer:
         """Return the visible box around sections drawn with a line width, px; None if nothing is visible."""
         paths = [section.path for section in sections]
         points = np.concatenate([np.empty((0, 2)), *paths])
-        return find_visible_box(points, 5.0 + width, self._page)
+        return find_visible_box(points, MARGIN_PX + width, self._page)
 
     def _draw_ends(self, canvas: Canvas, ends: list[list[float]], pen: Pen) -> None:
         """Draw the open paths up to the current positions, px.
@@ -218,8 +221,8 @@ class TrajectoriesLayer:
 
         def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
             angles = np.linspace(-np.pi, np.pi, 24)
-            columns = x + angles * 2.9 * canvas.scale
-            rows = y - 3 * canvas.scale * np.sin(angles)
+            columns = x + angles * _WAVE_PX_PER_RAD * canvas.scale
+            rows = y - _WAVE_HEIGHT_PX * canvas.scale * np.sin(angles)
             wave = np.column_stack([columns, rows]).tolist()
             sketch = Sketch.from_points(wave, 3.0)
             if sketch is not None:

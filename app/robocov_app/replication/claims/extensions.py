@@ -105,11 +105,11 @@ def judge_conditions(degradations: Iterable[Degradation], maps: int) -> Claim:
     criteria = []
     runs = 0
     for disturbance, description in TOLERATED:
-        known = by_value.get(disturbance)
-        if known is not None:
+        degradation = by_value.get(disturbance)
+        if degradation is not None:
             measure = f"final cost if {description}, relative to that under ideal conditions"
-            criteria.append(Criterion(measure, known.ratio, high=1.0 + NEARLY_SAME))
-            runs += 2 * known.runs
+            criteria.append(Criterion(measure, degradation.ratio, high=1.0 + NEARLY_SAME))
+            runs += 2 * degradation.runs
     if not criteria:
         return claim
     worst = max(rapf, key=lambda degradation: degradation.ratio.estimate)

@@ -86,10 +86,10 @@ def judge_goals(
         Goals without data are left out.
     """
     goals: list[Claim] = []
-    known = outcomes.select_finite("gap", own.key)
-    if known.instances:
+    finished = outcomes.select_finite("gap", own.key)
+    if finished.instances:
         goals += _judge_gap_goals(outcomes, own, contenders)
-        goals += _judge_rest_goals(known, own, plan)
+        goals += _judge_rest_goals(finished, own, plan)
     return goals + _judge_step_goals(own, steps, plan)
 
 
@@ -102,24 +102,24 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     """Judge the gap in the median, on every map, and compared with the paper's strongest contenders."""
     key = own.key
     label = own.label
-    known = outcomes.select_finite("gap", key)
-    gaps = known.get_values(key, "gap")
-    highest = estimate_maximum_over_maps(lambda rows: np.median(gaps[rows], axis=-1), known.maps)
+    finished = outcomes.select_finite("gap", key)
+    gaps = finished.get_values(key, "gap")
+    highest = estimate_maximum_over_maps(lambda rows: np.median(gaps[rows], axis=-1), finished.maps)
     goals = [
         _build_goal(
             "gap",
             f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the centralized reference in the "
             "median.",
-            _build_main_criteria(known, key).gap,
+            _build_main_criteria(finished, key).gap,
             describe_middle_half(gaps),
-            known,
+            finished,
         ),
         _build_goal(
             "every-map",
             f"On every map {label}'s median is within {format_amount(MAX_MAP_GAP, '%')} of the reference.",
             Criterion("highest median of a map", highest, high=MAX_MAP_GAP, unit="%"),
-            _describe_highest(known.compute_medians_by_map(key), MAX_MAP_GAP),
-            known,
+            _describe_highest(finished.compute_medians_by_map(key), MAX_MAP_GAP),
+            finished,
         ),
     ]
     for other in select_strongest(contenders):
@@ -140,18 +140,18 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
                     high=NEVER_WORSE,
                 ),
                 _describe_highest(ratios, NEVER_WORSE),
-                known,
+                finished,
             )
         )
     return goals
 
 
-def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim]:
+def _judge_rest_goals(finished: Outcomes, own: Contender, plan: Plan) -> list[Claim]:
     """Judge contacts, the fraction of runs that settle, and the median settling time."""
     label = own.label
-    criteria = _build_main_criteria(known, own.key)
-    has_contact = known.get_values(own.key, "contacts") > 0
-    settled = known.get_values(own.key, "settled")
+    criteria = _build_main_criteria(finished, own.key)
+    has_contact = finished.get_values(own.key, "contacts") > 0
+    settled = finished.get_values(own.key, "settled")
     is_at_rest = np.isfinite(settled)
     censored = np.full(len(is_at_rest), plan.duration)
 
@@ -159,28 +159,28 @@ def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim
         at_rest = is_at_rest[rows]
         return estimate_median_time(settled[rows][at_rest], censored[rows][~at_rest])
 
-    rest_time = bootstrap_statistic(compute_median_time, known.maps)
+    rest_time = bootstrap_statistic(compute_median_time, finished.maps)
     return [
         _build_goal(
             "contacts",
             f"{label} has no contacts.",
             replace(criteria.contacts, high=0.0),
             f"{has_contact.sum()} of {len(has_contact)} runs.",
-            known,
+            finished,
         ),
         _build_goal(
             "rest",
             f"{label} settles in at least {format_amount(MIN_AT_REST, '%')} of the runs.",
             criteria.rest,
             f"{(~is_at_rest).sum()} of {len(is_at_rest)} runs do not.",
-            known,
+            finished,
         ),
         _build_goal(
             "time",
             f"{label} settles within {format_amount(MAX_REST_TIME_S, 's')} in the median.",
             Criterion("median settling time", rest_time, high=MAX_REST_TIME_S, unit="s"),
             "Kaplan-Meier: runs that do not settle are censored.",
-            known,
+            finished,
         ),
     ]
 
@@ -307,21 +307,21 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
     contenders : sequence of Contender
         All contenders, including the paper's strongest ones.
     """
-    known = outcomes.select_finite("gap", own.key)
-    if not known.instances:
+    finished = outcomes.select_finite("gap", own.key)
+    if not finished.instances:
         return None
-    main = _build_main_criteria(known, own.key)
+    main = _build_main_criteria(finished, own.key)
     criteria = [main.gap, main.contacts, main.rest]
     for other in select_strongest(contenders):
         pairs = outcomes.compare(own.key, other.key)
         if pairs is not None:
             measure = f"median of J({own.label}) / J({other.label}) at the end"
             criteria.append(Criterion(measure, pairs.ratio, high=1.0))
-    medians = known.compute_medians_by_map(own.key)
+    medians = finished.compute_medians_by_map(own.key)
     worst = max(medians, key=medians.__getitem__)
     explanation = (
-        f"{len(medians)} generated maps, {len(known.instances)} runs of {own.label}. "
+        f"{len(medians)} generated maps, {len(finished.instances)} runs of {own.label}. "
         f"Highest median of a map: {format_amount(medians[worst], '%')}, on {worst}."
     )
     claim = Claim("goal-unseen", GOALS, "The same holds on maps of other families than those of the claims.")
-    return claim.judge(criteria, explanation, known, runs_per_instance=1)
+    return claim.judge(criteria, explanation, finished, runs_per_instance=1)

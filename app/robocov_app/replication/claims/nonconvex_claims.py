@@ -98,15 +98,15 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
         "Lloyd's algorithm is unusable in the presence of obstacles: its robots get stuck.",
         "I and IV",
     )
-    known = outcomes.select_finite("stuck", "lloyd")
-    if not known.instances:
+    finished = outcomes.select_finite("stuck", "lloyd")
+    if not finished.instances:
         return claim
-    counts = known.get_values("lloyd", "stuck")
-    stuck = estimate_fraction(counts > 0, known.maps)
+    counts = finished.get_values("lloyd", "stuck")
+    stuck = estimate_fraction(counts > 0, finished.maps)
     criteria = [
         Criterion("Lloyd's runs that end with a stuck robot", stuck, low=_MIN_STUCK_FRACTION, unit="%")
     ]
-    with_gap = known.select_finite("gap", "lloyd")
+    with_gap = finished.select_finite("gap", "lloyd")
     if with_gap.instances:
         gap = bootstrap(with_gap.get_values("lloyd", "gap"), clusters=with_gap.maps)
         criteria.append(Criterion("Lloyd: median of J/J_ref - 1", gap, low=FAR_FROM_OPTIMUM, unit="%"))
@@ -119,24 +119,24 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
         f"Runs with a stuck robot of other controllers: {', '.join(others)}. "
         f"Stuck: the goal is more than 0.5 m away and the robot moved less than 0.05 m in the last 5 s."
     )
-    return claim.judge(criteria, explanation, known, runs_per_instance=1)
+    return claim.judge(criteria, explanation, finished, runs_per_instance=1)
 
 
 def judge_gap(outcomes: Outcomes, key: str) -> Claim:
     """Judge the gap of a contender to the reference: RPF's is claimed to be large, that of others small."""
     text, source = _GAP_CLAIMS[key]
     claim = Claim(f"gap-{key.removesuffix('-shared')}", 6, text, source)
-    known = outcomes.select_finite("gap", key)
-    if not known.instances:
+    finished = outcomes.select_finite("gap", key)
+    if not finished.instances:
         return claim
-    gaps = known.get_values(key, "gap")
+    gaps = finished.get_values(key, "gap")
     measure = f"{LABELS[key]}: median of J/J_ref - 1"
-    interval = bootstrap(gaps, clusters=known.maps)
+    interval = bootstrap(gaps, clusters=finished.maps)
     if key == "rpf-shared":
         criterion = Criterion(measure, interval, low=FAR_FROM_OPTIMUM, unit="%")
     else:
         criterion = Criterion(measure, interval, high=NEAR_OPTIMUM, unit="%")
-    return claim.judge((criterion,), _explain_gaps(known, gaps), known, runs_per_instance=1)
+    return claim.judge((criterion,), _explain_gaps(finished, gaps), finished, runs_per_instance=1)
 
 
 def _explain_gaps(outcomes: Outcomes, gaps: Array) -> str:

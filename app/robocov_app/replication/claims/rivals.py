@@ -59,11 +59,11 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
         RIVALS,
         f"{own.label} closes most of the gap that {other.label} leaves to the centralized reference.",
     )
-    known = outcomes.select_finite("gap", own.key, other.key)
-    if not known.instances:
+    finished = outcomes.select_finite("gap", own.key, other.key)
+    if not finished.instances:
         return claim
-    own_gaps = known.get_values(own.key, "gap")
-    other_gaps = known.get_values(other.key, "gap")
+    own_gaps = finished.get_values(own.key, "gap")
+    other_gaps = finished.get_values(other.key, "gap")
 
     def compute_closed_fraction(rows: IntArray) -> float:
         other_gap = float(np.median(other_gaps[rows]))
@@ -73,7 +73,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
 
     if math.isnan(compute_closed_fraction(np.arange(len(own_gaps)))):
         return replace(claim, explanation=f"{other.label} leaves no gap that could be closed.")
-    closed = bootstrap_statistic(compute_closed_fraction, known.maps)
+    closed = bootstrap_statistic(compute_closed_fraction, finished.maps)
     explanation = (
         f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
         f"{format_median(other_gaps, '%')}."
@@ -81,4 +81,4 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
     criterion = Criterion(
         "fraction of the median gap that is closed", closed, low=MIN_CLOSED_FRACTION, unit="%"
     )
-    return claim.judge((criterion,), explanation, known, runs_per_instance=2)
+    return claim.judge((criterion,), explanation, finished, runs_per_instance=2)

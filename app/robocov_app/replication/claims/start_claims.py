@@ -22,9 +22,9 @@ def judge_starts_cost(outcomes: Outcomes) -> Claim:
         "RAPF's final cost barely depends on where the robots start, RPF's does.",
         "VI-B, figures 6 and 8",
     )
-    known = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
-    rapf, maps = _compute_start_variation(known, "rapf-shared")
-    rpf, _ = _compute_start_variation(known, "rpf-shared")
+    finished = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
+    rapf, maps = _compute_start_variation(finished, "rapf-shared")
+    rpf, _ = _compute_start_variation(finished, "rpf-shared")
     if not maps:
         return claim
     measure = "median standard deviation of the final cost over the starts, relative to its mean"
@@ -35,11 +35,11 @@ def judge_starts_cost(outcomes: Outcomes) -> Claim:
         variation, _ = _compute_start_variation(outcomes.select_finite("final", key), key)
         others[key] = format_median(variation, "%")
     explanation = (
-        f"Over the same map and seed, from {len(set(known.starts))} kinds of starts. RPF's varies "
+        f"Over the same map and seed, from {len(set(finished.starts))} kinds of starts. RPF's varies "
         f"{format_amount(ratio)} times as much as RAPF's. With their "
         f"best gains: RAPF {others['rapf-best']}, RPF {others['rpf-best']}; Lloyd {others['lloyd']}."
     )
-    return claim.judge(criteria, explanation, known, runs_per_instance=2)
+    return claim.judge(criteria, explanation, finished, runs_per_instance=2)
 
 
 def judge_starts_placement(outcomes: Outcomes) -> Claim:
@@ -50,15 +50,15 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
         "RAPF's final placement varies little with where the robots start, RPF's strongly.",
         "VI-B, figures 6 and 8",
     )
-    known = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
-    rapf_spreads = known.compute_placement_spreads("rapf-shared")
-    rpf_spreads = known.compute_placement_spreads("rpf-shared")
+    finished = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
+    rapf_spreads = finished.compute_placement_spreads("rapf-shared")
+    rpf_spreads = finished.compute_placement_spreads("rpf-shared")
     maps = [name for name in rapf_spreads if name in rpf_spreads]
     if not maps:
         return claim
     rapf = np.array([rapf_spreads[name] for name in maps])
     rpf = np.array([rpf_spreads[name] for name in maps])
-    sides = [known.share_sides[name] for name in maps]
+    sides = [finished.share_sides[name] for name in maps]
     measure = (
         "distance between matched final positions from different starts, "
         "relative to the side of a square with the mean free area per robot"
@@ -75,7 +75,7 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
         f"Robots are matched so that the sum of straight-line distances is smallest. "
         f"A placement can differ while its cost does not: many are equally good."
     )
-    return claim.judge(criteria, explanation, known, runs_per_instance=2)
+    return claim.judge(criteria, explanation, finished, runs_per_instance=2)
 
 
 def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[Array, list[str]]:

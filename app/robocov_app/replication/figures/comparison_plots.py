@@ -1,5 +1,6 @@
 """Plots that compare contenders: pairs of runs, final costs, gaps and gain grids."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -161,8 +162,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     k_rep = rpf.list_levels("k_rep")
     rho_0 = rpf.list_levels("rho_0")
     columns = 3 if len(panels) > 4 else 2
-    # Rounded up.
-    rows = -(-len(panels) // columns)
+    rows = math.ceil(len(panels) / columns)
     left = 44 * PAGE_SCALE
     right = 10 * PAGE_SCALE
     above = 52 * PAGE_SCALE

@@ -1,5 +1,6 @@
 """Plot of final costs under disturbances, with a panel for each kind of disturbance."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +19,16 @@ from robocov_app.sweep.parameters import UNITS
 
 _SIZE_PX = (1180, 720)
 _MAX_COLUMNS = 3
+_SIDES_PX = 40
+"""Space to the left and to the right of all panels."""
+_HEAD_AND_FOOT_PX = 110
+"""Space above and below all panels."""
+_FIRST_PANEL_LEFT_PX = 64
+_FIRST_PANEL_TOP_PX = 100
+_PANEL_GAP_PX = 60
+"""Space between the axes of adjacent panels."""
+_PANEL_LABELS_PX = 84
+"""Space for the title and the labels of a panel, above and below its axes."""
 _OFFSET = 0.11
 """Horizontal distance between controllers at the same value; the distance between values is 1."""
 
@@ -41,10 +52,9 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     quiet = mix(theme.background, theme.ink, 0.7)
     names = list(dict.fromkeys(degradation.axis for degradation in degradations))
     columns = min(_MAX_COLUMNS, len(names))
-    # Rounded up.
-    rows = -(-len(names) // columns)
-    panel_width = (width - 40) / columns
-    panel_height = (height - 110) / rows
+    rows = math.ceil(len(names) / columns)
+    slot_width = (width - _SIDES_PX) / columns
+    slot_height = (height - _HEAD_AND_FOOT_PX) / rows
     bottom, top = _find_limits(degradations)
     page = FigurePage(_SIZE_PX, theme, scale=1.0)
     page.write_title("Coverage under disturbances", 26)
@@ -52,9 +62,9 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     page.write(subtitle, page.margin, 50, color=quiet, max_width=page.content_width)
     for number, name in enumerate(names):
         row, column = divmod(number, columns)
-        x = 64 + column * panel_width
-        y = 100 + row * panel_height
-        axes = page.add_axes((x, y, panel_width - 60, panel_height - 84))
+        x = _FIRST_PANEL_LEFT_PX + column * slot_width
+        y = _FIRST_PANEL_TOP_PX + row * slot_height
+        axes = page.add_axes((x, y, slot_width - _PANEL_GAP_PX, slot_height - _PANEL_LABELS_PX))
         axes.set_ylim(bottom, top)
         _draw_panel(
             axes, name, [degradation for degradation in degradations if degradation.axis == name], theme

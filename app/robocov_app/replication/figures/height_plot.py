@@ -30,6 +30,10 @@ _MAX_HEIGHT_M = 100.0
 _PATH_POINTS = 240
 _GROUND_HEIGHT = 1e-7
 """Height that stands for the limit h → 0, relative to the size of the cell."""
+_FRAME_FACTORS = (1.9, 1.3)
+"""Width and height of the enlarged frame, compared with those of the points in it."""
+_FRAME_LEFT_FRACTION = 0.2
+"""Space to the left of the points, as a fraction of the width of the frame."""
 _PANELS = (
     (0.0, 0.30, "the cell (m)"),
     (0.37, 0.26, "the frame in it (m)"),
@@ -174,9 +178,14 @@ def _find_frame(points: Array, aspect: float) -> PageBox:
     """
     low = points.min(axis=0)
     high = points.max(axis=0)
-    width, height = (high - low) * (1.9, 1.3)
+    width, height = (high - low) * _FRAME_FACTORS
     width, height = max(width, height * aspect), max(height, width / aspect)
-    return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
+    return (
+        float(low[0] - _FRAME_LEFT_FRACTION * width),
+        float((low[1] + high[1] - height) / 2.0),
+        float(width),
+        float(height),
+    )
 
 
 def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme) -> None:

@@ -66,21 +66,23 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         for measure in (*COLUMNS, "early", "first_minute", "gap"):
             values[key, measure] = np.full(len(instances), np.nan)
         values[key, "placement"] = np.full((len(instances), ROBOTS, 2), np.nan)
-    for k, row in _read_rows(folder, instances):
+    for instance_index, row in _read_rows(folder, instances):
         controller_key = _identify_controller(row["controller"], row)
         for key, candidate in controller_keys.items():
             if candidate != controller_key:
                 continue
             for measure, column in COLUMNS.items():
                 if row.get(column) is not None:
-                    values[key, measure][k] = row[column]
-            values[key, "placement"][k] = results.record(row["run"]).positions[-1]
+                    values[key, measure][instance_index] = row[column]
+            values[key, "placement"][instance_index] = results.record(row["run"]).positions[-1]
             history = results.history(row["run"])
-            values[key, "early"][k] = compute_mean_until(history, EARLY_S)
-            values[key, "first_minute"][k] = compute_mean_until(history, FIRST_MINUTE_S)
+            values[key, "early"][instance_index] = compute_mean_until(history, EARLY_S)
+            values[key, "first_minute"][instance_index] = compute_mean_until(history, FIRST_MINUTE_S)
             reference = references.get(row["map"])
             if reference is not None:
-                values[key, "gap"][k] = values[key, "final"][k] / reference.mean_distance - 1.0
+                values[key, "gap"][instance_index] = (
+                    values[key, "final"][instance_index] / reference.mean_distance - 1.0
+                )
     share_sides = {}
     for study_map in contest.study.maps:
         share_sides[study_map.name] = float(np.sqrt(study_map.environment.free_area / ROBOTS))
@@ -108,13 +110,15 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
     excess = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
     cells = {}
     for name, sets in gain_sets.items():
-        for g, gains in enumerate(sets):
-            cells[_identify_controller(name, gains)] = (name, g)
-    for k, row in _read_rows(folder, instances):
+        for gains_index, gains in enumerate(sets):
+            cells[_identify_controller(name, gains)] = (name, gains_index)
+    for instance_index, row in _read_rows(folder, instances):
         cell = cells.get(_identify_controller(row["controller"], row))
         if cell is not None and row["map"] in references:
-            name, g = cell
-            excess[name][g, k] = row["mean_distance_m"] / references[row["map"]].mean_distance
+            name, gains_index = cell
+            excess[name][gains_index, instance_index] = (
+                row["mean_distance_m"] / references[row["map"]].mean_distance
+            )
     return {name: GainOutcomes(instances, gain_sets[name], excess[name]) for name in study.controllers}
 
 
@@ -129,11 +133,11 @@ def list_instances(study: Study) -> tuple[ProblemInstance, ...]:
 
 def _read_rows(folder: Path, instances: Iterable[ProblemInstance]) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the table rows of runs that did not fail, each with the index of its instance."""
-    index = {instance: k for k, instance in enumerate(instances)}
+    indices = {instance: index for index, instance in enumerate(instances)}
     for row in read_results(folder).rows():
-        k = index.get(ProblemInstance(row["map"], row["start"], row["seed"]))
-        if k is not None and row["error"] is None:
-            yield k, row
+        index = indices.get(ProblemInstance(row["map"], row["start"], row["seed"]))
+        if index is not None and row["error"] is None:
+            yield index, row
 
 
 def _identify_controller(controller: str, gains: Mapping[str, Any]) -> _ControllerKey:
