@@ -184,6 +184,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("schema foo", "schema: expected map or session, got 'foo'"),
         ("lesson 99", "lesson: expected check, got '99'"),
         ("sweep", "missing argument: expected STUDY.toml"),
+        ("lesson", "lesson: expected check, got nothing"),
         ("run /no/such/map.json", "/no/such/map.json"),
         ("compare rooms --controllers", "--controllers: expected at least one, got none"),
         ("compare rooms --controllers rapf rapf", "duplicate value"),

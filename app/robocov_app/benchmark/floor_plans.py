@@ -32,9 +32,49 @@ _SEED_ORDER = ("homes", "offices", "plants", "traffic", "yards")
 _MAX_ATTEMPTS = 400
 _MIN_PASSAGE_M = 0.6
 _INNER_WALL_M = 0.12
+_HALF_WALL_M = _INNER_WALL_M / 2.0
 _START_RADIUS_M = 0.6
 _MIN_BLOCKED_FRACTION = 0.04
 _MIN_WALL_PIECE_M = 0.15
+
+# Floor plans are frozen: a different number gives different maps. Sizes that vary are in the functions.
+_HOME_DOOR_MARGIN_M = 0.8
+"""Minimum distance of the middle of a door from the ends of its wall."""
+_FREE_WIDTH_AROUND_FURNITURE_M = 2.2
+_OFFICE_DOOR_MARGIN_M = 0.7
+_OFFICE_DOOR_WIDTH_M = 0.9
+_SHELF_PROBABILITY = 0.6
+_SHELF_END_M = 1.2
+_SHELF_DEPTH_M = 0.7
+"""A shelf is in the upper left corner of an office, up to this distance from its left and upper wall."""
+_OPEN_SPACE_DOOR_WIDTH_M = 1.2
+_DESK_SIZE_M = (1.6, 0.8)
+_DESK_PROBABILITY = 0.85
+_FIRST_DESK_X_M = 2.2
+_LAST_DESK_MARGIN_M = 2.5
+_LOWER_DESKS_Y_M = 1.3
+_UPPER_DESKS_MARGIN_M = 1.9
+_YARD_CENTER_M = (10.0, 8.0)
+_YARD_RADII_M = (9.0, 7.5)
+_YARD_CORNERS = 7
+_YARD_GAP_M = 0.7
+"""Minimum distance of the shapes in a yard from each other and from the boundary."""
+_POND_CORNERS = 14
+_HEDGE_WIDTH_M = 0.3
+_RACK_DEPTH_M = 0.7
+_FIRST_RACK_Y_M = 2.0
+_GATE_MARGIN_M = 2.0
+_MACHINE_MARGIN_M = 1.4
+"""Minimum distance of the middle of a machine from outer walls, and of the last rack from the upper one."""
+_MACHINE_PARTITION_MARGIN_M = 1.6
+_MACHINE_GAP_M = 0.9
+_MAX_MACHINES = 7
+_MACHINE_ATTEMPTS = 30
+_HALF_CROSS_AISLE_M = 0.8
+"""Half the width of the gap in a row of shelves in a hall with vehicles."""
+_SHELF_ROWS_Y_M = (3.0, 7.2)
+_AISLES_Y_M = (5.7, 9.6, 1.5)
+"""Aisles of the vehicles; two vehicles are in the first two."""
 
 
 def build_floor_plan(kind: str, seed: int) -> Environment:
@@ -202,7 +242,7 @@ class _Flat:
         if high - low < rng.uniform(4.6, 6.4):
             return None
         split = low + (high - low) * rng.uniform(0.38, 0.62)
-        door = rng.uniform(start + 0.8, end - 0.8)
+        door = rng.uniform(start + _HOME_DOOR_MARGIN_M, end - _HOME_DOOR_MARGIN_M)
         door_width = rng.uniform(0.8, 1.1)
         self.walls += _build_wall_with_door(
             split, start, end, door=door, width=door_width, is_vertical=is_vertical
@@ -214,10 +254,10 @@ class _Flat:
         rng = self._rng
         width = rng.uniform(0.5, 1.6)
         depth = rng.uniform(0.4, 0.9)
-        if right - left > width + 2.2 and top - bottom > depth + 2.2:
-            # 0.06 m is half the thickness of the walls.
-            x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - width
-            y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - depth
+        free_width = _FREE_WIDTH_AROUND_FURNITURE_M
+        if right - left > width + free_width and top - bottom > depth + free_width:
+            x = left + _HALF_WALL_M if rng.random() < 0.5 else right - _HALF_WALL_M - width
+            y = bottom + _HALF_WALL_M if rng.random() < 0.5 else top - _HALF_WALL_M - depth
             self.furniture.append(_build_block(x, y, width, depth))
 
 
@@ -231,21 +271,26 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
     partitions = np.linspace(0.0, width, int(rng.integers(5, 8)))
     partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
     for left, right in itertools.pairwise(partitions.tolist()):
-        door = rng.uniform(left + 0.7, right - 0.7)
-        obstacles += _build_wall_with_door(high, left, right, door=door, width=0.9, is_vertical=False)
+        door = rng.uniform(left + _OFFICE_DOOR_MARGIN_M, right - _OFFICE_DOOR_MARGIN_M)
+        obstacles += _build_wall_with_door(
+            high, left, right, door=door, width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
+        )
         if right < width:
             obstacles.append(WallObstacle(_round_points([(right, high), (right, height)]), _INNER_WALL_M))
-        if rng.random() < 0.6:
-            obstacles.append(PolygonObstacle(_build_box(left + 0.06, height - 0.7, left + 1.2, height)))
+        if rng.random() < _SHELF_PROBABILITY:
+            shelf = _build_box(left + _HALF_WALL_M, height - _SHELF_DEPTH_M, left + _SHELF_END_M, height)
+            obstacles.append(PolygonObstacle(shelf))
     left_door = width * rng.uniform(0.15, 0.35)
     right_door = width * rng.uniform(0.65, 0.85)
     middle = width / 2.0
-    obstacles += _build_wall_with_door(low, 0.0, middle, door=left_door, width=1.2, is_vertical=False)
-    obstacles += _build_wall_with_door(low, middle, width, door=right_door, width=1.2, is_vertical=False)
-    for x in np.arange(2.2, width - 2.5, rng.uniform(2.9, 3.6)):
-        for y in (1.3, low - 1.9):
-            if rng.random() < 0.85:
-                obstacles.append(_build_block(x, y, 1.6, 0.8))
+    for start, end, door in ((0.0, middle, left_door), (middle, width, right_door)):
+        obstacles += _build_wall_with_door(
+            low, start, end, door=door, width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
+        )
+    for x in np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6)):
+        for y in (_LOWER_DESKS_Y_M, low - _UPPER_DESKS_MARGIN_M):
+            if rng.random() < _DESK_PROBABILITY:
+                obstacles.append(_build_block(x, y, *_DESK_SIZE_M))
     return _build_box(0.0, 0.0, width, height), obstacles
 
 
@@ -260,8 +305,13 @@ def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
 
 def _build_yard(rng: np.random.Generator) -> FloorPlan:
     """Draw a park: a convex piece of land with houses, a pond, hedges and trees."""
-    angle = np.sort((np.arange(7) + rng.uniform(-0.25, 0.25, 7)) * 2.0 * np.pi / 7.0)
-    corners = np.column_stack([10.0 + 9.0 * np.cos(angle), 8.0 + 7.5 * np.sin(angle)])
+    offsets = rng.uniform(-0.25, 0.25, _YARD_CORNERS)
+    angles = np.sort((np.arange(_YARD_CORNERS) + offsets) * 2.0 * np.pi / _YARD_CORNERS)
+    center_x, center_y = _YARD_CENTER_M
+    radius_x, radius_y = _YARD_RADII_M
+    corners_x = center_x + radius_x * np.cos(angles)
+    corners_y = center_y + radius_y * np.sin(angles)
+    corners = np.column_stack([corners_x, corners_y])
     hull = shapely.orient_polygons(shapely.convex_hull(shapely.MultiPoint(corners)))
     boundary = _round_points(np.asarray(hull.exterior.coords)[:-1])
 
@@ -270,8 +320,8 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     shapes = [build(rng) for build in builders]
     land = shapely.Polygon(boundary)
     inside = [shape for shape in shapes if land.contains(shape.polygon)]
-    clear = [shape for shape in inside if land.exterior.distance(shape.polygon) > 0.7]
-    return boundary, _remove_near_shapes(clear, 0.7)
+    clear = [shape for shape in inside if land.exterior.distance(shape.polygon) > _YARD_GAP_M]
+    return boundary, _remove_near_shapes(clear, _YARD_GAP_M)
 
 
 def _draw_yard_point(rng: np.random.Generator) -> Array:
@@ -286,8 +336,8 @@ def _build_house(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_pond(rng: np.random.Generator) -> Obstacle:
-    """Draw a pond: a polygon with 14 corners, roughly an ellipse with a wavy shore."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
+    """Draw a pond: a polygon, roughly an ellipse with a wavy shore."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _POND_CORNERS, endpoint=False)
     radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
     shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
     return PolygonObstacle(_round_points(_draw_yard_point(rng) + shore))
@@ -300,7 +350,7 @@ def _build_hedge(rng: np.random.Generator) -> Obstacle:
     along = np.array((np.cos(angle), np.sin(angle)))
     across = np.array((-np.sin(angle), np.cos(angle)))
     corner = np.array([0.0 * along, along, along + across])
-    return WallObstacle(_round_points(start + rng.uniform(1.4, 2.4) * corner), 0.3)
+    return WallObstacle(_round_points(start + rng.uniform(1.4, 2.4) * corner), _HEDGE_WIDTH_M)
 
 
 def _build_tree(rng: np.random.Generator) -> Obstacle:
@@ -313,16 +363,19 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
     width = rng.uniform(15.0, 19.0)
     height = rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
-    gate = rng.uniform(2.0, height - 2.0)
+    gate = rng.uniform(_GATE_MARGIN_M, height - _GATE_MARGIN_M)
     gate_width = rng.uniform(1.4, 2.2)
     obstacles = _build_wall_with_door(split, 0.0, height, door=gate, width=gate_width, is_vertical=True)
-    for y in np.arange(2.0, height - 1.4, rng.uniform(1.9, 2.4)):
+    for y in np.arange(_FIRST_RACK_Y_M, height - _MACHINE_MARGIN_M, rng.uniform(1.9, 2.4)):
         left = rng.uniform(1.2, 2.2)
         right = split - rng.uniform(1.2, 1.8)
-        obstacles.append(PolygonObstacle(_build_box(left, y, right, y + 0.7)))
+        obstacles.append(PolygonObstacle(_build_box(left, y, right, y + _RACK_DEPTH_M)))
     shapes: list[Obstacle] = []
-    for number in range(30):
-        center = np.array([rng.uniform(split + 1.6, width - 1.4), rng.uniform(1.4, height - 1.4)])
+    margin = _MACHINE_MARGIN_M
+    for number in range(_MACHINE_ATTEMPTS):
+        x = rng.uniform(split + _MACHINE_PARTITION_MARGIN_M, width - margin)
+        y = rng.uniform(margin, height - margin)
+        center = np.array([x, y])
         # Every third shape is round.
         if number % 3 == 2:
             shapes.append(_build_circle(center, rng.uniform(0.2, 0.7)))
@@ -330,7 +383,7 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
         block_width = rng.uniform(0.8, 2.0)
         block_depth = rng.uniform(0.6, 1.2)
         shapes.append(_build_rotated_block(center, block_width, block_depth, rng.choice([0.0, 0.6, 1.2])))
-    machines = _remove_near_shapes(shapes, 0.9)[:7]
+    machines = _remove_near_shapes(shapes, _MACHINE_GAP_M)[:_MAX_MACHINES]
     return _build_box(0.0, 0.0, width, height), [*obstacles, *machines]
 
 
@@ -341,12 +394,12 @@ def _build_traffic(rng: np.random.Generator) -> FloorPlan:
     obstacles: list[Obstacle] = []
     left = rng.uniform(4.2, 5.0)
     right = width - rng.uniform(2.2, 3.0)
-    for y in (3.0, 7.2):
+    for y in _SHELF_ROWS_Y_M:
         middle = rng.uniform(8.2, 9.8)
-        for start, end in ((left, middle - 0.8), (middle + 0.8, right)):
+        for start, end in ((left, middle - _HALF_CROSS_AISLE_M), (middle + _HALF_CROSS_AISLE_M, right)):
             obstacles.append(PolygonObstacle(_build_box(start, y, end, y + rng.uniform(0.8, 1.3))))
     vehicles = int(rng.integers(2, 4))
-    for y in (5.7, 9.6, 1.5)[:vehicles]:
+    for y in _AISLES_Y_M[:vehicles]:
         ends = _round_points([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
         path = ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
         obstacles.append(CircleObstacle(ends[0], round(rng.uniform(0.3, 0.45), 2), path=path))

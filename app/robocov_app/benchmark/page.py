@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
@@ -307,18 +308,30 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
     axes.plot(*front.T, color=to_plot_color(LIGHT.faint), linewidth=1.0, zorder=1)
     for point in points:
-        color = to_plot_color(point.style.get_color(LIGHT))
-        axes.plot(
-            [point.x],
-            [point.gap],
-            marker=point.style.mark,
-            markerfacecolor=color if point.is_rival else to_plot_color(LIGHT.background),
-            zorder=3,
-            markersize=9,
-            markeredgewidth=1.6,
-            markeredgecolor=color,
-            linestyle="",
-        )
+        _draw_pareto_point(axes, point)
+    _style_pareto_axes(axes, points, axis_label)
+    _label_pareto_points(axes, points)
+    return figure
+
+
+def _draw_pareto_point(axes: Axes, point: ParetoPoint) -> None:
+    """Draw the mark of a controller; only those of competing controllers are filled."""
+    color = to_plot_color(point.style.get_color(LIGHT))
+    axes.plot(
+        [point.x],
+        [point.gap],
+        marker=point.style.mark,
+        markerfacecolor=color if point.is_rival else to_plot_color(LIGHT.background),
+        zorder=3,
+        markersize=9,
+        markeredgewidth=1.6,
+        markeredgecolor=color,
+        linestyle="",
+    )
+
+
+def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: str) -> None:
+    """Choose the scales and ticks of the axes; the horizontal scale is logarithmic for a wide range."""
     values = [point.x for point in points]
     if min(values) > 0.0 and max(values) > _MIN_LOG_RATIO * min(values):
         axes.set_xscale("log")
@@ -329,6 +342,10 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
         axis.set_minor_locator(NullLocator())
     axes.margins(x=0.12, y=0.1)
     style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
+
+
+def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
+    """Write the label of each controller next to its mark."""
     marks = axes.transData.transform([(point.x, point.gap) for point in points])
     label_centers = place_labels(marks, [point.label for point in points])
     for point, mark, center in zip(points, marks, label_centers, strict=True):
@@ -342,7 +359,6 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
             ha="center",
             va="center",
         )
-    return figure
 
 
 def place_labels(marks: Array, labels: Sequence[str]) -> Array:

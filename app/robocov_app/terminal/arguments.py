@@ -53,6 +53,11 @@ def _explain_invalid_choice(match: re.Match[str]) -> str:
     return f"{option}: expected {_describe_choices(choices)}, got {value}"
 
 
+def _explain_missing_choice(match: re.Match[str]) -> str:
+    command, choices = match.groups()
+    return f"{command}: expected {_describe_choices(choices.replace(',', ', '))}, got nothing"
+
+
 def _explain_invalid_number(match: re.Match[str]) -> str:
     option, kind, value = match.groups()
     number = "whole number" if kind == "INT" else "number"
@@ -76,6 +81,7 @@ _EXPLANATIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     ),
     (r"^Missing value for argument '(\S+)'\..*$", r"\1: expected a value"),
     (r"^Missing from robocov \w+: (-\S+).*$", r"\1: this option is required"),
+    (r"^Missing from robocov (\w+): \{(\S+)\}.*$", _explain_missing_choice),
     (r"^Missing from robocov \w+: (\S+).*$", r"missing argument: expected \1"),
     (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
     (r"^Unrecognized options: ([^\s,]*).*$", r"unexpected argument \1"),

@@ -169,12 +169,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     -------
     BeyondResults
     """
-    if paper is not None:
-        references = {**paper.references}
-        papers = paper.contenders
-        claims = paper.claims
-    else:
-        papers, claims, references = _run_claims_only(folder, plan, options)
+    papers, claims, references = _get_baselines(folder, plan, options, paper)
     gains = _run_baseline_gain_grids(folder, plan, options)
     contests = studies.build_beyond_contests(plan, find_best_gains(gains), papers)
     maps = (*build_generated_maps(plan.beyond.maps), *build_unseen_maps(plan))
@@ -189,9 +184,9 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     ranked_names = [name for name in contests if name == "rivals" or name.startswith("ours-")]
     ranked_outcomes = [outcomes[name] for name in ranked_names]
     all_outcomes = merge_outcomes([select_baseline_outcomes(claims, plan), *ranked_outcomes])
-    all_contenders = list(papers)
+    ranked_contenders: list[Contender] = []
     for name in ranked_names:
-        all_contenders += contests[name].contenders
+        ranked_contenders += contests[name].contenders
     own_study = contests[f"ours-{OURS[0]}"].study
     names = [*sweeps, studies.BASELINE_GAINS] if gains else list(sweeps)
     runs, failed = _count_runs(folder, names)
@@ -199,7 +194,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
         plan=plan,
         outcomes=all_outcomes,
         unseen=outcomes.get("unseen"),
-        contenders=tuple(all_contenders),
+        contenders=(*papers, *ranked_contenders),
         gains=gains,
         steps=time_steps(folder, plan, options),
         worst=repeat_worst_runs(own_study, all_outcomes, OWN[0], plan.beyond.worst),
@@ -210,6 +205,15 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
         runs=runs,
         failed=failed,
     )
+
+
+def _get_baselines(
+    folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None
+) -> tuple[tuple[Contender, ...], Outcomes, References]:
+    """Return the paper's contenders, their outcomes and the references; execute missing runs."""
+    if paper is not None:
+        return paper.contenders, paper.claims, {**paper.references}
+    return _run_claims_only(folder, plan, options)
 
 
 def _run_claims_only(
