@@ -29,6 +29,9 @@ from robocov_app.viewer.window.window import ViewerWindow
 SIZE = (900, 600)
 FRAME = 1 / 50
 
+MAX_NOTCHES = 40  # of the wheel, to reach the end of the panel
+MIN_VISIBLE_PX = 12
+
 MIDDLE = (0.6, 3.6)
 """A free position in the hall, m."""
 
@@ -201,14 +204,41 @@ class Driver:
     # the panel
 
     def get_widget(self, kind: str, name: str) -> Widget:
+        """Return a widget; if it is in the closed section or out of sight, first open that or scroll."""
         self.window.draw()
-        assert not self.window.panel.hidden, "the panel is hidden"
+        found = self.find_widget(kind, name)
+        advanced = self.find_widget("section", "section:advanced")
+        if found is None and advanced is not None and not advanced.value:
+            self.scroll_to(advanced)
+            self.click(*self.find_rect("section", "section:advanced").center)
+            found = self.find_widget(kind, name)
+        assert found is not None, f"no {kind} {name}"
+        return self.scroll_to(found)
+
+    def find_rect(self, kind: str, name: str) -> pygame.Rect:
         found = self.find_widget(kind, name)
         assert found is not None, f"no {kind} {name}"
-        return found
+        return found.rect
+
+    def scroll_to(self, widget: Widget) -> Widget:
+        """Scroll the panel down until a widget is visible, and return the widget as it is then."""
+        for _ in range(MAX_NOTCHES):
+            if widget.rect.height >= MIN_VISIBLE_PX:
+                break
+            left, _, width, height = self.window.layout.panel
+            self.turn_wheel(left + width / 2, height - 20, -1)
+            self.window.draw()
+            scrolled = self.find_widget(widget.kind, widget.key)
+            assert scrolled is not None
+            widget = scrolled
+        return widget
 
     def find_widget(self, kind: str, name: str) -> Widget | None:
-        return self.window.panel.ui.find(kind, name)
+        for part in self.window.parts:
+            found = part.ui.find(kind, name)
+            if found is not None and not part.hidden:
+                return found
+        return None
 
     def push_button(self, name: str) -> None:
         """Press a button of the panel."""

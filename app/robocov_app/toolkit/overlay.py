@@ -16,6 +16,7 @@ _FINE = 4
 """Rounded boxes are drawn larger by this factor and then scaled down, which smooths their edges."""
 _BOX_CACHE_BYTES = 4_000_000
 _VEIL_ALPHA = 150
+_EDGE_STRENGTH = 0.14
 _FACT_SEPARATOR = "    "
 
 # Lengths in pixels at scale 1.
@@ -125,6 +126,11 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
                 lines.append("")
             lines[-1] += letter
     return lines
+
+
+def draw_edge(screen: Surface, line: Rect, theme: Theme) -> None:
+    """Draw a thin line between two parts of a window."""
+    screen.fill(mix(theme.panel, theme.ink, _EDGE_STRENGTH), line)
 
 
 def draw_card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:

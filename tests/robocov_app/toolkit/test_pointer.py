@@ -14,7 +14,7 @@ class RecordedPointer(Pointer):
     """A pointer whose presses pan, and that records pans, clicks and counts of clicks."""
 
     def __init__(self, scale: float = 1.0) -> None:
-        super().__init__(SidePanel(""))
+        super().__init__((SidePanel(""),))
         self.scale = scale
         self.panned = (0, 0)
         self.clicks: list[int] = []

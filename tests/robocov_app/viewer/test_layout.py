@@ -27,7 +27,27 @@ def draw_layouts(draw: st.DrawFn) -> Layout:
     size = draw(WIDTHS), draw(HEIGHTS)
     panes = draw(st.integers(1, 4))
     rows = draw(st.integers(1, 3))
-    return build_layout(size, draw(SCALES), panes, draw(ASPECTS), panel=draw(st.booleans()), legend_rows=rows)
+    return build_layout(
+        size,
+        draw(SCALES),
+        panes,
+        draw(ASPECTS),
+        panel=draw(st.booleans()),
+        legend_rows=rows,
+        toolbars=draw(st.booleans()),
+    )
+
+
+def list_boxes(layout: Layout) -> list[Box]:
+    return [
+        layout.bar,
+        layout.rail,
+        layout.arena,
+        layout.panel,
+        layout.chart,
+        layout.time_slider,
+        layout.status,
+    ]
 
 
 def compute_overlap(first: Box, second: Box) -> int:
@@ -39,7 +59,7 @@ def compute_overlap(first: Box, second: Box) -> int:
 
 @given(draw_layouts())
 def test_boxes_fill_the_window_without_overlapping(layout: Layout) -> None:
-    boxes = [layout.arena, layout.panel, layout.chart, layout.time_slider, layout.status]
+    boxes = list_boxes(layout)
     width, height = layout.size
     for left, top, box_width, box_height in boxes:
         assert left >= 0
@@ -98,8 +118,7 @@ def test_windows_that_are_too_small_have_a_small_scale(size: tuple[int, int]) ->
 @given(draw_layouts(), st.integers(0, 3839), st.integers(0, 2159))
 def test_every_pixel_is_in_one_box(layout: Layout, x: int, y: int) -> None:
     pixel = (x % layout.size[0], y % layout.size[1])
-    boxes = (layout.arena, layout.panel, layout.chart, layout.time_slider, layout.status)
-    assert sum(is_inside(box, pixel) for box in boxes) == 1
+    assert sum(is_inside(box, pixel) for box in list_boxes(layout)) == 1
 
 
 @pytest.mark.parametrize(("size", "rows"), [((1280, 720), 1), ((900, 600), 2), ((2560, 1440), 1)])

@@ -29,8 +29,23 @@ LIMITS = list(list_limit_parameters(RobotProperties()))
 NUMBERS = [parameter for parameter in (*GAINS, *LIMITS) if isinstance(parameter, NumberParameter)]
 
 
+def build_choice(name: str, *choices: str) -> OptionParameter:
+    """Build a parameter with choices, the first of which is the default."""
+    return OptionParameter(
+        name=name,
+        label=name,
+        symbol=name,
+        meaning="",
+        value=choices[0],
+        default=choices[0],
+        choices=choices,
+    )
+
+
 class StubController:
     """A controller with any gains, at their defaults."""
+
+    name = "stub"
 
     def __init__(self, **gains: Gain) -> None:
         self.available_gains = gains
@@ -82,23 +97,19 @@ def test_gains_with_choices_are_options():
     [("sensing", "sensing"), (" Median ", "median"), ("c", "centroid"), ("SENS", "sensing")],
 )
 def test_the_start_of_a_choice_can_be_typed(text, choice):
-    target = OptionParameter(
-        "target", "target", "", "centroid", "centroid", ("centroid", "sensing", "median")
-    )
+    target = build_choice("target", "centroid", "sensing", "median")
     assert target.parse(text) == choice
 
 
 @pytest.mark.parametrize("text", ["", "mediane", "x", "0.3"])
 def test_unknown_choices_are_rejected(text):
-    target = OptionParameter(
-        "target", "target", "", "centroid", "centroid", ("centroid", "sensing", "median")
-    )
+    target = build_choice("target", "centroid", "sensing", "median")
     with pytest.raises(ParameterError, match=r"target: expected one of centroid, sensing, median, got .*"):
         target.parse(text)
 
 
 def test_a_choice_may_be_the_start_of_another():
-    parameter = OptionParameter("n", "n", "", "on", "on", ("on", "once"))
+    parameter = build_choice("n", "on", "once")
     assert parameter.parse("on") == "on"
     assert parameter.parse("onc") == "once"
 
@@ -235,7 +246,7 @@ def test_numbers_are_typed(text, value):
 
 @pytest.mark.parametrize("text", ["", "none", "many", "1.2.3", "0x10", "--1"])
 def test_invalid_numbers_are_rejected(text):
-    with pytest.raises(ParameterError, match=r"^k: expected a number, got .*$"):
+    with pytest.raises(ParameterError, match=r"^K: expected a number, got .*$"):
         build_parameter(1.0, 0.0, 9.0).parse(text)
 
 

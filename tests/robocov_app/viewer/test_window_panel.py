@@ -15,6 +15,7 @@ from sample_sessions import RAPF, RPF
 from robocov.controllers import CONTROLLERS
 from robocov_app.toolkit.widgets.tool_tip import TIP_DELAY_S
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
+from robocov_app.toolkit.window.layout import RAIL_WIDTH_PX
 from robocov_app.viewer.panel.panel import ViewerPanel, label_controllers
 from robocov_app.viewer.session.playback import Playback
 
@@ -117,12 +118,12 @@ def test_escape_only_closes_a_menu(driver: Driver) -> None:
 
 def test_an_open_menu_covers_the_buttons_below_it(driver: Driver) -> None:
     """A choice from the list presses none of the buttons under it."""
-    step = driver.get_widget("button", "step").rect
+    fewer = driver.get_widget("button", "fewer").rect
     driver.click(*driver.get_widget("menu", "map").rect.center)
     found = driver.window.panel.ui.open_list
-    name = found.options[found.find_item((driver.at[0], step.centery))]
-    driver.click(driver.at[0], step.centery)
-    assert driver.session.timeline.end_time == 0.0
+    name = found.options[found.find_item((driver.at[0], fewer.centery))]
+    driver.click(driver.at[0], fewer.centery)
+    assert driver.session.timeline.scenario.robots == 3
     assert driver.viewer.files.map_name == name
 
 
@@ -318,8 +319,8 @@ def test_the_arena_fills_the_place_of_a_hidden_panel(driver: Driver) -> None:
     driver.press_key("h")
     assert driver.window.layout.panel.width == 0
     assert driver.window.panel.hidden
-    assert driver.window.layout.arena.width == 900
-    driver.click(880, 40)
+    assert driver.window.layout.arena.width == 900 - RAIL_WIDTH_PX
+    driver.click(880, 80)
     driver.press_key("space")
     driver.run_frames(3)
     driver.press_key("h")

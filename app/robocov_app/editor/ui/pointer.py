@@ -38,7 +38,7 @@ class EditorPointer(Pointer):
     def __init__(
         self, editor: Editor, canvas: EditorCanvas, panel: SidePanel, open_menu: Callable[[Pixel], object]
     ) -> None:
-        super().__init__(panel)
+        super().__init__((panel,))
         self.editor = editor
         self.canvas = canvas
         self.pans_with_left = False

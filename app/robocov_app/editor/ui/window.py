@@ -285,7 +285,9 @@ class EditorWindow(CommandWindow):
             return
         self._layout_key = key
         self.theme = get_theme(editor.theme)
-        self.layout = build_layout(key[0], self.scale, 1, 1.0, panel=editor.shows_panel, plot=False)
+        self.layout = build_layout(
+            key[0], self.scale, 1, 1.0, panel=editor.shows_panel, plot=False, toolbars=False
+        )
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 

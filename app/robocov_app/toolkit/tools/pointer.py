@@ -1,12 +1,12 @@
 """The mouse over the map of a window: button presses start gestures, and the wheel zooms."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import dist
 from typing import NamedTuple, TypeAlias
 
 import pygame
 
-from robocov_app.toolkit.panel import SidePanel
+from robocov_app.toolkit.panel import WindowPart, offer_event
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX
 
 LEFT_BUTTON = 1
@@ -82,8 +82,8 @@ class Pointer:
 
     Parameters
     ----------
-    panel : SidePanel
-        The panel, which gets events first unless a button is held down over the map.
+    parts : sequence of WindowPart
+        Parts of the window that get events first unless a button is held down over the map.
 
     Attributes
     ----------
@@ -93,10 +93,10 @@ class Pointer:
         Gesture of the button that is held down.
     """
 
-    def __init__(self, panel: SidePanel) -> None:
+    def __init__(self, parts: Sequence[WindowPart]) -> None:
         self.pixel: Pixel = (0, 0)
         self.gesture: Gesture | None = None
-        self._panel = panel
+        self._parts = parts
         self._button = 0
         self._pressed_at: Pixel = (0, 0)
         self._is_click = False  # the mouse has hardly moved since the press
@@ -137,15 +137,16 @@ class Pointer:
         """Handle a mouse event that arrives at time `now`, s."""
         if event.type != pygame.MOUSEWHEEL:
             self.pixel = event.pos
-        is_for_panel = not self.is_busy and self._panel.handle_event(event)
+        is_for_part = not self.is_busy and offer_event(self._parts, event)
         if event.type == pygame.MOUSEMOTION:
             self.move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
             self.release(event)
-        elif is_for_panel:
+        elif is_for_part:
             self.leave()
         elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.ui.stop_typing()
+            for part in self._parts:
+                part.ui.stop_typing()
             self.press(event, now)
         else:
             self.handle_wheel(event)

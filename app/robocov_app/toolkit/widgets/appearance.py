@@ -11,9 +11,9 @@ from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_fi
 from robocov_app.toolkit.widgets.page import Page
 
 # Lengths in pixels at scale 1.
-TEXT_PX = 12.0
+TEXT_PX = 13.0
 """Size of a widget's text."""
-SMALL_TEXT_PX = 11.0
+SMALL_TEXT_PX = 11.5
 """Size of the text of small buttons, headings and units."""
 CORNER_RADIUS_PX = 4.0
 EDGE_WIDTH_PX = 0.75

@@ -1,9 +1,12 @@
 """Texts: headings, labels and paragraphs."""
 
 from robocov_app.look.colors import Color
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_text, get_text_size
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX, draw_text, get_text_size
 from robocov_app.toolkit.widgets.page import Page, Widget
+
+_NOTE_GAP_PX = 6.0  # at scale 1
 
 
 def show_header(page: Page, text: str) -> None:
@@ -14,7 +17,14 @@ def show_header(page: Page, text: str) -> None:
 
 
 def show_label(
-    page: Page, text: str, *, key: str = "", style: str = "", tip: str = "", align: str = "left"
+    page: Page,
+    text: str,
+    *,
+    key: str = "",
+    style: str = "",
+    tip: str = "",
+    align: str = "left",
+    note: str = "",
 ) -> None:
     """Show a line of text in the next cell.
 
@@ -30,6 +40,8 @@ def show_label(
         Tool tip.
     align : str
         "left", "center" or "right".
+    note : str
+        Small gray text after a text at the left, shown if there is space for it.
     """
     rect = page.cell()
     page.add_widget(Widget("label", key or text, rect, text, tip=tip))
@@ -38,7 +50,14 @@ def show_label(
     if is_small:
         color = page.theme.faint
     size = get_text_size(small=is_small)
-    draw_text(page, text, rect, color, size, bold=style in ("header", "bold"), align=align)
+    is_bold = style in ("header", "bold")
+    draw_text(page, text, rect, color, size, bold=is_bold, align=align)
+    if note:
+        note_rect = rect.copy()
+        note_rect.left += measure_text(text, page.px(size), is_bold) + page.px(_NOTE_GAP_PX)
+        note_rect.width = rect.right - note_rect.left
+        if measure_text(note, page.px(SMALL_TEXT_PX)) <= note_rect.width:
+            draw_text(page, note, note_rect, page.theme.faint, SMALL_TEXT_PX)
 
 
 def show_paragraph(

@@ -78,6 +78,8 @@ class Page(RowLayout):
         Key of the widget on which a mouse button is held down.
     grab_offset : float
         Distance of the pointer from the left or upper end of the knob being dragged, px.
+    drag_value : float
+        Value of the slider being dragged, before it is rounded.
     edit : TextEdit or None
         Text being edited, if the widget with the focus is a text field.
     clipboard : Clipboard
@@ -86,8 +88,8 @@ class Page(RowLayout):
         List of the drop-down menu that is open.
     widgets : dict of str to Widget
         Widgets of the last run by kind and key, such as "button:pause".
-    folded_sections : set of str
-        Keys of the sections whose content is hidden.
+    toggled_sections : set of str
+        Keys of the sections that are open although they start closed, or closed although they start open.
     scroll_offsets, content_heights : dict of str to float
         Scroll offset and total height of the content at scale 1, px, by the key of the scroll area.
     tool_tip : ToolTip
@@ -105,11 +107,12 @@ class Page(RowLayout):
         self.focus: str | None = None
         self.active: str | None = None
         self.grab_offset = 0.0
+        self.drag_value = 0.0
         self.edit: TextEdit | None = None
         self.clipboard = Clipboard()
         self.open_list: OpenList | None = None
         self.widgets: dict[str, Widget] = {}
-        self.folded_sections: set[str] = set()
+        self.toggled_sections: set[str] = set()
         self.scroll_offsets: dict[str, float] = {}
         self.content_heights: dict[str, float] = {}
         self._event: pygame.event.Event | None = None

@@ -6,7 +6,8 @@ from robocov_app.toolkit.widgets.open_list import ListResponse
 from robocov_app.toolkit.widgets.page import Page
 from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, is_function_key
 
-_WIDGET_KEYS = (*ENTER_KEYS, "space", "left", "right", "up", "down")
+_ARROW_KEYS = ("left", "right", "up", "down")
+_WIDGET_KEYS = (*ENTER_KEYS, "space", *_ARROW_KEYS, *(f"shift+{key}" for key in _ARROW_KEYS))
 """Keys that a focused widget without a text cursor reacts to."""
 
 

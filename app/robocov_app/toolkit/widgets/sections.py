@@ -4,7 +4,7 @@ from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box, draw
 from robocov_app.toolkit.widgets.page import Page, Widget
 
 
-def show_section(page: Page, title: str, *, key: str = "") -> bool:
+def show_section(page: Page, title: str, *, key: str = "", starts_open: bool = True) -> bool:
     """Show the title of a section; a click on it hides or shows the content.
 
     Parameters
@@ -13,6 +13,8 @@ def show_section(page: Page, title: str, *, key: str = "") -> bool:
     title : str
     key : str, optional
         By default the title.
+    starts_open : bool
+        Whether it is open until the first click.
 
     Returns
     -------
@@ -24,9 +26,10 @@ def show_section(page: Page, title: str, *, key: str = "") -> bool:
     rect = page.cell()
     widget = Widget("section", key, rect, title)
     if page.add_clickable(widget):
-        page.folded_sections ^= {key}  # Add the key, or remove it if it is there.
+        page.toggled_sections ^= {key}  # Add the key, or remove it if it is there.
         page.needs_redraw = True
-    is_open = key not in page.folded_sections
+    is_toggled = key in page.toggled_sections
+    is_open = starts_open is not is_toggled
     widget.value = is_open
     if page.is_hovered(rect):
         draw_box(page, rect, shade(page, 0.06))

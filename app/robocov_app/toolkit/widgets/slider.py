@@ -30,6 +30,8 @@ _MIN_SPAN = 1e-300
 _KEY_STEPS = {"left": -1, "down": -1, "right": 1, "up": 1}
 _STEPS_OF_KEYS = 50
 """Number of arrow key presses from one end to the other, if `step` is 0."""
+FINE_FRACTION = 0.1
+"""Fraction by which drags and arrow keys move a slider while Shift is held down, if `step` is 0."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,7 @@ def show_slider(
     high: float,
     *,
     step: float = 0.0,
+    tip: str = "",
     disabled_reason: str = "",
 ) -> float | None:
     """Show a slider.
@@ -85,6 +88,8 @@ def show_slider(
         The current value, and the values at the left and right end.
     step : float
         Spacing of the possible values; 0 if any value is possible.
+    tip : str
+        Tool tip.
     disabled_reason : str
         Why it cannot be moved; empty if it can.
 
@@ -102,7 +107,7 @@ def show_slider(
         new_value = _read_input(page, key, value, values)
     if new_value != value:
         new_value = values.limit(new_value)
-    page.add_widget(Widget("slider", key, track, value=new_value), disabled_reason)
+    page.add_widget(Widget("slider", key, track, value=new_value, tip=tip), disabled_reason)
     if is_visible(page, rect):
         _draw_slider(page, key, values, values.compute_fraction(new_value), enabled=not disabled_reason)
     if new_value == value:
@@ -120,15 +125,34 @@ def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
         page.active = key
         page.consume_event()
         page.grab_offset = values.knob_width / 2
+        page.drag_value = value
         if is_on_knob:
             page.grab_offset = page.pointer[0] - knob_left
     is_dragged = page.active == key and page.is_event(pygame.MOUSEMOTION)
+    is_fine = not values.step and bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
+    if is_dragged and is_fine:
+        return _drag_finely(page, values)
     if is_dragged or (is_pressed and not is_on_knob):
-        return (
-            values.low + values.span * (page.pointer[0] - page.grab_offset - track.left) / values.free_width
-        )
-    steps = _KEY_STEPS.get(page.get_key(key), 0)
+        fraction = (page.pointer[0] - page.grab_offset - track.left) / values.free_width
+        page.drag_value = values.low + values.span * fraction
+        return page.drag_value
+    name = page.get_key(key)
+    steps: float = _KEY_STEPS.get(name.removeprefix("shift+"), 0)
+    if is_fine:
+        steps *= FINE_FRACTION
     return value + steps * (values.step or values.span / _STEPS_OF_KEYS)
+
+
+def _drag_finely(page: Page, values: _Range) -> float:
+    """Return the value after a drag with Shift, which moves the knob by a fraction of the mouse's motion."""
+    event = page.get_event()
+    if event is not None:
+        change = FINE_FRACTION * values.span * event.rel[0] / values.free_width
+        page.drag_value = min(max(page.drag_value + change, values.low), values.high)
+    # If Shift is released later, the drag continues from the new position of the knob.
+    knob_left = values.track.left + values.free_width * values.compute_fraction(page.drag_value)
+    page.grab_offset = page.pointer[0] - knob_left
+    return page.drag_value
 
 
 def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabled: bool) -> None:

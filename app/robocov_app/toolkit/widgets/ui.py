@@ -19,7 +19,16 @@ from collections.abc import Callable
 import pygame
 
 from robocov_app.look.theme import Theme
-from robocov_app.toolkit.widgets import buttons, dropdown, labels, scroll_area, sections, slider, text_field
+from robocov_app.toolkit.widgets import (
+    buttons,
+    dropdown,
+    icon_buttons,
+    labels,
+    scroll_area,
+    sections,
+    slider,
+    text_field,
+)
 from robocov_app.toolkit.widgets.page import Page
 from robocov_app.toolkit.widgets.page_events import PageEvents
 
@@ -41,6 +50,8 @@ class Ui(Page):
     label = labels.show_label
     paragraph = labels.show_paragraph
     button = buttons.show_button
+    icon_button = icon_buttons.show_icon_button
+    main_button = icon_buttons.show_main_button
     option = buttons.show_option
     area = buttons.show_area
     tabs = buttons.show_tabs

@@ -1,6 +1,6 @@
 """A window with commands, a panel, dialogs, help and a map: base class of the viewer and the editor."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -13,7 +13,7 @@ from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.help_page import draw_help_page
 from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Dialogs
-from robocov_app.toolkit.panel import CommandPanel
+from robocov_app.toolkit.panel import CommandPanel, WindowPart, offer_event
 from robocov_app.toolkit.tools.pointer import Pointer
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
@@ -142,6 +142,11 @@ class CommandWindow(BaseWindow):
 
     # Events
 
+    @property
+    def parts(self) -> Sequence[WindowPart]:
+        """Parts of the window with widgets, which get events before the map."""
+        return (self.panel,)
+
     def handle_event(self, event: pygame.event.Event) -> None:
         """Pass an event to the open dialog, or else to the panel, a command or the map."""
         if event.type == pygame.KEYUP:
@@ -161,8 +166,8 @@ class CommandWindow(BaseWindow):
         """Open a file that was dropped on the window."""
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Offer a key to the panel before commands get it; return whether it was used."""
-        return self.panel.handle_event(event)
+        """Offer a key to the parts before commands get it; return whether it was used."""
+        return offer_event(self.parts, event)
 
     def handle_mouse(self, event: pygame.event.Event) -> None:
         """Handle a mouse event that no dialog has used."""
@@ -181,7 +186,7 @@ class CommandWindow(BaseWindow):
         elif event.type == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
-            self.panel.handle_event(event)
+            offer_event(self.parts, event)
 
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press: as input for the panel, or by running the command of that key."""

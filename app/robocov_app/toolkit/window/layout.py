@@ -1,4 +1,4 @@
-"""Layout of a window: boxes of arena, panel, chart, time slider and status line."""
+"""Layout of a window: boxes of top bar, tool rail, arena, panel, chart, time slider and status line."""
 
 from math import ceil, floor
 from typing import NamedTuple
@@ -7,7 +7,9 @@ from robocov_app.render.panel_grid import choose_column_count
 
 # Lengths in pixels at scale 1.
 PANEL_WIDTH_PX = 320
-CHART_HEIGHT_PX = 150
+BAR_HEIGHT_PX = 44
+RAIL_WIDTH_PX = 44
+CHART_HEIGHT_PX = 118
 TIME_SLIDER_HEIGHT_PX = 26
 STATUS_HEIGHT_PX = 26
 PANE_GAP_PX = 2
@@ -52,6 +54,10 @@ class Layout(NamedTuple):
     size : (width, height), px
     scale : float
         The requested scale, or the largest one at which everything fits into the window.
+    bar : Box
+        The top bar; its height is 0 in windows without one.
+    rail : Box
+        The tool rail to the left of the arena; its width is 0 in windows without one.
     arena, chart, time_slider, status : Box
         The time slider is below the chart.
     panel : Box
@@ -64,6 +70,8 @@ class Layout(NamedTuple):
 
     size: tuple[int, int]
     scale: float
+    bar: Box
+    rail: Box
     arena: Box
     panel: Box
     chart: Box
@@ -87,6 +95,7 @@ def build_layout(
     panel: bool = True,
     legend_rows: int = 1,
     plot: bool = True,
+    toolbars: bool = True,
 ) -> Layout:
     """Lay out a window.
 
@@ -105,6 +114,8 @@ def build_layout(
         Number of rows of the shared legend.
     plot : bool
         Whether chart and time slider are shown.
+    toolbars : bool
+        Whether the top bar and the tool rail are shown.
 
     Returns
     -------
@@ -112,7 +123,7 @@ def build_layout(
     """
     width, height = size
     scale = min(scale, find_max_scale(size))
-    panel_width = slider_height = chart_height = legend_height = 0
+    panel_width = slider_height = chart_height = legend_height = bar_height = rail_width = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
     # In small windows, the chart takes at most a third of the height.
@@ -121,26 +132,35 @@ def build_layout(
         chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
     if panes > 1:
         legend_height = round((_LEGEND_MARGIN_PX + LEGEND_ROW_PX * legend_rows) * scale)
+    if toolbars:
+        bar_height = round(BAR_HEIGHT_PX * scale)
+        rail_width = round(RAIL_WIDTH_PX * scale)
     left_width = width - panel_width
     status_height = round(STATUS_HEIGHT_PX * scale)
-    arena_height = max(height - status_height - slider_height - chart_height, 1)
+    arena_height = max(height - bar_height - status_height - slider_height - chart_height, 1)
+    arena = Box(rail_width, bar_height, max(left_width - rail_width, 1), arena_height)
+    chart_top = bar_height + arena_height
+    slider_top = chart_top + chart_height
     return Layout(
         size=size,
         scale=scale,
-        arena=Box(0, 0, left_width, arena_height),
-        panel=Box(left_width, 0, panel_width, height),
-        chart=Box(0, arena_height, left_width, chart_height),
-        time_slider=Box(0, arena_height + chart_height, left_width, slider_height),
-        status=Box(0, arena_height + chart_height + slider_height, left_width, status_height),
-        panes=_arrange_panes(panes, aspect, scale, left_width, arena_height, legend_height),
-        legend=Box(0, 0, left_width, legend_height),
+        bar=Box(0, 0, width, bar_height),
+        rail=Box(0, bar_height, rail_width, arena_height),
+        arena=arena,
+        panel=Box(left_width, bar_height, panel_width, height - bar_height),
+        chart=Box(0, chart_top, left_width, chart_height),
+        time_slider=Box(0, slider_top, left_width, slider_height),
+        status=Box(0, slider_top + slider_height, left_width, status_height),
+        panes=_arrange_panes(panes, aspect, scale, arena, legend_height),
+        legend=Box(rail_width, bar_height, arena.width, legend_height),
     )
 
 
 def _arrange_panes(
-    count: int, aspect: float, scale: float, width: int, arena_height: int, legend_height: int
+    count: int, aspect: float, scale: float, arena: Box, legend_height: int
 ) -> tuple[Box, ...]:
     """Return the boxes of the panes, arranged in a grid below the legend."""
+    arena_left, arena_top, width, arena_height = arena
     free_size = width, max(arena_height - legend_height, 1)
     margin_width, margin_height = _PANE_MARGINS_PX
     columns = choose_column_count(
@@ -152,8 +172,8 @@ def _arrange_panes(
     boxes: list[Box] = []
     for number in range(count):
         row, column = divmod(number, columns)
-        left = column * (pane_width + PANE_GAP_PX)
-        top = legend_height + row * (pane_height + PANE_GAP_PX)
+        left = arena_left + column * (pane_width + PANE_GAP_PX)
+        top = arena_top + legend_height + row * (pane_height + PANE_GAP_PX)
         boxes.append(Box(left, top, pane_width, max(pane_height, 1)))
     return tuple(boxes)
 

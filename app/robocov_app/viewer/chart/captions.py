@@ -1,5 +1,7 @@
 """Captions to the right of the chart: the displayed value of each curve, and its gap to the best one."""
 
+from collections.abc import Mapping
+
 import pygame
 
 from robocov_app.look.labels import spread_labels
@@ -8,7 +10,8 @@ from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.viewer.chart.curves import map_curve_colors
 from robocov_app.viewer.chart.frame import ChartFrame
-from robocov_app.viewer.chart.scale import ChartScale
+from robocov_app.viewer.chart.scale import ChartScale, has_headline
+from robocov_app.viewer.session.pane import Pane
 
 # Lengths in pixels at scale 1.
 MIN_CAPTION_GAP_PX = 15.0
@@ -16,10 +19,17 @@ MIN_CAPTION_GAP_PX = 15.0
 _LEFT_PX = 9
 _RIGHT_PX = 6
 _BOTTOM_PX = 8
+_NOTE_LINE_PX = 13.0
+HEADLINE_TEXT_PX = 23.0
+_HEADLINE_LEFT_PX = 16
+_HEADLINE_TITLE_UP_PX = 22
+_HEADLINE_NOTE_DOWN_PX = 22
 _MAX_PERCENT_WITH_DECIMAL = 99.95
 
 
-def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) -> None:
+def draw_captions(
+    screen: pygame.Surface, frame: ChartFrame, scale: ChartScale, cut_off: Mapping[int, str]
+) -> None:
     """Draw the captions directly onto the window, since they change more often than the cached page.
 
     Parameters
@@ -28,31 +38,64 @@ def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) 
     frame : ChartFrame
     scale : ChartScale
         Scale with which the page was drawn.
+    cut_off : mapping of int to str
+        Text about the area that no robot reaches, by the number of the pane; empty where there is none.
     """
     chart = screen.subsurface(pygame.Rect(frame.layout.chart).clip(screen.get_rect()))
     canvas = create_flat_canvas(chart, frame.theme, frame.scale)
-    size = frame.theme.small_text
     _, values = frame.session.displayed.get_costs(frame.quantity.name)
-    colors = map_curve_colors(frame.timeline.panes, frame.theme)
     panes = [pane for pane in frame.timeline.panes if pane.number in values]
+    if not panes:
+        return
+    if has_headline(frame.layout, frame.timeline):
+        _draw_headline(canvas, frame, values[panes[0].number], cut_off[panes[0].number])
+        return
     # From top to bottom: the largest value is at the top of the chart.
     panes.sort(key=lambda pane: -values[pane.number])
     gap = MIN_CAPTION_GAP_PX * frame.scale
+    if len(panes) > 1 and any(cut_off.values()):
+        gap += _NOTE_LINE_PX * frame.scale
     rows = spread_labels(
         [scale.to_row(values[pane.number]) for pane in panes],
         gap=gap,
         low=0.5 * gap,
         high=frame.layout.chart.height - _BOTTOM_PX * frame.scale,
     )
-    left = frame.times.right + _LEFT_PX * frame.scale
     for row, pane in zip(rows, panes, strict=True):
-        value = values[pane.number]
-        text = f"{value:.3f}"
-        if len(values) > 1:
-            text += format_gap(value, min(values.values()))
-            width = chart.get_width() - left - _RIGHT_PX * frame.scale
-            text = _add_name(canvas, pane.controller.label, text, width)
-        canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)
+        _draw_caption(canvas, frame, pane, values, row=row, note=cut_off[pane.number])
+
+
+def _draw_headline(canvas: Canvas, frame: ChartFrame, value: float, note: str) -> None:
+    """Draw the value of the only curve as a large number, with its name above and a note below it."""
+    theme = frame.theme
+    left = frame.times.right + _HEADLINE_LEFT_PX * frame.scale
+    middle = 0.5 * frame.layout.chart.height
+    title = (left, middle - _HEADLINE_TITLE_UP_PX * frame.scale)
+    canvas.draw_text(frame.quantity.short_title, title, color=theme.faint, size=theme.small_text)
+    number = f"{value:.3f} {frame.quantity.unit}"
+    canvas.draw_text(number, (left, middle), bold=True, size=HEADLINE_TEXT_PX)
+    if note:
+        position = (left, middle + _HEADLINE_NOTE_DOWN_PX * frame.scale)
+        canvas.draw_text(f"({note})", position, color=theme.error, bold=True, size=theme.text)
+
+
+def _draw_caption(
+    canvas: Canvas, frame: ChartFrame, pane: Pane, values: Mapping[int, float], *, row: float, note: str
+) -> None:
+    """Draw the value of one of several curves, with the name of its controller, and a note below it."""
+    size = frame.theme.small_text
+    colors = map_curve_colors(frame.timeline.panes, frame.theme)
+    left = frame.times.right + _LEFT_PX * frame.scale
+    value = values[pane.number]
+    text = f"{value:.3f}"
+    if len(values) > 1:
+        text += format_gap(value, min(values.values()))
+        width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
+        text = _add_name(canvas, pane.controller.label, text, width)
+    canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)
+    if note:
+        position = (left, row + _NOTE_LINE_PX * frame.scale)
+        canvas.draw_text(f"({note})", position, color=frame.theme.error, size=size)
 
 
 def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:

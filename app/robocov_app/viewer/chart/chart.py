@@ -22,6 +22,7 @@ from robocov_app.viewer.chart.scale import ChartScale, TimeScale, build_chart_sc
 from robocov_app.viewer.chart.time_slider import draw_empty_slider, draw_slider_state
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
+from robocov_app.viewer.window.status import describe_cut_off
 
 REFRESH_INTERVAL_S = 0.1
 """Minimum time between two drawings of curves that grow."""
@@ -102,6 +103,14 @@ class Chart:
         point = np.array([pixel[0], pixel[1] - self._layout.chart.top])
         return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self._layout.scale)
 
+    def _describe_ghost(self, pixel: tuple[int, int]) -> str:
+        """Describe the branch whose curve is at a pixel; empty without one."""
+        node = self.find_ghost(pixel)
+        for ghost in self.viewer.session.timeline.ghosts:
+            if ghost.node == node:
+                return f"Branch: {ghost.description}. Click to enter it."
+        return ""
+
     def to_time(self, column: float) -> float:
         """Return the time, s, at a column of the window, limited to the simulated time."""
         end_time = self.viewer.session.timeline.end_time
@@ -118,10 +127,12 @@ class Chart:
         if self._update_page_key(frame) or page is None:
             page = self._draw_page(frame)
         screen.blit(page, self._layout.chart.position)
-        draw_captions(screen, frame, self._scale)
+        cut_off = {pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes}
+        draw_captions(screen, frame, self._scale, cut_off)
         draw_slider_state(screen, frame)
         if self.hover is not None:
-            draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]))
+            ghost = self._describe_ghost(self.hover)
+            draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]), ghost)
 
     def _update_page_key(self, frame: ChartFrame) -> bool:
         """Update the key of the page's content; return whether the page must be redrawn.

@@ -14,7 +14,6 @@ from robocov_app.render.dashes import cut_into_dashes
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import ChartScale
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.past.curves import GhostCurve
 
 GHOST_REACH_PX = 6.0
 """Maximum distance, at scale 1, of a click from the curve of another branch that it opens."""
@@ -28,10 +27,6 @@ _DASH_STRETCH = 1.4  # dashes are longer than in figures, because the curves are
 _GHOST_STRENGTH = 0.45
 _SEGMENTS_PER_DASH = 4
 """Number of curve segments per dash; the last of them is the gap."""
-
-# Position of the name of a branch relative to the end of its curve, px at scale 1.
-_NAME_LEFT_PX = 4
-_NAME_UP_PX = 9
 
 
 class GhostLine(NamedTuple):
@@ -65,7 +60,7 @@ def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
 
 
 def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[GhostLine]:
-    """Draw the curves of other branches, pale and dashed, each with its name at the end.
+    """Draw the curves of other branches, pale and dashed.
 
     Returns
     -------
@@ -78,8 +73,6 @@ def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[Gh
         controller_color = frame.theme.get_controller_color(ghost.controller)
         color = mix(frame.theme.panel, controller_color, _GHOST_STRENGTH)
         _draw_ghost_line(canvas, points, color)
-        if len(points):
-            _draw_ghost_name(canvas, frame, ghost, points[-1], color)
     return lines
 
 
@@ -89,15 +82,6 @@ def _draw_ghost_line(canvas: Canvas, points: Array, color: Color) -> None:
         is_gap = is_dashed and index % _SEGMENTS_PER_DASH == _SEGMENTS_PER_DASH - 1
         if not is_gap:
             canvas.draw_line(points[index].tolist(), points[index + 1].tolist(), color)
-
-
-def _draw_ghost_name(canvas: Canvas, frame: ChartFrame, ghost: GhostCurve, end: Array, color: Color) -> None:
-    """Draw the description of a branch near the last point of its curve, `end`, (2,) px."""
-    size = frame.theme.small_text
-    name_width = canvas.measure_text(ghost.description, size)
-    right = max(end[0] - _NAME_LEFT_PX * frame.scale, frame.times.left + name_width)
-    position = (right, end[1] - _NAME_UP_PX * frame.scale)
-    canvas.draw_text(ghost.description, position, size=size, color=color, anchor="right")
 
 
 def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) -> int | None:

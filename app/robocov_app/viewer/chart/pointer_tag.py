@@ -15,7 +15,9 @@ _LEFT_PX = 12
 _TOP_GAP_PX = 16
 
 
-def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int, int], time: float) -> None:
+def draw_pointer_tag(
+    screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int, int], time: float, ghost: str = ""
+) -> None:
     """Draw the tag onto the window, if the pointer is over the curves or the time slider.
 
     Parameters
@@ -26,6 +28,8 @@ def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int
         Position of the pointer in the window.
     time : float, s
         The time at the pointer.
+    ghost : str
+        Description of the branch whose curve is at the pointer, which takes precedence; empty without one.
     """
     if not _is_over_axis(frame, pixel):
         return
@@ -35,7 +39,7 @@ def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int
     top = frame.layout.chart.top
     column = round(times.to_column(time))
     frame.draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
-    text = describe_events_at(frame, pixel[0]) or _describe_values(frame, time)
+    text = ghost or describe_events_at(frame, pixel[0]) or _describe_values(frame, time)
     text_width = create_flat_canvas(screen, theme, scale).measure_text(text)
     left = min(column + _LEFT_PX * scale, times.right - text_width)
     draw_tag(screen, text, (left, top + (TOP_PX + _TOP_GAP_PX) * scale), theme, scale)

@@ -15,7 +15,11 @@ from robocov_app.viewer.session.timeline import Timeline
 LEFT_PX = 52
 """Space to the left of the curves, at scale 1, for the numbers of the value axis."""
 RIGHT_PX = 70
-"""Space to the right, for the values of the captions."""
+"""Space to the right of a narrow chart, for the value of its curve."""
+HEADLINE_PX = 140
+"""Space to the right, for a large number: the value of the only curve."""
+MIN_WIDTH_WITH_HEADLINE_PX = 420
+"""Minimum width of a chart with a large number."""
 TOP_PX = 26
 """Space above, for the title."""
 BOTTOM_PX = 20
@@ -74,12 +78,20 @@ def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> Ti
     """
     left, _, width, _ = layout.chart
     caption_width = RIGHT_PX * layout.scale
-    if len(timeline.panes) > 1:
+    if has_headline(layout, timeline):
+        caption_width = HEADLINE_PX * layout.scale
+    elif len(timeline.panes) > 1:
         names_width = _measure_captions(timeline.panes, round(text_size * layout.scale))
         caption_width = min(names_width + 20 * layout.scale, _MAX_NAMES_FRACTION * width)
     ghost_ends = [float(ghost.times[-1]) for ghost in timeline.ghosts]
     end = choose_growing_time_limit(max([timeline.end_time, *ghost_ends]))
     return TimeScale(left + LEFT_PX * layout.scale, left + width - caption_width, end)
+
+
+def has_headline(layout: Layout, timeline: Timeline) -> bool:
+    """Return whether the value of the only curve is shown as a large number next to the chart."""
+    is_wide = layout.chart.width >= MIN_WIDTH_WITH_HEADLINE_PX * layout.scale
+    return is_wide and len(timeline.panes) == 1
 
 
 def _measure_captions(panes: Sequence[Pane], text_size: int) -> int:

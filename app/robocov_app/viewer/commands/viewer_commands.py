@@ -245,7 +245,7 @@ def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:
     A limit can also be typed with the prefix ``team.``, for which a hidden command is yielded.
     """
     for parameter in viewer.comparison.list_parameters():
-        title = f"Set {parameter.label}"
+        title = f"{parameter.label} ({parameter.symbol})"
         set_value = partial(viewer.comparison.set_parameter, parameter.name)
         argument = _build_parameter_argument(parameter)
         short_name = parameter.name.removeprefix("team.")

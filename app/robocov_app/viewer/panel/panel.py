@@ -7,24 +7,25 @@ from itertools import chain, zip_longest
 from pathlib import Path
 
 import numpy as np
+from pygame import Rect
 
 from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
+from robocov_app.look.colors import Color
+from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
-from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
 from robocov_app.viewer.explanation.sentences import ReportLine
 from robocov_app.viewer.panel.parameters import NumberParameter, OptionParameter, Parameter
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
 from robocov_app.viewer.session.scenario import MAX_PANES
 
-TOOL_COLUMNS = 5
 LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
 """Layers that are nearly always visible. They can still be toggled by keys."""
 
@@ -46,6 +47,8 @@ _FILE_BUTTONS = (
 )
 _REDRAW_INTERVAL_S = 0.25  # while the simulation runs
 _NO_ROBOT_TEXT = "Click a robot, or press Tab, to see why it moves and why it does not."
+_SLIDER_TIP = "Hold Shift while dragging for fine steps"
+_TAB_TITLES = {"show": "Layers"}
 _NO_ROBOT_REASON = "no robot is selected: click one first, or press Tab"
 
 # Lengths in pixels at scale 1.
@@ -53,21 +56,20 @@ _ARROW_PX = 13.0
 _MIN_ARROW_FRACTION = 0.35
 _ARROW_CENTER_PX = (14, 8)
 _REPORT_INDENT_PX = 34.0
-_LABEL_PX = 100
+_LABEL_PX = 116
 _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
-_NUMBER_PX = (50, 34)  # the value and its unit
-_UNLIMITED_PX = (87,)  # the word "unlimited" instead of value and unit
+_NUMBER_PX = (58, 42)  # the value and its unit
+_UNLIMITED_PX = (103,)  # the word "unlimited" instead of value and unit
 _ROW_PX = 24
 _HIGH_ROW_PX = 28
 _MAP_PX = (172, 0)  # menus of the map and of its starts
 # Label and number of robots, minus, plus, a gap, label and value of the seed, next seed.
 _ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
-_SPEED_PX = (46, 0, 42)  # label, slider and value
-# Column widths of the rows with controllers: each controller has a button that removes its pane, and a gap.
-_SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
-_TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
-_CONTROLLER_PAIR_PX = (0, 24, 3, 0, 24)  # two of three or four
+_SLIDER_ROW_PX = 20
+_SWATCH_PX = 8
+_CLOSE_PX = 28
+_COMPARE_PX = 96
 
 
 class ViewerPanel(CommandPanel):
@@ -148,9 +150,7 @@ class ViewerPanel(CommandPanel):
         ui.inset(12, 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
-        self._show_run(ui)
-        self.show_tools(ui, self.viewer.toolbox, TOOL_COLUMNS)
-        self.show_pages(ui, {})
+        self.show_pages(ui, _TAB_TITLES)
 
     def _show_environment(self, ui: Ui) -> None:
         """Show the map, the start, the number of robots and the seed."""
@@ -159,12 +159,13 @@ class ViewerPanel(CommandPanel):
         files = viewer.files
         labels = shorten_names(files.list_maps())
         maps = {label: name for name, label in labels.items()}
-        ui.header("ENVIRONMENT")
+        ui.header("Map and team")
         ui.row(*_MAP_PX, height=_HIGH_ROW_PX, below=5)
-        label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name))
+        label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name), tip="Map")
         if label is not None:
             viewer.attempt(partial(files.open_map, maps[label]))
-        start = ui.dropdown("start", viewer.playback.list_starts(), scenario.start_name)
+        starts = viewer.playback.list_starts()
+        start = ui.dropdown("start", starts, scenario.start_name, tip="Where the robots start")
         if start is not None:
             viewer.attempt(partial(viewer.playback.restart, start=start))
         ui.row(*_ROBOTS_AND_SEED_PX, gap=3.5, below=8)
@@ -175,106 +176,113 @@ class ViewerPanel(CommandPanel):
         self.show_button(ui, "−", "fewer")
         self.show_button(ui, "+", "more")
         ui.cell()
-        ui.label("Seed")
+        ui.label("Seed", tip="Number from which random starting positions are drawn")
         seed = ui.text_field("seed", str(scenario.seed))
         if seed is not None:
             viewer.attempt(partial(self.commands.run_text, f"seed {seed}"))
         self.show_button(ui, "↻", "seed:next")
 
     def _show_controllers(self, ui: Ui) -> None:
-        """Show the controller of each pane, with buttons that remove and add panes."""
+        """Show a row for the controller of each pane, and a button that adds a pane."""
         viewer = self.viewer
         session = viewer.session
         choices = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
         labels = label_controllers(viewer.controllers, {choice.name: choice.label for choice in choices})
-        names = {label: name for name, label in labels.items()}
         count = len(choices)
-        ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
-        if count == 1:
-            ui.row(*_SINGLE_CONTROLLER_PX, height=_HIGH_ROW_PX, gap=6, below=4)
-        else:
-            columns = _TWO_CONTROLLERS_PX if count == 2 else _CONTROLLER_PAIR_PX
-            ui.row(*columns, height=_HIGH_ROW_PX, gap=2, below=4)
-        for k, choice in enumerate(choices):
-            label = ui.dropdown(f"controller:{k}", list(names), labels[choice.name])
-            if label is not None:
-                viewer.attempt(partial(viewer.comparison.set_controller, k, names[label]))
-            if count == 1:
-                continue
-            if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
-                viewer.inspection.active_pane = k
-                self._run_command("pane:remove")
-            # The narrow columns between two controllers are gaps; a cell without a widget stays empty.
-            if count == 2 or k % 2 == 0:
-                ui.cell()
+        ui.row(0, _COMPARE_PX, height=_ROW_PX, below=4)
+        ui.label("Controller" if count == 1 else "Controllers, side by side", style="header")
         if count < MAX_PANES:
-            self.show_button(ui, "+ compare" if count != 2 else "+", "pane:add")
+            self.show_button(ui, "+ Compare", "pane:add", small=True)
+        styles = choose_curve_styles([choice.name for choice in choices])
+        for k, choice in enumerate(choices):
+            self._show_controller(ui, k, labels, labels[choice.name], styles[k].get_color(ui.theme))
         ui.space(4)
 
-    def _show_run(self, ui: Ui) -> None:
-        """Show the buttons for playback, and the speed."""
-        session = self.viewer.session
-        ui.header("RUN")
-        ui.row(0, 0, 0, 0, height=_HIGH_ROW_PX, below=5)
-        self.show_button(
-            ui,
-            "Pause" if session.playback.is_playing else "Play",
-            "pause",
-            selected=not session.playback.is_playing,
-        )
-        self.show_button(ui, "Step", "step")
-        self.show_button(ui, "Settle", "settle", selected=session.playback.stop_when_settled)
-        self.show_button(ui, "Restart", "restart")
-        ui.row(*_SPEED_PX, height=22)
-        ui.label("Speed")
-        index = float(find_speed_index(session.playback.clock.speed))
-        speed_index = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0)
-        if speed_index is not None:
-            speed = SPEEDS[round(speed_index)]
-            self.viewer.attempt(partial(self.viewer.playback.set_speed, speed))
-        ui.label(format_speed(session.playback.clock.speed), key="speed")
+    def _show_controller(
+        self, ui: Ui, pane: int, labels: Mapping[str, str], label: str, color: Color
+    ) -> None:
+        """Show the row of a pane: the color of its curve, the menu of controllers, and a button to remove it.
+
+        Parameters
+        ----------
+        ui : Ui
+            The page of the panel.
+        pane : int
+            Index of the pane.
+        labels : mapping of str to str
+            Label of each controller, by its name.
+        label : str
+            Label of the controller of the pane.
+        color : Color
+            Color of the pane's curve.
+        """
+        viewer = self.viewer
+        is_single = len(viewer.session.timeline.panes) == 1
+        columns = (_SWATCH_PX, 0) if is_single else (_SWATCH_PX, 0, _CLOSE_PX)
+        ui.row(*columns, height=_HIGH_ROW_PX, gap=4, below=4)
+        swatch = ui.cell()
+        if ui.surface is not None:
+            # The bar next to the active pane is as high as the row, the others are dots.
+            height = _HIGH_ROW_PX if pane == viewer.active_pane else _SWATCH_PX
+            box = Rect(0, 0, ui.px(_SWATCH_PX), ui.px(height))
+            box.center = swatch.center
+            draw_box(ui, box, color, radius=_SWATCH_PX / 2)
+        names = {text: name for name, text in labels.items()}
+        chosen = ui.dropdown(f"controller:{pane}", list(names), label, tip="Controller of this pane")
+        if chosen is not None:
+            viewer.attempt(partial(viewer.comparison.set_controller, pane, names[chosen]))
+        if not is_single and ui.icon_button("close", "Remove", key=f"close:{pane}", tip="Remove this pane"):
+            viewer.inspection.active_pane = pane
+            self._run_command("pane:remove")
 
     def _show_parameters(self, ui: Ui) -> None:
+        """Show the frequently used gains and limits, and below them the advanced ones."""
         controller = self.viewer.session.displayed.get_setup(self.viewer.pane).controller
         parameters = self.viewer.comparison.list_parameters()
-        gains = [parameter for parameter in parameters if not parameter.name.startswith("team.")]
-        limits = [parameter for parameter in parameters if parameter.name.startswith("team.")]
-        groups = {f"GAINS OF {controller.label.upper()}": gains, "ROBOTS": limits}
+        basic = [parameter for parameter in parameters if not parameter.is_advanced]
+        advanced = [parameter for parameter in parameters if parameter.is_advanced]
+        gains = [parameter for parameter in basic if not parameter.name.startswith("team.")]
+        limits = [parameter for parameter in basic if parameter.name.startswith("team.")]
         with ui.scroll(f"parameters:{controller.name}"):
-            for title, group in groups.items():
-                if ui.section(title, key=title.split()[0]):
-                    self._show_parameter_group(ui, group)
+            if ui.section(controller.label, key="gains"):
+                self._show_parameter_group(ui, gains)
+            if ui.section("Robots", key="robots"):
+                self._show_parameter_group(ui, limits)
+            if ui.section("Advanced", key="advanced", starts_open=False):
+                self._show_parameter_group(ui, advanced)
 
     def _show_parameter_group(self, ui: Ui, parameters: list[Parameter]) -> None:
         if not parameters:
-            ui.label("none", style="unit")
+            ui.label("This controller has no parameters", style="unit")
         for parameter in parameters:
             if isinstance(parameter, OptionParameter):
                 self._show_options(ui, parameter)
             else:
-                self._show_slider(ui, parameter)
+                self._show_number(ui, parameter)
         ui.space(4)
 
     def _set(self, name: str, value: float | str | None) -> None:
         self.viewer.attempt(partial(self.viewer.comparison.set_parameter, name, value))
 
-    def _show_slider(self, ui: Ui, parameter: NumberParameter) -> None:
-        """Show a row for a numeric parameter: name, slider, text field, unit and reset button."""
+    def _show_number(self, ui: Ui, parameter: NumberParameter) -> None:
+        """Show two rows for a numeric parameter: name, text field and unit; slider and reset button."""
         name = parameter.name
         unit = parameter.unit
-        columns: tuple[int, ...] = _NUMBER_PX
+        columns: tuple[float, ...] = _NUMBER_PX
         if parameter.is_unlimited:
             columns = _UNLIMITED_PX
-        ui.row(_LABEL_PX, 0, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
-        ui.label(parameter.label, tip=f"{parameter.meaning} ({unit})" if unit else parameter.meaning)
-        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
-        if position is not None:
-            self._set(name, parameter.compute_value(position))
+        ui.row(0, *columns, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=0)
+        tip = f"{parameter.meaning} ({unit})" if unit else parameter.meaning
+        ui.label(parameter.label, tip=f"{parameter.symbol}: {tip}", note=choose_note(parameter))
         text = ui.text_field(name, parameter.format())
         if text is not None:
             self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
         if not parameter.is_unlimited:
             ui.label(unit, key=f"unit:{name}", style="unit")
+        ui.row(0, _RESET_PX, height=_SLIDER_ROW_PX, gap=_PARAMETER_GAP_PX, below=5)
+        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0, tip=_SLIDER_TIP)
+        if position is not None:
+            self._set(name, parameter.compute_value(position))
         default = "unlimited" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()
         self._show_reset(ui, parameter, default)
 
@@ -287,7 +295,7 @@ class ViewerPanel(CommandPanel):
         fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
         ui.row(_LABEL_PX, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
-        ui.label(parameter.label, tip=parameter.meaning)
+        ui.label(parameter.label, tip=f"{parameter.symbol}: {parameter.meaning}")
         if fits:
             for choice in choices:
                 is_on = choice == parameter.value
@@ -301,8 +309,12 @@ class ViewerPanel(CommandPanel):
         self._show_reset(ui, parameter, parameter.default)
 
     def _show_reset(self, ui: Ui, parameter: Parameter, default: str) -> None:
+        """Show a button that restores the default, if the value differs from it."""
+        if parameter.value == parameter.default:
+            ui.cell()
+            return
         tip = f"Back to the default: {default}"
-        if ui.button("↺", key=f"reset:{parameter.name}", tip=tip, small=True):
+        if ui.icon_button("reset", "Reset", key=f"reset:{parameter.name}", tip=tip):
             self._set(parameter.name, parameter.default)
 
     def _show_layers(self, ui: Ui) -> None:
@@ -349,6 +361,13 @@ class ViewerPanel(CommandPanel):
             is_recording = command == "video" and self.viewer.view.is_recording
             text = "Stop video" if is_recording else label
             self.show_button(ui, text, command, selected=is_recording)
+
+
+def choose_note(parameter: Parameter) -> str:
+    """Return the symbol of a parameter for display after its label; empty if the label contains it."""
+    if parameter.symbol.replace("_", " ") in parameter.label.lower():
+        return ""
+    return parameter.symbol
 
 
 def show_report(ui: Ui, report: RobotReport) -> None:

@@ -1,8 +1,9 @@
 """Parameters of the panel: gains of a controller and limits of the team, as sliders or choices."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 from robocov.controllers.gains import Gain, Option, Value
@@ -16,25 +17,102 @@ NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional para
 NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
 
 
+MAX_BASIC_GAINS = 4
+"""Number of numeric gains of a controller that are always visible; the others are advanced."""
+GAIN_LABELS: Mapping[str, str] = MappingProxyType(
+    {
+        "k_rep": "Repulsion strength",
+        "rho_0": "Repulsion range",
+        "k_att": "Attraction strength",
+        "attraction_limit": "Attraction limit",
+        "cells": "Cells by",
+        "target": "Goal",
+        "height": "Sensor height",
+        "k_prop": "Approach speed",
+        "response_time": "Response time",
+        "period": "Planning interval",
+        "threshold": "Minimum saving",
+        "nearby": "Minimum saving nearby",
+        "rest": "Minimum saving of a goal",
+        "stake": "Viewpoint stake",
+        "patience": "Patience",
+        "settling": "Settling path",
+        "clearance": "Clearance",
+        "k_robots": "Repulsion of robots",
+        "k_obs": "Repulsion of obstacles",
+        "friction": "Friction",
+        "neighbours": "Neighbors kept",
+        "link_range": "Link range",
+        "k_cover": "Spreading strength",
+        "eta": "Balance distance",
+        "rho_obs": "Obstacle range",
+        "reach": "Spreading distance",
+        "k_disperse": "Spreading speed",
+        "explore_speed": "Exploring speed",
+        "k_avoid": "Avoidance speed",
+        "interaction_range": "Interaction range",
+        "jump": "Depth step",
+        "detour": "Longest detour",
+        "moved": "Retry distance",
+        "safe_gap": "Safe gap",
+        "gamma": "Barrier rate",
+        "boosting.gamma": "Boost exponent",
+        "braking": "Braking fraction",
+        "exponent": "Distance exponent",
+        "lattice": "Lattice cells",
+        "k_area": "Area gain",
+        "decay": "Detection decay",
+        "boost": "Boosting by",
+        "kappa": "Boost factor",
+        "boosts": "Maximum boosts",
+        "boosting.patience": "Boost duration",
+        "k_grad": "Gradient gain",
+        "estimate": "Density model",
+        "basis": "Basis functions",
+        "prior": "Prior density",
+        "least": "Minimum density",
+        "learning": "Learning rate",
+        "consensus": "Consensus rate",
+        "coupling": "Coupling",
+        "correlation": "Correlation length",
+        "explore": "Exploration bonus",
+        "shrink": "Obstacle stiffness",
+        "nodes": "Maximum nodes",
+        "beta": "Path cost",
+        "shortest": "Minimum frontier",
+    }
+)
+"""Name of each gain in everyday words, by its name or by those of a controller and a gain."""
+
+
 class _LimitSlider(NamedTuple):
     label: str
     meaning: str
     low: float
     high: float
+    is_advanced: bool
 
 
 _KINEMATIC = "kinematic limit, the same for every controller"
 _LIMITS = {
-    "max_speed": _LimitSlider("max. speed", _KINEMATIC, 0.1, 10.0),
-    "max_acceleration": _LimitSlider("acceleration", _KINEMATIC, 0.1, 20.0),
-    "viscosity": _LimitSlider("viscosity ν", "ν of (28): slows robots down", 0.1, 20.0),
+    "max_speed": _LimitSlider("Maximum speed", _KINEMATIC, 0.1, 10.0, is_advanced=False),
     "sensing_range": _LimitSlider(
-        "sensing", "range of the obstacle sensor, from the robot's center", 0.2, 30.0
+        "Sensing range",
+        "range of the obstacle sensor, from the robot's center",
+        0.2,
+        30.0,
+        is_advanced=False,
     ),
     "communication_range": _LimitSlider(
-        "communication", "distance within which robots receive each other's messages", 0.5, 50.0
+        "Communication range",
+        "distance within which robots receive each other's messages",
+        0.5,
+        50.0,
+        is_advanced=False,
     ),
-    "radius": _LimitSlider("radius", "radius of a robot", 0.02, 1.0),
+    "radius": _LimitSlider("Radius", "radius of a robot", 0.02, 1.0, is_advanced=False),
+    "max_acceleration": _LimitSlider("Acceleration", _KINEMATIC, 0.1, 20.0, is_advanced=True),
+    "viscosity": _LimitSlider("Viscosity", "ν of (28): slows robots down", 0.1, 20.0, is_advanced=True),
 }
 _KINEMATICS_MEANING = (
     "a point moves in any direction; a unicycle has two driven wheels, and has to turn first"
@@ -51,6 +129,8 @@ class NumberParameter:
         Name of a gain; for a limit, its name with the prefix ``team.``.
     label : str
         Name in the panel.
+    symbol : str
+        Short name as it is typed and as it is in files.
     unit : str
         Unit; empty for none.
     meaning : str
@@ -61,10 +141,13 @@ class NumberParameter:
         Values at the ends of the slider; typed values may lie outside.
     is_optional : bool
         Whether "no limit" is a possible value.
+    is_advanced : bool
+        Whether it is rarely used.
     """
 
     name: str
     label: str
+    symbol: str
     unit: str
     meaning: str
     value: float | None
@@ -72,6 +155,7 @@ class NumberParameter:
     low: float
     high: float
     is_optional: bool
+    is_advanced: bool
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -137,20 +221,24 @@ class OptionParameter:
 
     Attributes
     ----------
-    name, label, meaning : str
+    name, label, symbol, meaning : str
         As in `NumberParameter`.
     value, default : str
         Current and default value.
     choices : tuple of str
         All possible values.
+    is_advanced : bool
+        Whether it is rarely used.
     """
 
     name: str
     label: str
+    symbol: str
     meaning: str
     value: str
     default: str
     choices: tuple[str, ...]
+    is_advanced: bool = True
 
     def format(self) -> str:
         """Return the value."""
@@ -178,17 +266,54 @@ Parameter = NumberParameter | OptionParameter
 
 
 def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
-    """Yield a parameter for each gain of a controller."""
+    """Yield a parameter for each gain of a controller; all but the first few numbers are advanced."""
+    number_count = 0
     for name, gain in controller.available_gains.items():
         value = controller.get_value(name)
+        label = label_gain(name, controller.name)
         if isinstance(gain, Option):
             word = value if isinstance(value, str) else gain.default
-            yield OptionParameter(name, name, gain.meaning, word, gain.default, gain.choices)
+            yield OptionParameter(
+                name=name,
+                label=label,
+                symbol=name,
+                meaning=gain.meaning,
+                value=word,
+                default=gain.default,
+                choices=gain.choices,
+            )
         else:
-            yield _build_gain_parameter(name, gain, value)
+            number_count += 1
+            is_advanced = number_count > MAX_BASIC_GAINS
+            yield _build_gain_parameter(name, label, gain, value, is_advanced=is_advanced)
 
 
-def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParameter:
+def label_gain(name: str, controller: str = "") -> str:
+    """Return the name of a gain in everyday words.
+
+    Parameters
+    ----------
+    name : str
+        Name of the gain in code and files.
+    controller : str
+        Name of the controller.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> label_gain("k_rep"), label_gain("patience", "boosting"), label_gain("my_gain")
+    ('Repulsion strength', 'Boost duration', 'My gain')
+    """
+    general_label = GAIN_LABELS.get(name, name.replace("_", " ").capitalize())
+    return GAIN_LABELS.get(f"{controller}.{name}", general_label)
+
+
+def _build_gain_parameter(
+    name: str, label: str, gain: Gain, value: Value, *, is_advanced: bool
+) -> NumberParameter:
     """Build the parameter of a numeric gain; its slider covers a range around the default value."""
     reference_value = min(max(gain.default or 1.0, gain.low), gain.high)
     if reference_value > 0 and gain.low >= 0:
@@ -197,7 +322,8 @@ def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParamete
         lowest = -SLIDER_SPAN * abs(reference_value)
     return NumberParameter(
         name=name,
-        label=name,
+        label=label,
+        symbol=name,
         unit=gain.unit,
         meaning=gain.meaning,
         value=None if isinstance(value, str) else value,
@@ -205,6 +331,7 @@ def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParamete
         low=max(gain.low, lowest),
         high=min(gain.high, SLIDER_SPAN * abs(reference_value)),
         is_optional=gain.optional,
+        is_advanced=is_advanced,
     )
 
 
@@ -220,6 +347,7 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
         yield NumberParameter(
             name=f"team.{name}",
             label=label,
+            symbol=name,
             unit=UNITS[name],
             meaning=meaning,
             value=_drop_infinity(getattr(limits, name)),
@@ -227,12 +355,14 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
             low=slider.low,
             high=slider.high,
             is_optional=name.endswith("_range"),
+            is_advanced=slider.is_advanced,
         )
     # Only unicycles have a track width.
     kinematics = UNICYCLE if limits.track_width > 0.0 else POINT
     yield OptionParameter(
         name="team.kinematics",
-        label="kinematics",
+        label="Kinematics",
+        symbol="kinematics",
         meaning=_KINEMATICS_MEANING,
         value=kinematics,
         default=POINT,

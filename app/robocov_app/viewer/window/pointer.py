@@ -1,9 +1,10 @@
 """The mouse over the viewer's canvas and chart: tools, panning, the time slider."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pygame
 
+from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
@@ -31,9 +32,11 @@ class ViewerPointer(Pointer):
     chart : Chart
         The chart and the time slider.
     panel : ViewerPanel
-        The panel, which gets events first.
+        The panel.
     layer_bar : LayerBar
         The chips over the canvas.
+    parts : sequence of WindowPart
+        Top bar, tool rail and panel, which get events first.
     leave_lesson : callable
         Lets the user take over from a lesson.
     """
@@ -45,10 +48,11 @@ class ViewerPointer(Pointer):
         chart: Chart,
         panel: ViewerPanel,
         layer_bar: LayerBar,
+        parts: Sequence[WindowPart],
         leave_lesson: Callable[[], None],
     ) -> None:
         """Connect the mouse to the parts of the window."""
-        super().__init__(panel)
+        super().__init__(parts)
         self._viewer = viewer
         self._canvas = canvas
         self._chart = chart

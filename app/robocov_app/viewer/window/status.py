@@ -51,11 +51,19 @@ def list_facts(
         facts += _list_cost_facts(known, time)
     if video_duration is not None:
         facts.append(f"● video {video_duration:.0f} s")
-    facts.append(describe_cursor(viewer))
     facts.append(_describe_speed(viewer, step_rate))
+    facts.append(describe_cursor(viewer))
     facts.append(f"{step_rate:.0f} steps/s")
     facts.append(f"{frame_rate:.0f} fps")
     return [fact for fact in facts if fact]
+
+
+def describe_cut_off(viewer: ViewerModel, pane: Pane) -> str:
+    """Describe the area of a pane that no robot can reach; empty if there is none worth mentioning."""
+    known = viewer.costs.known.get(pane.number)
+    if known is None or known.result.uncovered_area <= MIN_UNCOVERED_AREA_M2:
+        return ""
+    return f"{known.result.uncovered_area:.1f} m² cut off"
 
 
 def _list_cost_facts(known: KnownCost, time: float) -> list[str]:

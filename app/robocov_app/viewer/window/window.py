@@ -13,6 +13,8 @@ from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.panel import WindowPart
+from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
@@ -38,6 +40,7 @@ from robocov_app.viewer.window.pointer import ViewerPointer
 from robocov_app.viewer.window.screen_video import ScreenVideo
 from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import HINT, list_facts, suggest_actions
+from robocov_app.viewer.window.top_bar import TopBar
 
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
@@ -91,6 +94,10 @@ class ViewerWindow(CommandWindow):
         The chart and the time slider.
     panel : ViewerPanel
         The panel.
+    top_bar : TopBar
+        The bar at the top.
+    tool_rail : ToolRail
+        The tools, to the left of the panes.
     dialogs : Dialogs
         Shows the open dialog.
     commands : CommandTable
@@ -139,8 +146,16 @@ class ViewerWindow(CommandWindow):
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
+        self.top_bar = TopBar(viewer, self.commands, self.do)
+        self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.do)
         self.pointer = ViewerPointer(
-            viewer, self.canvas, self.chart, self.panel, self.layer_bar, self.lesson.leave
+            viewer,
+            self.canvas,
+            self.chart,
+            self.panel,
+            self.layer_bar,
+            self.parts,
+            self.lesson.leave,
         )
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
@@ -167,6 +182,11 @@ class ViewerWindow(CommandWindow):
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
         )
+
+    @property
+    def parts(self) -> Sequence[WindowPart]:
+        """Top bar, tool rail and panel."""
+        return (self.top_bar, self.tool_rail, self.panel)
 
     def show_result(self, message: str) -> None:
         """Show the message of a command of the palette, and update the report on the robot."""
@@ -228,6 +248,8 @@ class ViewerWindow(CommandWindow):
         self._inspector.update(self.viewer.now)
         self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
+        self.top_bar.update()
+        self.tool_rail.update()
         self.pointer.show_action(self.cursor)
 
     def build_frame_key(self) -> object:
@@ -256,7 +278,7 @@ class ViewerWindow(CommandWindow):
             self._get_seek_progress(),
             viewer.costs.state,
             self._layout_key,
-            self.panel.ui.needs_redraw,
+            any(part.ui.needs_redraw for part in self.parts),
             self.lesson.frame_key,
             self.layer_bar.frame_key,
         )
@@ -292,9 +314,10 @@ class ViewerWindow(CommandWindow):
         self.layout = build_layout(size, self.scale, panes, aspect, panel=view.has_panel)
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
-        # The panel does not depend on the panes.
+        # The parts do not depend on the panes.
         if before is None or frame != before.frame:
-            self.panel.arrange(self.layout, self.theme)
+            for part in self.parts:
+                part.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
         """Draw all parts of the window, show the frame, and add it to the video."""
@@ -308,6 +331,8 @@ class ViewerWindow(CommandWindow):
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
+        self.tool_rail.draw(self.screen)
+        self.top_bar.draw(self.screen)
         self._draw_message(can_suggest=not has_lesson)
         self.draw_above_map()
         if self.video is not None:

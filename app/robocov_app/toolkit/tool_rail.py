@@ -1,0 +1,82 @@
+"""The tool rail: a column of icons to the left of the arena, one for each tool."""
+
+from collections.abc import Callable
+from typing import Any
+
+from pygame import Rect, Surface
+
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.overlay import draw_edge
+from robocov_app.toolkit.panel import WindowPart
+from robocov_app.toolkit.tools.tool import Toolbox
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.layout import Box, Layout
+
+VIEW_COMMANDS = ("fit", "zoom:in", "zoom:out")
+"""Commands of the camera, shown below the tools as far as there is space."""
+
+# Lengths in pixels at scale 1.
+_MARGIN_PX = 4.0
+_BUTTON_HEIGHT_PX = 36.0
+_GAP_PX = 2.0
+_VIEW_GAP_PX = 10.0
+
+
+class ToolRail(WindowPart):
+    """Buttons that choose a tool, and buttons for the camera below them.
+
+    Parameters
+    ----------
+    toolbox : Toolbox
+        The tools, and the one in use.
+    commands : CommandTable
+        The commands of the window; a tool is chosen by ``tool:name``.
+    run_command : callable
+        Runs the command with a given name.
+    """
+
+    def __init__(
+        self, toolbox: Toolbox[Any], commands: CommandTable, run_command: Callable[[str], object]
+    ) -> None:
+        super().__init__()
+        self._toolbox = toolbox
+        self._commands = commands
+        self._run_command = run_command
+
+    def get_box(self, layout: Layout) -> Box:
+        """Return the box of the rail."""
+        return layout.rail
+
+    def draw(self, screen: Surface) -> None:
+        """Draw the rail, with a line at its right edge."""
+        box = self.ui.box
+        self.ui.draw(screen)
+        draw_edge(screen, Rect(box.right - 1, box.top, 1, box.height), self.ui.theme)
+        self.ui.draw_overlays(screen)
+
+    def update(self) -> None:
+        """Request a redraw if another tool is in use."""
+        self.request_redraw(self._toolbox.current.name)
+
+    def show_content(self, ui: Ui) -> None:
+        """Show a button for each tool, and below them those of the camera."""
+        height = ui.box.height / ui.scale
+        tools = list(self._toolbox.by_name.values())
+        ui.inset(_MARGIN_PX, _MARGIN_PX, _MARGIN_PX)
+        pitch = min(_BUTTON_HEIGHT_PX + _GAP_PX, (height - _MARGIN_PX) / len(tools))
+        ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
+        for tool in tools:
+            is_selected = tool is self._toolbox.current
+            self._show_button(ui, tool.name, f"tool:{tool.name}", tool.title, selected=is_selected)
+        free = height - 2 * _MARGIN_PX - len(tools) * pitch - _VIEW_GAP_PX
+        ui.space(_VIEW_GAP_PX)
+        ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
+        for command in VIEW_COMMANDS[: max(int(free / pitch), 0)]:
+            self._show_button(ui, command, command, self._commands[command].title)
+
+    def _show_button(self, ui: Ui, icon: str, command: str, title: str, *, selected: bool = False) -> None:
+        """Show a button with the key of its command; the tip is the command's title and its keys."""
+        entry = self._commands[command]
+        shortcut = entry.key_text if len(entry.key_text) == 1 else ""
+        if ui.icon_button(icon, title, key=command, tip=entry.tip, selected=selected, shortcut=shortcut):
+            self._run_command(command)
