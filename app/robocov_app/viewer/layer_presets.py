@@ -43,15 +43,15 @@ class LayerPreset:
         Identifier, as in the command ``preset:simple``.
     title : str
         Name in the window.
-    tip : str
-        What it shows, in one sentence.
+    description : str
+        What it shows, as a noun phrase.
     layers : frozenset of str
         Names of its layers.
     """
 
     name: str
     title: str
-    tip: str
+    description: str
     layers: frozenset[str]
 
 
@@ -59,13 +59,13 @@ LAYER_PRESETS = (
     LayerPreset(
         "simple",
         "Simple",
-        "Show robots, their trajectories and their cells",
+        "Robots, their trajectories and their cells",
         _BASE_LAYERS | {"cells", "density", "trajectories"},
     ),
     LayerPreset(
         "why",
         "Why?",
-        "Show where each robot is heading, and the forces that move it",
+        "The goal of each robot, and the forces that move it",
         _BASE_LAYERS
         | {"cells", "density", "goals", "velocities", "obstacle_points"}
         | {"force_attraction", "force_repulsion_robots", "force_repulsion_obstacle"},
@@ -73,13 +73,13 @@ LAYER_PRESETS = (
     LayerPreset(
         "knowledge",
         "What robots know",
-        "Show the obstacles that the team has sensed, and the range and the neighbors of each robot",
+        "The obstacles that the team has sensed, and the range and the neighbors of each robot",
         _BASE_LAYERS | {"sensed", "sensing", "communication", "links", "trajectories"},
     ),
     LayerPreset(
         "print",
         "Print",
-        "Show what a figure in an article needs, without a grid",
+        "What a figure in an article needs, without a grid",
         _BASE_LAYERS | {"cells", "density", "trajectories", "starts"},
     ),
 )

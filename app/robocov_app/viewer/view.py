@@ -44,7 +44,7 @@ class ViewState:
     def use_preset(self, preset: LayerPreset) -> str:
         """Show exactly the layers of a preset; return a message."""
         self.layers = set(preset.layers)
-        return preset.tip
+        return f"{preset.title} · {preset.description}"
 
     def use_next_preset(self) -> str:
         """Show the layers of the next preset, or of the first one; return a message."""

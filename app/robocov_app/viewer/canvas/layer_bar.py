@@ -43,7 +43,7 @@ _MENU_HEADER_TEXT_PX = 11.0
 _GROUP_GAP_PX = 6.0
 
 _DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
-"""Layers that everybody recognizes; their chips are left out first if there is not enough space."""
+"""Layers with symbols that need no explanation; their chips are left out first if space is short."""
 
 
 class LayerBar:
