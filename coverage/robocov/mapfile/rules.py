@@ -197,7 +197,7 @@ def _find_room_mistakes(
         if isinstance(start, DiscStart):
             x, y = start.center
             area = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
-        message = f"{area} has no space for a robot of radius {DEFAULT_RADIUS_M:g} m"
+        message = f"a robot of radius {DEFAULT_RADIUS_M:g} m does not fit into {area}"
         yield Mistake.at_path(("starts", name), message)
 
 

@@ -165,11 +165,11 @@ GEOMETRIC = [
     ),
     (
         edit("starts", "west side", "center", [30, 2]),
-        'starts["west side"]: the disc of radius 0.8',
+        'starts["west side"]: a robot of radius 0.1 m does not fit into the disc of radius 0.8',
     ),
     (
         edit("starts", "west side", {"kind": "disc", "center": [3.5, 3.5], "radius": 0.2}),
-        'starts["west side"]: the disc of radius 0.2 m at [3.5, 3.5] has no space',
+        'starts["west side"]: a robot of radius 0.1 m does not fit into the disc of radius 0.2 m',
     ),
     (
         edit("starts", "given", "positions", 1, [7, 2]),
@@ -397,7 +397,7 @@ def assert_loads_or_raises(load: Any) -> None:
             for phrase in (
                 "expected",
                 "no free space",
-                "has no space",
+                "does not fit",
                 "duplicate",
                 "not JSON",
                 "not UTF-8",

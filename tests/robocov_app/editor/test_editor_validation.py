@@ -195,7 +195,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             hall(PolygonObstacle(BOX), starts=(("a", DiscStart((2.0, 2.0), 0.5)),)),
-            "start “a”: its disc has no space for a robot of radius 0.1 m",
+            "start “a”: a robot of radius 0.1 m does not fit into its disc",
             (2.0, 2.0),
             "a",
         ),
@@ -287,11 +287,11 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     )
     assert not [message for message in list_warnings(sketch, 0.2) if "start" in message]
     message = [message for message in list_warnings(sketch, 0.5) if "start" in message]
-    assert message[0] == "start “a”: its disc has no space for a robot of radius 0.5 m"
+    assert message[0] == "start “a”: a robot of radius 0.5 m does not fit into its disc"
     assert message[1] == "start “b”: position 1 at (1, 1) and position 2 are 0.5 m apart: robots need 1 m"
     assert list_warnings(hall(starts=(("all", UniformStart()),)), 3.9) == []
     assert list_warnings(hall(starts=(("all", UniformStart()),)), 4.0) == [
-        "start “all”: the free space has no space for a robot of radius 4 m"
+        "start “all”: a robot of radius 4 m does not fit into the free space"
     ]
 
 

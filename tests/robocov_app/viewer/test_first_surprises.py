@@ -190,7 +190,10 @@ def test_more_robots_than_fit_at_the_start_start_uniformly(driver: Driver) -> No
     driver.viewer.attempt(lambda: driver.viewer.playback.restart(robots=40))
     assert len(driver.session.displayed.numbers) == 40
     assert driver.session.timeline.scenario.start_name == "uniform"
-    assert driver.viewer.message == "no space for 40 robots at start “far”: they start uniformly"
+    assert (
+        driver.viewer.message
+        == "no space for 40 robots at start “far”: they start anywhere in the free space"
+    )
     driver.press_key("ctrl+z")
     assert driver.session.timeline.scenario.start_name == "far"
     driver.viewer.attempt(lambda: driver.viewer.playback.restart(robots=40, start="far"))

@@ -137,13 +137,13 @@ def _check_space(
     try:
         env.Start(name, start, free).sample(1, radius=radius)
     except StartError:
-        reason = f"has no space for a robot of radius {radius:g} m"
+        reason = f"a robot of radius {radius:g} m does not fit into"
         if isinstance(start, env.DiscStart):
             disc = shapely.Point(start.center).buffer(start.radius)
-            message = f"{label}: its disc {reason}"
+            message = f"{label}: {reason} its disc"
             yield Problem(message, disc, owner=name, is_error=is_error, kind="no room")
         else:
-            yield Problem(f"{label}: the free space {reason}", None, owner=name, is_error=is_error)
+            yield Problem(f"{label}: {reason} the free space", None, owner=name, is_error=is_error)
 
 
 def _list_warnings(

@@ -56,7 +56,8 @@ class PlaybackActions:
                 raise
             session.restart(robots=robots, start=UNIFORM, seed=seed)
             self._viewer.show_message(
-                f"no space for {robots} robots at start “{start_before}”: they start uniformly"
+                f"no space for {robots} robots at start “{start_before}”: "
+                "they start anywhere in the free space"
             )
 
     def restart_with_next_seed(self) -> None:
