@@ -46,6 +46,10 @@ class TestReadability:
                 assert compute_contrast(theme.obstacle, cell) >= 3.0
                 # Moving obstacles are paler, but have a wide outline.
                 assert compute_contrast(theme.obstacle_edge, cell) >= 3.0
+            # Where the density is highest, the outline stands out.
+            peak = mix(theme.get_cell_color(hue), theme.density, theme.density_strength)
+            assert compute_contrast(theme.obstacle_edge, peak) >= 3.0
+            assert compute_contrast(theme.get_cell_color(hue), peak) >= 1.4
 
     def test_obstacles_or_their_outlines_stand_out_on_a_distance_map(self, theme):
         for color in theme.build_heat_table(50).tolist():
