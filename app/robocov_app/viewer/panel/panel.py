@@ -11,8 +11,8 @@ from pygame import Rect
 
 from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
-from robocov_app.look.colors import Color
-from robocov_app.look.curve_styles import choose_curve_styles
+from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
+from robocov_app.render.dashes import cut_into_dashes
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas
@@ -67,7 +67,9 @@ _MAP_PX = (172, 0)  # menus of the map and of its starts
 # Label and number of robots, minus, plus, a gap, label and value of the seed, next seed.
 _ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
 _SLIDER_ROW_PX = 20
-_SWATCH_PX = 8
+_MARK_PX = 4  # bar next to the controller of the active pane
+_SAMPLE_PX = 24
+_SAMPLE_LINE_PX = 3.0
 _CLOSE_PX = 28
 _COMPARE_PX = 96
 
@@ -195,13 +197,13 @@ class ViewerPanel(CommandPanel):
             self.show_button(ui, "+ Compare", "pane:add", small=True)
         styles = choose_curve_styles([choice.name for choice in choices])
         for k, choice in enumerate(choices):
-            self._show_controller(ui, k, labels, labels[choice.name], styles[k].get_color(ui.theme))
+            self._show_controller(ui, k, labels, labels[choice.name], styles[k])
         ui.space(4)
 
     def _show_controller(
-        self, ui: Ui, pane: int, labels: Mapping[str, str], label: str, color: Color
+        self, ui: Ui, pane: int, labels: Mapping[str, str], label: str, style: CurveStyle
     ) -> None:
-        """Show the row of a pane: the color of its curve, the menu of controllers, and a button to remove it.
+        """Show the row of a pane: a sample of its curve, the menu of controllers, a button to remove it.
 
         Parameters
         ----------
@@ -213,20 +215,18 @@ class ViewerPanel(CommandPanel):
             Label of each controller, by its name.
         label : str
             Label of the controller of the pane.
-        color : Color
-            Color of the pane's curve.
+        style : CurveStyle
+            Style of the pane's curve.
         """
         viewer = self.viewer
         is_single = len(viewer.session.timeline.panes) == 1
-        columns = (_SWATCH_PX, 0) if is_single else (_SWATCH_PX, 0, _CLOSE_PX)
+        columns = (_SAMPLE_PX, 0) if is_single else (_MARK_PX, _SAMPLE_PX, 0, _CLOSE_PX)
         ui.row(*columns, height=_HIGH_ROW_PX, gap=4, below=4)
-        swatch = ui.cell()
-        if ui.surface is not None:
-            # The bar next to the active pane is as high as the row, the others are dots.
-            height = _HIGH_ROW_PX if pane == viewer.active_pane else _SWATCH_PX
-            box = Rect(0, 0, ui.px(_SWATCH_PX), ui.px(height))
-            box.center = swatch.center
-            draw_box(ui, box, color, radius=_SWATCH_PX / 2)
+        if not is_single:
+            mark = ui.cell()
+            if pane == viewer.active_pane:
+                draw_box(ui, mark, ui.theme.accent, radius=_MARK_PX / 2)
+        draw_curve_sample(ui, ui.cell(), style)
         names = {text: name for name, text in labels.items()}
         chosen = ui.dropdown(f"controller:{pane}", list(names), label, tip="Controller of this pane")
         if chosen is not None:
@@ -361,6 +361,17 @@ class ViewerPanel(CommandPanel):
             is_recording = command == "video" and self.viewer.view.is_recording
             text = "Stop video" if is_recording else label
             self.show_button(ui, text, command, selected=is_recording)
+
+
+def draw_curve_sample(ui: Ui, cell: Rect, style: CurveStyle) -> None:
+    """Draw a short line in the style of a curve."""
+    if ui.surface is None:
+        return
+    canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
+    width = canvas.scale_width(_SAMPLE_LINE_PX)
+    dashes = [width * length for length in style.list_dash_lengths()]
+    points = np.array([cell.midleft, cell.midright], dtype=float)
+    canvas.draw_segments(cut_into_dashes(points, dashes), style.get_color(ui.theme), width)
 
 
 def choose_note(parameter: Parameter) -> str:

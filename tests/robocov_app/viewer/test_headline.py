@@ -1,0 +1,80 @@
+"""The large number next to the chart, the area that is cut off, and branches under the pointer."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from driven_window import Driver
+from sample_sessions import RPF
+
+from robocov_app.render.canvas import Canvas
+from robocov_app.viewer.chart.captions import HEADLINE_TEXT_PX
+from robocov_app.viewer.window.status import MIN_UNCOVERED_AREA_M2, describe_cut_off
+
+
+@pytest.fixture
+def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
+    """Size of each text that canvases draw during the test."""
+    sizes: dict[str, float] = {}
+    draw_text = Canvas.draw_text
+
+    def draw_and_list(canvas: Canvas, text: str, *args: object, **kwargs: object) -> float:
+        sizes[text] = float(kwargs.get("size") or 0.0)  # type: ignore[arg-type]
+        return draw_text(canvas, text, *args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
+    return sizes
+
+
+def set_cut_off_area(driver: Driver, monkeypatch: pytest.MonkeyPatch, area: float) -> None:
+    answer = SimpleNamespace(result=SimpleNamespace(uncovered_area=area))
+    known = {pane.number: answer for pane in driver.session.timeline.panes}
+    monkeypatch.setattr(driver.viewer.costs, "known", known)
+
+
+def test_the_mean_distance_is_a_large_number_with_its_unit(
+    driver: Driver, drawn_texts: dict[str, float]
+) -> None:
+    driver.run_frames(2)
+    drawn_texts.clear()
+    driver.window.chart.draw(driver.window.screen)
+    value = driver.session.timeline.panes[0].distance_curve.values[-1]
+    assert drawn_texts[f"{value:.3f} m"] == HEADLINE_TEXT_PX
+
+
+@pytest.mark.parametrize("pane_count", [1, 2])
+def test_the_area_that_is_cut_off_is_written_next_to_the_number(
+    driver: Driver, drawn_texts: dict[str, float], monkeypatch: pytest.MonkeyPatch, pane_count: int
+) -> None:
+    if pane_count > 1:
+        driver.session.add_pane(RPF)
+    driver.run_frames(3)
+    set_cut_off_area(driver, monkeypatch, 2.44)
+    drawn_texts.clear()
+    driver.window.chart.draw(driver.window.screen)
+    assert "(2.4 m² cut off)" in drawn_texts
+    set_cut_off_area(driver, monkeypatch, 0.9 * MIN_UNCOVERED_AREA_M2)
+    drawn_texts.clear()
+    driver.window.chart.draw(driver.window.screen)
+    assert not any("cut off" in text for text in drawn_texts)
+    assert describe_cut_off(driver.viewer, driver.session.timeline.panes[0]) == ""
+
+
+def test_a_branch_is_described_under_the_pointer_only(driver: Driver) -> None:
+    driver.session.playback.is_playing = True
+    driver.run_frames(60)
+    driver.viewer.attempt(lambda: driver.session.fail_robot(1))
+    driver.run_frames(60)
+    driver.press_key("ctrl+z")
+    driver.session.playback.is_playing = False
+    driver.run_frames(10)
+    chart = driver.window.chart
+    chart.draw(driver.window.screen)
+    assert chart.ghosts
+    x, y = chart.ghosts[0].points[-2]
+    pixel = (round(x), round(y + driver.window.layout.chart.top))
+    description = chart._describe_ghost(pixel)
+    assert "RAPF" in description
+    assert "Click" in description
+    assert chart._describe_ghost((pixel[0], pixel[1] - 40)) == ""
