@@ -43,7 +43,7 @@ def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_captions_show_the_values_of_the_chart_with_their_time(
     tmp_path: Path, drawn_texts: list[str]
 ) -> None:
-    with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+    with open_viewer(tmp_path, RAPF, ControllerChoice("rpf"), size=(1280, 720)) as driver:
         session = driver.session
         driver.run_frames(2)
         # The curves get no further values.
