@@ -10,6 +10,7 @@ import pytest
 from driven_window import open_viewer
 from hypothesis import given
 from hypothesis import strategies as st
+from sample_sessions import RAPF
 
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.commands import help_page
@@ -76,14 +77,15 @@ def test_a_long_message_is_wrapped_within_the_arena(tmp_path: Path) -> None:
         driver.run_frames(1)
         after = copy_pixels(driver.window.screen)
         rows, columns = np.nonzero((after != before).any(axis=2))
-        _, _, width, height = driver.window.layout.arena
-        assert columns.min() > 0
-        assert columns.max() < width
-        assert rows.max() < height
+        left, top, width, height = driver.window.layout.arena
+        assert columns.min() > left
+        assert columns.max() < left + width
+        assert rows.min() > top
+        assert rows.max() < top + height
 
 
 def test_a_long_report_is_scrolled_to_its_end_by_the_wheel(tmp_path: Path) -> None:
-    with open_viewer(tmp_path) as driver:
+    with open_viewer(tmp_path, RAPF, RAPF, RAPF, RAPF) as driver:
         window = driver.window
         driver.viewer.inspection.selected = 1
         window.panel.show_tab("robot")

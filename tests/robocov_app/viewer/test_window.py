@@ -275,11 +275,14 @@ def test_windows_of_any_size_can_be_used(size: tuple[int, int], panes: int, tmp_
         assert driver.viewer.selected_robot == 1
         if size[0] >= 900:
             driver.open_tab("parameters")
+            driver.type_into("k_rep", "1")
+            driver.press_key("return")
             driver.push_button("reset:k_rep")
 
 
 def test_long_pages_scroll_by_wheel_and_bar(driver: Driver) -> None:
-    assert driver.get_widget("entry", "team.radius").rect.height == 0  # out of sight
+    driver.window.draw()
+    assert driver.find_rect("entry", "team.radius").height == 0  # out of sight
     for _ in range(12):
         driver.turn_wheel(740, 500, -3)
     driver.type_into("team.radius", "0.12")
@@ -287,7 +290,8 @@ def test_long_pages_scroll_by_wheel_and_bar(driver: Driver) -> None:
     assert driver.session.timeline.panes[0].setup.properties.radius == 0.12
     bar = driver.get_widget("bar", "parameters:rapf").rect
     driver.drag(bar.center, (bar.centerx, bar.centery - 200))
-    assert driver.get_widget("entry", "team.radius").rect.height == 0
+    driver.window.draw()
+    assert driver.find_rect("entry", "team.radius").height == 0
     camera = driver.window.canvas._painters[0].camera
     driver.turn_wheel(740, 500, -3)
     assert driver.window.canvas._painters[0].camera == camera
