@@ -39,7 +39,7 @@ from robocov_app.report.pictures import PictureFrame, draw_map
 from robocov_app.report.replay import build_replay_html, read_asset
 from robocov_app.report.theme_css import build_theme_rules
 from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost
-from robocov_app.web.live import LiveWindow
+from robocov_app.web.notebook_window import LiveWindow
 
 if TYPE_CHECKING:
     # Pages of HTML need no matplotlib.

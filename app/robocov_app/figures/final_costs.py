@@ -8,9 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from robocov.arrays import Array
-from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TEXT, get_figure, set_value_axis, to_plot_color
-from robocov_app.figures.rows import (
+from robocov_app.figures.dot_rows import (
     HALF_BOX_HEIGHT,
     MIN_BOX_VALUES,
     arrange_rows,
@@ -20,6 +18,8 @@ from robocov_app.figures.rows import (
     draw_row_points,
     label_rows,
 )
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import TEXT, get_figure, set_value_axis, to_plot_color
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 

@@ -9,15 +9,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from robocov.arrays import Array
-from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import get_figure, to_plot_color
-from robocov_app.figures.rows import (
+from robocov_app.figures.dot_rows import (
     arrange_rows,
     create_row_axes,
     draw_row_median,
     draw_row_points,
     label_rows,
 )
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import get_figure, to_plot_color
 from robocov_app.figures.statistics import Interval
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme

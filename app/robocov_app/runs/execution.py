@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from robocov.metrics import CostHistory, compute_cost_history, select_sampled_mo
 from robocov.metrics.cost_history import DEFAULT_RATE_HZ
 from robocov.record import Record
 from robocov.scenario import Scenario
+from robocov_app.runs.cost_table import build_cost_table
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import replace_non_finite, write_csv
@@ -147,28 +147,3 @@ def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     """
     run.record.save(folder, replace_non_finite(run.summary), lattice=lattice)
     write_csv(folder / COST_FILE, *build_cost_table(run.history))
-
-
-def build_cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, ...]]]:
-    """Build the content of ``cost.csv``.
-
-    Parameters
-    ----------
-    history : CostHistory
-
-    Returns
-    -------
-    header : str
-        Names of the columns, with a column of mean times only if some robots are faster than others.
-    rows : iterator of tuple of float
-    """
-    columns = {
-        "time_s": history.time,
-        "mean_distance_m": history.mean_distance,
-        "cost_m3": history.cost,
-        "uncovered_area_m2": history.uncovered_area,
-    }
-    if history.mean_time is not None:
-        columns["mean_time_s"] = history.mean_time
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return ",".join(columns), rows

@@ -26,7 +26,7 @@ from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Channel
-from robocov_app.runs.execution import build_cost_table
+from robocov_app.runs.cost_table import build_cost_table
 from robocov_app.sweep.controller_files import source_to_json
 from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite

@@ -7,7 +7,7 @@ from called import SHORT, answer, complaint
 
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs.execution import build_cost_table
+from robocov_app.runs.cost_table import build_cost_table
 from robocov_app.runs.saved_runs import load_saved_runs
 
 TEAM = """

@@ -13,7 +13,7 @@ import robocov
 from robocov_app.notebook import show
 from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.session import Session
-from robocov_app.web import live
+from robocov_app.web import notebook_window
 
 pytest.importorskip("websockets")
 
@@ -93,7 +93,7 @@ def test_without_the_extra_it_is_a_replay(monkeypatch):
 
 
 def test_behind_a_hub_the_cell_asks_the_hub(monkeypatch):
-    window = live.LiveWindow.__new__(live.LiveWindow)
+    window = notebook_window.LiveWindow.__new__(notebook_window.LiveWindow)
     window.link, window.height = "http://127.0.0.1:4567/?token=abc", 500
     monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/ada/")
     assert 'src="/user/ada/proxy/4567/?token=abc"' in window._repr_html_()

@@ -11,7 +11,8 @@ from robocov.metrics import summarize
 from robocov.record import Record
 from robocov_app.runs.artifacts import save_comparison, save_figures, start_comparison
 from robocov_app.runs.cost import build_cost
-from robocov_app.runs.execution import Run, build_cost_table, evaluate_record, save_numbers
+from robocov_app.runs.cost_table import build_cost_table
+from robocov_app.runs.execution import Run, evaluate_record, save_numbers
 from robocov_app.runs.saved_runs import name_folders
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.runs.video import get_video_name, write_frames_and_video

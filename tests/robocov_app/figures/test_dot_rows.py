@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 
+from robocov_app.figures.dot_rows import MAX_POINTS, arrange_rows, create_row_axes
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.final_costs import draw_box
 from robocov_app.figures.pairs import set_ratio_axis
-from robocov_app.figures.rows import MAX_POINTS, arrange_rows, create_row_axes
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 
