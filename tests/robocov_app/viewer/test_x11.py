@@ -15,6 +15,7 @@ from called import COMMAND
 from x11_hands import MARKS, Hands, read_errors, run_window, start_display, wait_for_end
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
+from robocov_app.toolkit.window.layout import BAR_HEIGHT_PX
 
 pytestmark = MARKS
 
@@ -73,7 +74,7 @@ def test_keys_and_mouse_reach_the_window_until_it_is_closed(display: str, tmp_pa
             return not np.array_equal(picture[track], played[track])
 
         one_robot = hands.wait_for_picture(has_restarted, "time 0")
-        hands.move(SIZE[0] - 234, 74)  # the field of the number of robots
+        hands.move(SIZE[0] - 234, 74 + BAR_HEIGHT_PX)  # the field of the number of robots
         hands.run_xdotool("click", 1)
         hands.run_xdotool("type", "--delay", "20", "3")
         hands.press("Return")
