@@ -28,7 +28,7 @@ from robocov_app.toolkit.widgets.page import Page, Widget
 # Lengths in pixels at scale 1.
 _MAX_BUTTON_HEIGHT_PX = 32.0
 _LINE_PX = TEXT_PX + 5
-_BUTTON_MARGIN_PX = 3
+_BUTTON_MARGIN_PX = 1
 _OPTION_MARGIN_PX = 8
 _NOTE_GAP_PX = 12
 _TABS_GAP_PX = 8
