@@ -29,7 +29,7 @@ class DrawingBackend(Protocol):
     render_environment_png, render_record_png, render_comparison_png : callable
         Return the image, bytes, that a notebook displays if it displays no HTML.
     show : callable
-        ``show(map, **options)`` returns what a notebook displays for `robocov.show`.
+        ``show(map, **options)`` returns the object that a notebook displays for `robocov.show`.
     """
 
     plot_environment: Callable[..., Any]

@@ -133,7 +133,7 @@ def _generate_decisions(replay: Replay) -> Iterator[Any]:
 
 
 class GuardedProcesses:
-    """Starts guarded processes, each of which answers a single question and receives nothing else."""
+    """Starts guarded processes that each answer a single question and receive nothing else."""
 
     def __init__(self) -> None:
         self._processes: set[subprocess.Popen[bytes]] = set()

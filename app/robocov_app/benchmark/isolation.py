@@ -6,7 +6,7 @@ robot. The simulation depends on the controller only through its decisions. Ther
 messages are the same in all steps, bit for bit, the run would have been the same if each of these robots had
 been controlled by a separate process.
 
-What a process receives depends on the information that the controller declares:
+The input of a process depends on the information that the controller declares:
 
 ==========  ===========================================================================================
 own         The state and measurements of one robot, the positions of the robots that it hears, and the

@@ -84,7 +84,7 @@ def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator)
     Parameters
     ----------
     families : sequence of str
-        Names of families, of which those without a generator are ignored.
+        Names of families; those without a generator are ignored.
     count : int
         Number of maps; fewer are drawn if there are fewer families.
     rng : Generator

@@ -409,7 +409,7 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     Parameters
     ----------
     points : sequence of (float, float)
-        Pairs of values, of which smaller ones are better.
+        Pairs of values; smaller values are better.
 
     Returns
     -------

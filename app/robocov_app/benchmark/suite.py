@@ -129,7 +129,7 @@ TRACKS: Mapping[str, Track] = {
     "one-robot": Track("one robot", robots=1),
     "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"]),
 }
-"""All tracks by name, of which only `RATED_TRACKS` count."""
+"""All tracks by name; only `RATED_TRACKS` count."""
 RATED_TRACKS = tuple(name for name in TRACKS if name != "tuning")
 QUICK_TRACKS = ("ideal", "short-range")
 """Tracks of ``--quick``, with the first map of each family and the first seed."""

@@ -1,6 +1,6 @@
 """Verifying a result of the benchmark: runs are repeated, robots are isolated, and new maps are tried.
 
-All choices follow from a seed that the verifier draws, so that nobody can prepare for them.
+All choices follow from a seed that the verifier draws, so that they cannot be anticipated.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ class Verification:
         return math.comb(self.rows - changed, self.runs) / math.comb(self.rows, self.runs)
 
     def describe(self) -> list[str]:
-        """Return sentences on what was checked."""
+        """Return sentences that describe the checks."""
         lines = [
             f"{self.runs} of {format_count(self.rows, 'run')} repeated. {self._describe_missing()}",
             *self._describe_isolation(),
@@ -228,8 +228,8 @@ def verify_result(
 
     1. The gaps of all rows are recomputed, and missing rows are found.
     2. A sample of the runs is repeated, and must give the same figures, bit for bit.
-    3. In these runs, the decisions of some robots are repeated in separate processes, each of which receives
-       only the observations of one robot (`robocov_app.benchmark.isolation`).
+    3. In these runs, the decisions of some robots are repeated in separate processes that each receive only
+       the observations of one robot (`robocov_app.benchmark.isolation`).
     4. The controller runs on new maps, where it must not be clearly worse than on the maps of the suite
        (`robocov_app.benchmark.new_maps`).
 

@@ -129,7 +129,7 @@ def command(options: Arguments) -> int:
 
 
 def _open_start_page(options: Arguments) -> int:
-    """Show the start page, and then what the user has chosen there; return the exit status."""
+    """Show the start page and open the user's choice; return the exit status."""
     from robocov.errors import RobocovError
     from robocov_app.viewer.start.launch import StartLauncher
 

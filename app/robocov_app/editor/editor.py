@@ -197,7 +197,7 @@ class Editor(EditorContext):
         self._handle_change()
 
     def choose_tool(self, name: str, *, shows_hint: bool = True) -> None:
-        """Choose a tool by name; this cancels what the current tool is doing."""
+        """Choose a tool by name; this cancels the current tool's action."""
         self.tool.cancel(self)
         self.toolbox.current = self.toolbox.by_name[name]
         self.typed = ""

@@ -39,7 +39,7 @@ class ReferenceQuery:
     lattice : int
         Number of sites along a side of the lattice on which the cost is computed.
     restarts : int
-        Number of descents, of which the best one is used.
+        Number of descents; the best one is used.
     seed : int
     """
 

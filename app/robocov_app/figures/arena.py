@@ -52,7 +52,7 @@ _CELL_EDGE_WIDTH_PT = 0.8
 _MAX_RING_WIDTH_PT = 1.1
 _MAX_RING_WIDTH_FRACTION = 0.25
 """Maximum width of the ring of a robot, as a fraction of its radius."""
-# Order of what is drawn, from the lowest to the topmost.
+# Drawing order, from the bottom to the top.
 _CELLS_ORDER = 1
 _DENSITY_ORDER = 1.5
 _OBSTACLES_ORDER = 2
@@ -292,7 +292,7 @@ def _draw_final_positions(
 def _draw_headings(
     axes: Axes, record: Record, steering: Array, radii: Mapping[int, float], theme: Theme
 ) -> None:
-    """Draw a triangle beside the disc of each working unicycle, pointing in its heading.
+    """Draw a triangle next to the disc of each working unicycle, pointing along its heading.
 
     The first column of `steering`, (n, ...), is the heading, rad. `radii` are those of discs, points.
     """

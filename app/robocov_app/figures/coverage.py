@@ -415,7 +415,7 @@ def _draw_curves(
     box: PageBox,
     distance_label: str,
 ) -> None:
-    """Draw the mean distances and, if there are any, the mean times: below or, in a wide box, beside them."""
+    """Draw the mean distances and any mean times, stacked or, in a wide box, side by side."""
     left, top, width, height = box
     if not times:
         _draw_curve_panel(page, curves, box, distance_label, "m")

@@ -54,7 +54,7 @@ _HALF_TICK = 4
 """Half the height of the ticks at the ends of the scale bar."""
 _SCALE_BAR_LABEL_GAP = 8
 _MIN_SCALE_BAR_PX = 20.0
-"""Minimum length of the longest scale bar, whatever the scale."""
+"""Minimum length of the longest scale bar, regardless of the scale."""
 
 
 def to_plot_color(color: Color) -> PlotColor:

@@ -5,9 +5,9 @@ They are in `vector` (SVG, DXF, well-known text, HouseExpo, rings), `raster` (RO
 Reading a file gives a `ForeignMap`: its free space. `geometry` converts it to an `Environment`, in the same
 way for all formats.
 
-`files` reads files safely, and `colors` assigns roles to the colors of pictures and drawings. `options` holds
-the options that users give, and `reports` what they get to see; `preview` plots an import, and `unsupported`
-recognizes files that no format reads.
+`files` reads files safely, and `colors` assigns roles to the colors of pictures and drawings. `options`
+defines the options of imports and exports, and `reports` their results; `preview` plots an import, and
+`unsupported` recognizes files that no format reads.
 """
 
 from robocov_app.formats.foreign_map import ForeignMap

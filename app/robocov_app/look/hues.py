@@ -1,6 +1,6 @@
 """Hues of robots and of their cells, and the colors of trajectories.
 
-In a small team each robot has its own hue. Nobody can tell more than nine hues apart, so the cells of a
+In a small team each robot has its own hue. Viewers cannot tell more than nine hues apart, so the cells of a
 larger team are colored like the countries of a map: only cells that share an edge must differ.
 """
 

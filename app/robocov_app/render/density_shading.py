@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov_app.look.theme import Theme
 
 _RANGE_SAMPLES = 96
-"""Number of samples along the longer side of a map, of which the range of a density is taken."""
+"""Number of samples along the longer side of a map for the range of a density."""
 Bounds: TypeAlias = tuple[float, float, float, float]
 """Low x, low y, high x and high y, m."""
 

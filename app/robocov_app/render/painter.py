@@ -132,7 +132,7 @@ class Painter:
     def camera(self) -> Camera:
         """The camera; set it to zoom and pan.
 
-        Its view is what the strips above and below and the color scale leave of the picture.
+        Its view is the picture without the strips above and below and without the color scale.
         """
         view = self._compute_view()
         if self._camera is not None:

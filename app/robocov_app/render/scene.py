@@ -42,7 +42,7 @@ def are_centroids(goals: Array, centroids: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The content of a picture at one time; what is None or empty is not drawn.
+    """The content of a picture at one time; values that are None or empty are not drawn.
 
     Attributes
     ----------

@@ -89,7 +89,7 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
     simulation = scenario.build_simulation()
     redirected: AbstractContextManager[Any] = nullcontext()
     if settings.hide_progress:
-        # What a user's controller prints must not be mixed with the JSON on standard output.
+        # The output of a user's controller must not be mixed with the JSON on standard output.
         redirected = redirect_stdout(sys.stderr)
     title = f"simulating {simulation.controller.label}"
     with redirected, show_progress(title, scenario.steps, quiet=settings.hide_progress) as update:

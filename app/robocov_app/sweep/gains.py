@@ -51,8 +51,8 @@ def build_gains(
     ----------
     controller_class : type
     specification : mapping, sequence of mapping, or Gains
-        Either a mapping of gains to a value, a list of values or a `Range`, of which every combination is
-        tried; or a list of sets of gains. Gains that are not mentioned have their defaults.
+        Either a mapping of gains to a value, a list of values or a `Range` (every combination is tried),
+        or a list of sets of gains. Gains that are not mentioned have their defaults.
     sampling : Sampling or None
         How ranges are sampled.
     path : tuple of str and int

@@ -26,7 +26,7 @@ _KILLED_STATUS = -getattr(signal, "SIGKILL", 9)
 
 
 class LocalPool(Executor):
-    """Processes on this machine, each of which executes one task at a time and is replaced when it ends.
+    """Processes on this machine that each execute one task at a time and are replaced when they end.
 
     Parameters
     ----------

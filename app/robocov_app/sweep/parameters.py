@@ -207,7 +207,7 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
     Parameters
     ----------
     parameters : mapping of str to float, str or None
-        Values of parameters, of which only the conditions are used.
+        Values of parameters; only the conditions are used.
     seed : int
         Seed of noise, message loss and failures.
     robots : int

@@ -1,4 +1,4 @@
-"""Tasks of a sweep, each of which contains everything that one run needs."""
+"""Tasks of a sweep; each contains everything that one run needs."""
 
 from __future__ import annotations
 

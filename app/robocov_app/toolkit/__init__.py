@@ -5,5 +5,5 @@
 - `widgets`: buttons, sliders and fields of a panel
 - `dialogs`: questions and choices
 - `tools`: gestures of the mouse, snapping and zooming
-- `panel`, `overlay`: the panel beside a map, and drawings over the window
+- `panel`, `overlay`: the panel next to a map, and drawings over the window
 """

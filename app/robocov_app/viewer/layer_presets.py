@@ -44,7 +44,7 @@ class LayerPreset:
     title : str
         Name in the window.
     description : str
-        What it shows, as a noun phrase.
+        Its content, as a noun phrase.
     layers : frozenset of str
         Names of its layers.
     """
@@ -79,7 +79,7 @@ LAYER_PRESETS = (
     LayerPreset(
         "print",
         "Print",
-        "What a figure in an article needs, without a grid",
+        "The layers of a figure for an article, without a grid",
         _BASE_LAYERS | {"cells", "density", "trajectories", "starts"},
     ),
 )

@@ -72,11 +72,11 @@ class Presenter(ViewerModel):
         self.show_message(f"{self.tool.title}: {self.tool.hint}")
 
     def finish_drawing(self) -> str | None:
-        """Complete what the tool is drawing; return a message."""
+        """Complete the tool's drawing; return a message."""
         return self.tool.finish(self.session)
 
     def cancel(self) -> None:
-        """Discard what the tool is drawing; if there is nothing to discard, switch to the hand."""
+        """Discard the tool's drawing; if there is nothing to discard, switch to the hand."""
         if not self.tool.cancel(self.session) and self.tool is not self.toolbox.hand:
             self.toolbox.current = self.toolbox.hand
 

@@ -16,7 +16,7 @@ SERVED_FPS = 60
 MAX_INDIVIDUAL_PAGES = 3
 """With at most this many other pages, each gets every frame that it can show."""
 SHARED_FRAME_INTERVAL_S = 1 / 15
-"""Time between frames if there are more pages. They share frames, each of which is encoded once."""
+"""Time between frames if there are more pages. They share frames, which are encoded only once."""
 _MIN_TIMEOUT_S = 0.001
 
 

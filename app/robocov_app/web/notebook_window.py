@@ -52,9 +52,9 @@ class LiveWindow:
         import_optional("websockets", "web")
         self.height = height
         command = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
-        # Running the cell again creates the window anew, so drafts are not needed.
+        # Running the cell again creates a new window, so drafts are not needed.
         environment = {**os.environ, DRAFTS: ""}
-        # Errors go to a file: a full pipe that nobody reads would stop the process.
+        # Errors go to a file: a full pipe without a reader would block the process.
         with tempfile.TemporaryFile() as errors:
             self._process = subprocess.Popen(
                 command,

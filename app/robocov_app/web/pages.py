@@ -237,7 +237,7 @@ class Pages:
         return min(wide, key=lambda page: (not page.may_control, page.number)).settings
 
     def wake(self) -> None:
-        """Wake the senders of all pages, so that they send what has changed."""
+        """Wake the senders of all pages, so that they send the changes."""
         for page in self._pages:
             page.has_updates.set()
 

@@ -10,12 +10,12 @@ conditions. For each receiver independently, a message is either lost or arrives
   at the earliest. A long message is sent in packets of at most `MAX_PACKET_BYTES`. It is lost as soon as one
   of its packets is lost.
 
-The bandwidth limits the bytes per second that a robot sends. What exceeds it waits in a queue at the sender,
+The bandwidth limits the bytes per second that a robot sends. Excess messages wait in a queue at the sender,
 in order. A position does not wait in this queue: it is sent next, or replaced by a newer one. While messages
 wait, positions and messages take turns.
 
-The state of the communication is an `Inbox`: what has arrived, is in flight or waits. It is part of the state
-of a simulation, so a copy continues with the same messages.
+The state of the communication is an `Inbox`: messages that have arrived, are in flight or wait. It is part
+of the state of a simulation, so a copy continues with the same messages.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Outbox:
     credits : (n,) array, bytes
         Bytes that each robot may send now; negative after a message that was larger.
     sent_position : (n,) bool array
-        Whether the last thing that each robot sent was its position.
+        Whether the last transmission of each robot was its position.
     """
 
     queues: tuple[tuple[Message, ...], ...]

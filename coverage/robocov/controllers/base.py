@@ -57,7 +57,7 @@ class Controller(Protocol):
     See Also
     --------
     IndividualController : A controller of a single robot, which is easier to write.
-    Observations : What the robots know.
+    Observations : The information available to the robots.
     gain : Declare a gain.
 
     Examples
@@ -227,7 +227,7 @@ class BaseController:
         validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> Any:
-        """Return the initial memory of the robots, each of which knows only its own body and limits.
+        """Return the initial memory of the robots. Each robot knows only its own body and limits.
 
         Parameters
         ----------

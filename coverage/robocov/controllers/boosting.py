@@ -211,8 +211,8 @@ class Boosting(BaseController):
     - ``neighbours``: the weight w; in addition, each neighbor in range repels with κ / d^γ
 
     A robot follows it until it comes to rest, or for at most `patience`. A robot that has returned on its
-    trail is not boosted again, so the result is no worse than without boosts, apart from what the other
-    robots have changed in the meantime.
+    trail is not boosted again, so the result is no worse than without boosts, apart from changes by
+    other robots in the meantime.
 
     The implementation is based on the abstracts of the paper (arXiv 1409.0776) and of its sequel by Welikala
     and Cassandras (arXiv 1903.04133), and on summaries, not on the full texts. It differs from the papers as

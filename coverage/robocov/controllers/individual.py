@@ -100,14 +100,14 @@ class OwnView:
 
 @runtime_checkable
 class IndividualController(Protocol):
-    """A controller of a single robot, with a method that computes a force from what the robot knows.
+    """A controller of a single robot, with a method that computes a force from the robot's knowledge.
 
     An optional method ``begin(number, team)`` returns the initial memory of a robot; numbers start from 0.
     The controller reads the memory from ``own.memory``, and may assign a new value to it in each step.
 
     See Also
     --------
-    OwnView : What the robot knows.
+    OwnView : The knowledge of a single robot.
     IndividualControllerAdapter : Calls the controller for each robot of a team.
     Controller : A controller of a whole team, which is faster.
 
@@ -135,7 +135,7 @@ class IndividualController(Protocol):
         Parameters
         ----------
         own : OwnView
-            What the robot knows.
+            The knowledge of the robot.
 
         Returns
         -------

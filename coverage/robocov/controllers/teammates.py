@@ -84,7 +84,7 @@ class Teammates(NamedTuple):
     def add_reports(
         self, reports: Sequence[Teammates], robot: int, loss_times: Mapping[int, float]
     ) -> Teammates:
-        """Add reports of other robots that are more recent than what the robot knows.
+        """Add reports of other robots that are more recent than the robot's own knowledge.
 
         Parameters
         ----------

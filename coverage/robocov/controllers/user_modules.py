@@ -196,7 +196,7 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
 
 
 def _add_import_folder(folder: Path) -> None:
-    """Let a user's file import modules beside it, as Python does for scripts.
+    """Let a user's file import modules from its folder, as Python does for scripts.
 
     The folder is the last one on ``sys.path``, so that none of its modules replaces an installed one.
     """

@@ -106,7 +106,7 @@ class VoronoiGraphCoverage(SharedMapController):
 
 
 def _fill_vertices(situation: Situation, vertices: Array) -> Array:
-    """Return goals for all robots, (k, 2) m, of which the nearest ones move to all vertices, (v < k, 2) m."""
+    """Return goals for all robots, (k, 2) m: the nearest robots move to the vertices, (v < k, 2) m."""
     goals = situation.positions.copy()
     if not len(vertices):
         return goals

@@ -39,7 +39,7 @@ class _Factor(NamedTuple):
 class _StandardMoments(NamedTuple):
     """Moments of the standard Gaussian over cells, or contributions of edges to them, one array each.
 
-    The second moments are stored as deficits, which are what the integrals along edges yield: the mass minus
+    The second moments are stored as deficits, the direct results of integrals along edges: the mass minus
     the moment xx, the moment xy with its sign reversed, and the mass minus the moment yy.
     """
 

@@ -142,7 +142,7 @@ class WeightedPolygons(Density):
         """The lines across which φ jumps, (j, 5): the edges of the visible parts of the areas.
 
         A row contains x and y of the lower end, then of the upper end, and the change of φ from left to
-        right. Horizontal edges are left out, because there is no strip beside them.
+        right. Horizontal edges are left out, because their strips have no height.
         """
         jumps = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()
@@ -237,7 +237,7 @@ class _Strip(NamedTuple):
 def _add_jumps(
     moments: Array, jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array
 ) -> None:
-    """Add to the moments of cells, (n, 4), what the areas of constant weight add to the background.
+    """Add the contribution of areas of constant weight to the moments of cells, (n, 4).
 
     A jump is a line across which the density changes: an edge of an area. An edge is one of a cell. With the
     change of the density to the right of a jump as its weight, the integral over a cell is the sum, over all

@@ -88,7 +88,7 @@ def read_arrays(file: BinaryIO, where: str, max_bytes: int = MAX_BYTES) -> dict[
 
 def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:
     """Raise ValueError if entries are too large, or have the same name."""
-    # No stream yields more than the size in its entry, whatever it contains.
+    # No stream yields more than the size in its entry, regardless of its content.
     total = sum(entry.file_size for entry in entries)
     if total > min(max_bytes, max(_MIN_RATIO_BYTES, _MAX_COMPRESSION_RATIO * file_size)):
         raise ValueError(f"too many arrays: {total / 1e6:,.0f} MB in a file of {file_size / 1e6:,.1f} MB")

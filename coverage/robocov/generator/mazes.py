@@ -95,7 +95,7 @@ def _choose_grid_shape(request: Request) -> GridShape:
     """Return numbers of columns and rows for about as many nearly square cells as requested."""
 
     def compute_mismatch(shape: GridShape) -> float:
-        """Return how far a grid is from the requested number of cells, and its cells from squares."""
+        """Return the deviation of a grid from the requested number of cells and from square cells."""
         columns, rows = shape
         elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
         return abs(math.log(columns * rows / request.count)) + _ELONGATION_WEIGHT * elongation

@@ -26,7 +26,7 @@ _MAX_CORRIDOR_WIDTH_GAPS = 2.2
 """Smallest and largest width of a corridor."""
 _MIN_CORRIDOR_OFFSET = 0.38
 _MAX_CORRIDOR_OFFSET = 0.62
-"""Smallest and largest part of the space beside a corridor that is on its left or below it."""
+"""Minimum and maximum fraction of the remaining space that is to the left of or below a corridor."""
 _MIN_CORRIDOR_DEPTH_GAPS = 3.0
 """Smallest depth of the rooms on either side of a corridor."""
 _MIN_ROOM_SIDE_GAPS = 1.5

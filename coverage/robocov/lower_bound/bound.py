@@ -260,10 +260,10 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
 class _Dual:
     """The dual problem of one map and team. Costs are weighted sums over the sites, not means.
 
-    Each site c of weight w_c offers a price u_c for a robot, of which the distance d(c, p) to the robot's
-    position p is subtracted. The profit of a position is sum_c w_c max(0, u_c - d(c, p)). For any prices, the
-    dual sum_c w_c u_c - n max_p profit(p) is a lower bound on the cost of every placement of n robots. The
-    largest profit is searched on a table of candidate positions, and then bounded on triangles that cover all
+    Each site c of weight w_c offers a robot at position p its price u_c minus the distance d(c, p). The
+    profit of a position is sum_c w_c max(0, u_c - d(c, p)). For any prices, the dual
+    sum_c w_c u_c - n max_p profit(p) is a lower bound on the cost of every placement of n robots. The largest
+    profit is searched on a table of candidate positions, and then bounded on triangles that cover all
     positions.
 
     Attributes

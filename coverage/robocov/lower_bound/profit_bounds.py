@@ -167,7 +167,7 @@ def _add_site(
     site: int,
     price: float,
 ) -> float:
-    """Add what a site pays to the profit bounds of the vertices; return what it pays at the center.
+    """Add the payment of a site to the profit bounds of the vertices; return its payment at the center.
 
     A site pays weight * max(price - distance, 0) to a robot. For each vertex, the distance is bounded from
     below by tangents of path lengths at the center: of the straight path, if the site is visible from the

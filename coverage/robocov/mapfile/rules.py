@@ -161,7 +161,7 @@ def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
         yield Mistake.at_path(("obstacles",), "no free space is left inside the boundary")
         return
     density = environment.density
-    # Integrals are computed only if necessary, because loading what they need takes a second.
+    # Integrals are computed only if necessary, because loading the necessary modules takes a second.
     if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
         yield Mistake.at_path(("density",), f"{NO_WEIGHT} in the free space")
     for name, start in environment.starts.items():

@@ -32,7 +32,7 @@ class Cells(ABC):
     @property
     @abstractmethod
     def edges(self) -> CellEdges:
-        """The edges of all cells, and what is beyond each."""
+        """The edges of all cells, with the cell beyond each edge."""
 
     @property
     @abstractmethod

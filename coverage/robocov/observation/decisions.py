@@ -37,7 +37,7 @@ class Decision:
 
     See Also
     --------
-    Observations : What a controller decides by.
+    Observations : The input of a controller.
     Controller : The interface of controllers.
 
     Examples

@@ -69,7 +69,7 @@ class Observations:
 
     See Also
     --------
-    Decision : What a controller returns for them.
+    Decision : The output of a controller for observations.
     OwnView : The knowledge of a single robot.
     Simulation.observe : The current observations of a simulation.
 

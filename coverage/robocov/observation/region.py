@@ -1,4 +1,4 @@
-"""The convex region: what the robots know of the outer boundary."""
+"""The convex region: the robots' knowledge of the outer boundary."""
 
 from dataclasses import dataclass, field
 from functools import cached_property

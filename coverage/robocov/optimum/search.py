@@ -249,7 +249,7 @@ def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
 
 
 class _SiteGroups(NamedTuple):
-    """Groups of neighboring sites, each of which is one row of the distance table."""
+    """Groups of neighboring sites; each group is one row of the distance table."""
 
     representatives: IntArray
     """(t,) The site of each group at which distances are measured."""

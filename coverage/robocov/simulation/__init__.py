@@ -3,7 +3,7 @@
 - `simulation`: one run of one team
 - `batch`: many runs of identical teams, advanced together
 - `team_state`: the state from which a run starts or continues
-- `controller_caller`: calls to controllers, with checks of what they return
+- `controller_caller`: calls to controllers, with checks of the returned values
 - `sensing`: observations of robots with exact sensors
 - `checks`: checks of the arguments of simulations
 """

@@ -1,4 +1,4 @@
-"""Calls to controllers: checks of what they return, and errors in users' code reported in one line."""
+"""Calls to controllers: checks of the returned values, and errors in users' code reported in one line."""
 
 from __future__ import annotations
 

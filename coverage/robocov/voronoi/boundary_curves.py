@@ -527,7 +527,7 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
 def _find_parameter(curve: Array, x: float, y: float) -> float:
     """Return the parameter t of a point on a curve: the inverse of `_evaluate`.
 
-    The point may be beside the curve by rounding.
+    The point may lie off the curve because of rounding.
     """
     # With the formula of q(t), both quotients below are equal to t. The larger divisor is more accurate.
     curvature = 2.0 * curve[_COEFFICIENT]

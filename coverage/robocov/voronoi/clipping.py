@@ -299,7 +299,7 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 @inlined_kernel
 def _compute_excess(polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Compute how far each vertex of a polygon is beyond a bisector, and write it to the column `_EXCESS`.
+    """Compute the excess of each vertex of a polygon over a bisector; write it to the column `_EXCESS`.
 
     The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
     is positive if q is nearer to the neighbor, zero on the bisector, and proportional to the distance from

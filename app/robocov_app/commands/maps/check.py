@@ -183,7 +183,7 @@ def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None 
 
 
 def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report, with what has changed since a previous one marked.
+    """Yield the lines of a report, with the changes since a previous one marked.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved to the center of 
 BADGE_REACH_PX = 10
 SCALE_BAR_LABEL_PX = 90
 
-MAX_PAN_FRACTION = 0.45  # of the view: how far the map can be moved from its center
+MAX_PAN_FRACTION = 0.45  # of the view: maximum shift of the map from its center
 EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # visible part of an empty sheet
 MIN_VIEW_M = 0.2  # minimum width and height of a fitted view
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
@@ -135,7 +135,7 @@ class EditorCanvas:
         self._legend_key = key
 
     def _build_legend_entries(self) -> list[LegendEntry]:
-        """Build the entries for what the sheet currently shows, including the range of the density."""
+        """Build the entries for the current content of the sheet, including the range of the density."""
         editor = self.editor
         sketch = editor.sketch
         has_excess = self._has_hull_excess.get(

@@ -114,7 +114,7 @@ def draw_hatch_pattern(box: Rect, color: Color, scale: float, strength: float = 
     step = max(MIN_HATCH_STEP_PX, round(HATCH_STEP_PX * scale))
     thickness = max(1, round(LINE_WIDTH_PX * scale))
     line_color = (*color, round(_LINE_OPACITY * strength))
-    # The lines have fixed positions in the window, whatever the position of the box.
+    # The lines have fixed positions in the window, regardless of the position of the box.
     first = -((box.left + box.top) % step)
     for x in range(first, box.width + box.height, step):
         pygame.draw.line(image, line_color, (x, 0), (x - box.height, box.height), thickness)

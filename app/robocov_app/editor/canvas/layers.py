@@ -284,7 +284,7 @@ class Problems:
 
 
 class Guides:
-    """Guides that show what the cursor has snapped to."""
+    """Guides that show the snap targets of the cursor."""
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the guides."""

@@ -14,7 +14,7 @@ from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.surface_cache import LatestValue
 
 MAX_OUTLINES_PER_OBSTACLE = 4  # cached outlines; more than one, because undo may restore earlier obstacles
-SPARE_OUTLINES = 1000  # cached outlines in addition, whatever the number of obstacles
+SPARE_OUTLINES = 1000  # additional cached outlines, regardless of the number of obstacles
 MIN_NAME_GAIN = 1.2  # a position for a name replaces an earlier one only if it is wider by this factor
 
 

@@ -211,7 +211,7 @@ def _draw_square(
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
-    """Draw the guides of a snap as dashed lines, and write what the cursor has snapped to next to it."""
+    """Draw the guides of a snap as dashed lines, and name the snap targets next to the cursor."""
     color = canvas.theme.forces["repulsion_obstacle"]
     labels: list[str] = []
     end: Point | None = None

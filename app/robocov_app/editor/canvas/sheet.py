@@ -74,7 +74,7 @@ class Sheet:
         self._hull_excess: LatestValue[shapely.Geometry] = LatestValue()
 
     def draw(self, view: View, sketch: Sketch, hidden_keys: frozenset[int] = frozenset()) -> Surface:
-        """Draw the sheet; redraw only what has changed since the last call.
+        """Draw the sheet, redrawing only the parts that have changed since the last call.
 
         Parameters
         ----------
@@ -378,7 +378,7 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
 
 
 def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
-    """Fill an obstacle on a separate surface, so that whatever is below is visible through its holes."""
+    """Fill an obstacle on a separate surface, so that the content below shows through its holes."""
     clip = canvas.surface.get_clip()
     layer = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
     for ring, is_outer in zip(outline.rings, outline.outer, strict=True):

@@ -86,7 +86,7 @@ def write_sketch(
     expected : FileVersion, optional
         Version of the file that may be replaced. By default, no file may exist.
     overwrites : bool
-        Whether to replace the file whatever its version.
+        Whether to replace the file regardless of its version.
 
     Returns
     -------

@@ -242,7 +242,7 @@ class MeasurementCodec(Codec):
 
 
 class SketchMeasurer:
-    """Service that measures sketches, of which it receives only the changes."""
+    """Service that measures sketches and receives only their changes."""
 
     failure_message = "the map could not be measured"
 

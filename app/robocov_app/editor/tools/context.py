@@ -92,7 +92,7 @@ class EditorContext(WindowModel):
         unsnapped : Point
             Position of the pointer, m.
         reach : float
-            Distance within which the pointer picks things, m.
+            Distance within which the pointer picks objects, m.
         origin : Point, optional
             Point at which angles are measured, m.
         more : sequence of Point

@@ -74,7 +74,7 @@ class Drag:
         raise MapError(f"“{text}”: this tool takes no typed value")
 
     def build_overlay(self) -> EditorToolOverlay:
-        """Return what the drag shows on the sheet."""
+        """Build the overlay that the drag shows on the sheet."""
         return EditorToolOverlay(label=self.label, dragged_image=self.dragged_image, shows_handles=True)
 
     def end(self) -> None:
@@ -328,7 +328,7 @@ class BoxDrag(Drag):
         self._end = event.unsnapped_point
 
     def find_selection(self) -> Selection:
-        """Return what the box selects: objects or, if it contains only some of the shown vertices, these."""
+        """Return the objects in the box or, if it contains only some of the shown vertices, those."""
         sketch = self.context.sketch
         owners = self.context.vertex_owners
         inside = find_in_box(sketch, self._start, self._end, includes_partial=self._selects_partial)

@@ -22,7 +22,7 @@ CLOSING_FRACTION = 0.7  # of the pointer's reach: a click this close to the firs
 
 
 class LineTool(EditorTool, ABC):
-    """Draws point by point or with a single drag; subclasses define what the points become.
+    """Draws point by point or with a single drag; subclasses turn the points into an object.
 
     Attributes
     ----------

@@ -114,7 +114,7 @@ class SelectTool(EditorTool):
             self.guides = self.drag.guides
 
     def _start_drag(self, context: EditorContext, pressed: EditorPointerEvent) -> Drag:
-        """Return the drag for what was pressed: a handle, a selected object, or an empty place."""
+        """Return the drag that a press starts: of a handle, a selected object, or a selection box."""
         handle = self._handle
         objects = context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:

@@ -119,5 +119,5 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         raise MapError(f"“{text}”: this tool takes no typed value")
 
     def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
-        """Return what the tool shows on the sheet."""
+        """Build the overlay that the tool shows on the sheet."""
         return EditorToolOverlay()

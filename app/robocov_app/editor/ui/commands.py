@@ -290,7 +290,7 @@ def _build_grid_group(editor: Editor) -> EditorCommandGroup:
 def _build_view_group(
     editor: Editor, canvas: EditorCanvas, window: EditorWindowActions
 ) -> EditorCommandGroup:
-    """Build the group of commands that change the view, the window, or what is shown."""
+    """Build the group of commands for the view, the window and the display of problems."""
 
     def fit_selection() -> None:
         canvas.fit(editor.selection)

@@ -113,7 +113,7 @@ class ImportForm:
         ui.edit = TextEdit.select_all(self.texts.get(first, ""))
 
     def _show_option(self, ui: Ui, option: ImportOption) -> None:
-        """Show the label of an option, and its drop-down list or text field; apply what the user enters."""
+        """Show the label of an option, and its drop-down list or text field; apply the user's input."""
         name = option.name
         present = self.texts.get(name, option.default)
         style = "bold" if name in self.texts else ""

@@ -150,7 +150,7 @@ def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, co
     if not len(polygon.interiors):
         pygame.draw.polygon(surface, color, outline.tolist())
         return
-    # The polygon is drawn on a separate layer, so that whatever is below is visible through the holes.
+    # The polygon is drawn on a separate layer, so that the content below shows through the holes.
     low = np.floor(outline.min(axis=0))
     high = np.ceil(outline.max(axis=0))
     box = Rect(low.tolist(), (high - low + 1).tolist()).clip(surface.get_clip())

@@ -50,7 +50,7 @@ class ImportOption:
     default : str
         Text that is shown while the option has its default value.
     help : str
-        Help text: what the option does.
+        Help text that describes the effect of the option.
     """
 
     name: str
@@ -153,7 +153,7 @@ class Imported:
     environment : Environment
         The map.
     report : ImportReport
-        What was read, changed and left out.
+        Items that were read, changed and left out.
     comparison : ImportComparison
         The free space before and after the import.
     sheet : ColorSheet or None

@@ -1,4 +1,4 @@
-"""The panel of the editor: buttons, tools, and pages, one of which depends on the selection."""
+"""The panel of the editor: buttons, tools, and pages, including one for the selection."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -488,7 +488,7 @@ class EditorPanel(CommandPanel):
                     self._select(Selection(vertices=frozenset({vertex})), previous)
 
     def _select(self, clicked: Selection, previous: Selection) -> None:
-        """Select what was clicked in a list; with Shift, add it to the previous selection or remove it."""
+        """Select the clicked objects of a list; with Shift, add them to the selection or remove them."""
         if pygame.key.get_mods() & pygame.KMOD_SHIFT:
             clicked = previous.toggle(clicked)
         self.editor.select(clicked)

@@ -109,7 +109,7 @@ class EditorPointer(Pointer):
             self._open_menu(event.pos)
 
     def hover(self, event: pygame.event.Event) -> None:
-        """Update the position of the mouse and, while no button is held down, what is under it."""
+        """Update the position of the mouse and, while no button is held down, the problem under it."""
         editor = self.editor
         canvas = self.canvas
         is_over_map = canvas.contains(event.pos)

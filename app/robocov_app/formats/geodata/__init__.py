@@ -1,1 +1,1 @@
-"""Formats with coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and what they share."""
+"""Formats with coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and their shared code."""

@@ -44,7 +44,7 @@ def draw_cursor_path(canvas: Canvas, scene: Scene) -> None:
         return
     theme = canvas.theme
     corners = canvas.camera.to_pixels(path)
-    # The halo separates the path from what it crosses.
+    # The halo sets the path off from the lines and areas that it crosses.
     canvas.draw_outline(corners, theme.background, canvas.scale_width(_HALO_WIDTH_PX), is_closed=False)
     canvas.draw_outline(corners, theme.final, canvas.scale_width(_LINE_WIDTH_PX), is_closed=False)
     _draw_path_start(canvas, float(corners[0, 0]), float(corners[0, 1]))

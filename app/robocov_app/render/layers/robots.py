@@ -194,7 +194,7 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
 def _choose_number_position(
     canvas: Canvas, text: str, *, center: Array, radius: float, centers: Array, radii: Array
 ) -> list[float]:
-    """Choose where the number of a failed robot is written, beside its disc.
+    """Choose the position of the number of a failed robot, next to its disc.
 
     The first side with enough space is chosen, so that numbers do not jump when other robots pass by; if no
     side has enough, the one with the most space.
@@ -269,9 +269,9 @@ build_failed_robots_legend = build_legend(legend.FAILED_ROBOT, _draw_failed_symb
 
 
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
-    """Draw a ring around the selected robot and, if messages can get lost, what it believes.
+    """Draw a ring around the selected robot and, if messages can get lost, its beliefs.
 
-    That is the cell that it computes, and the positions at which it believes itself and its neighbors.
+    These are the cell that it computes, and the positions at which it believes itself and its neighbors.
     """
     assert scene.selected is not None
     robot = scene.selected

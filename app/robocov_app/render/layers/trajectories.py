@@ -75,7 +75,7 @@ class TrajectoriesLayer:
         self._colors = LatestValue[list[Color]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the trail of a scene, of which only new rows are added if the page can be continued."""
+        """Draw the trail of a scene; if the page can be continued, add only the new rows."""
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return

@@ -240,7 +240,7 @@ def build_beyond_contests(
     best : Mapping
         The best gains of the baselines; baselines without an entry keep their defaults.
     papers : sequence of Contender
-        The paper's contenders, of which the strongest run on the unseen maps as well.
+        The paper's contenders; the strongest also run on the unseen maps.
 
     Returns
     -------

@@ -17,7 +17,7 @@ from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, KINDS, UNS
 from robocov_app.sweep.study import StudyMap
 
 START_RADII_M = (0.8, 0.6, 0.45)
-"""Radii of the discs of clustered starts, of which the first that fits is used."""
+"""Radii of the discs of clustered starts; the first that fits is used."""
 TIGHT_RADIUS_M = 0.35
 """Radius of the disc of "tight" starts, which is hardly larger than six robots need."""
 SIDE_M = 10.0

@@ -15,7 +15,7 @@ from robocov.record import Record
 from robocov_app.report.results.result import Reference, ReportedResult
 
 RESTARTS = 24
-"""Number of searches for the best placement, of which the best result is used."""
+"""Number of searches for the best placement; the best result is used."""
 
 
 def add_references(

@@ -249,7 +249,7 @@ class CommandTable:
         return commands[name].execute(argument)
 
     def search(self, text: str) -> list[Command]:
-        """Return the commands, except for hidden ones, that match what the user typed."""
+        """Return the commands, except for hidden ones, that match the typed text."""
         commands = list(self.commands)
         if text.strip():
             commands += self._list_temporary()

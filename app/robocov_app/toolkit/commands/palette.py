@@ -46,7 +46,7 @@ def create_palette(table: CommandTable, placeholder: str, show_message: Callable
 
 
 def list_options(table: CommandTable, text: str) -> list[Option]:
-    """List the palette entries for what the user has typed.
+    """List the palette entries for the typed text.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def list_options(table: CommandTable, text: str) -> list[Option]:
 def _list_completions(
     table: CommandTable, command: Command, argument: Argument, argument_text: str, text: str
 ) -> list[Option]:
-    """List the values of an argument that match what was typed of it, and the typed text itself."""
+    """List the values of an argument that match its typed text, and the typed text itself."""
     values = list(argument.list_values())
     reason = command.get_disabled_reason()
     start = argument_text.lower()

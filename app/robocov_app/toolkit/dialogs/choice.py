@@ -50,7 +50,7 @@ class Choice(Dialog):
     ----------
     title : str
     options : callable
-        Returns the lines that match what the user typed.
+        Returns the lines that match the typed text.
     accept : callable
         Called with the typed text and the chosen line, which is None if the list is empty. If it returns a
         string, that string replaces the typed text and the dialog stays open. If it raises a RobocovError,

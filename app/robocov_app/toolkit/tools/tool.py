@@ -1,4 +1,4 @@
-"""Tools: base class of the mouse tools for a map, the events that they get, and what they show."""
+"""Tools: base class of the mouse tools for a map, their events and their overlays."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -109,7 +109,7 @@ class Tool(Generic[ContextT, EventT]):
         return None
 
     def finish(self, context: ContextT) -> str | None:
-        """Complete what is being drawn; called on Enter and on a right click."""
+        """Complete the current drawing; called on Enter and on a right click."""
         return None
 
     def cancel(self, context: ContextT) -> bool:

@@ -164,7 +164,7 @@ def show_tabs(
     *widths: float,
     titles: Mapping[str, str] = _NO_TITLES,
 ) -> str | None:
-    """Show a row of buttons, one of which is selected.
+    """Show a row of buttons with one of them selected.
 
     Parameters
     ----------

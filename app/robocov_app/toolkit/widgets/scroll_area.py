@@ -174,7 +174,7 @@ def _read_bar(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
             page.grab_offset = bar.knob.height / 2
             if is_on_knob:
                 page.grab_offset = page.pointer[1] - bar.knob.top
-        # A press beside the knob moves the middle of the knob there at once.
+        # A press outside the knob moves the middle of the knob there at once.
         if not is_on_knob:
             knob_offset = page.pointer[1] - page.grab_offset - bar.track.top
             offset = knob_offset / bar.free_height * bar.max_offset

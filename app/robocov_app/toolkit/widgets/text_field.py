@@ -133,7 +133,7 @@ def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
 
 
 def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
-    """Return how far a long text is shifted to the left to keep its caret visible, px."""
+    """Return the shift to the left that keeps the caret of a long text visible, px."""
     width_before = measure_text(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
     return max(width_before - (rect.width - page.px(2 * (_MARGIN_PX + _CURSOR_WIDTH_PX))), 0)
 

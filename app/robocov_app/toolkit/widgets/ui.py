@@ -4,7 +4,7 @@ The function runs once for every event and once for every drawing. A widget retu
 run: a button returns True when it is pressed; others return the new value, or None if nothing happened::
 
     def show_run(ui: Ui) -> None:
-        ui.row(0, 0, 80)  # Widths of the cells at scale 1; cells of width 0 share what is left.
+        ui.row(0, 0, 80)  # Widths of the cells at scale 1; cells of width 0 share the rest.
         if ui.button("Pause", key="pause", disabled_reason="" if is_running else "nothing runs"):
             pause()
         robots = ui.text_field("robots", str(count))

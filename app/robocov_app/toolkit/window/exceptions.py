@@ -44,7 +44,7 @@ class ExceptionLog:
         ----------
         error : BaseException
         action : str
-            What the window was doing, such as "drawing".
+            Action of the window that failed, such as "drawing".
 
         Returns
         -------

@@ -105,7 +105,7 @@ def build_layout(
     scale : float
         Requested scale of texts and widgets.
     panes : int
-        Number of panes, all of which show the same map.
+        Number of panes; all show the same map.
     aspect : float
         Width of the map divided by its height.
     panel : bool

@@ -129,7 +129,7 @@ class BaseWindow:
 
     @property
     def status_text(self) -> str:
-        """What a screen reader announces when it changes."""
+        """Text that a screen reader announces when it changes."""
         return ""
 
     def close(self) -> None:
@@ -321,7 +321,7 @@ class BaseWindow:
     # Display
 
     def adopt_display(self) -> None:
-        """Draw on the display from now on; if it is tiny, on a larger surface, a part of which is shown.
+        """Draw on the display from now on; if it is tiny, on a larger surface that is partly shown.
 
         Tiling window managers may make a window as small as one pixel, for which there is no layout.
         """

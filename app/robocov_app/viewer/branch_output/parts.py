@@ -132,7 +132,7 @@ class BranchPart:
     last_step: int = 0
 
     def add_step(self, run: PaneGroup, node: Node) -> None:
-        """Record the current step of a run, and what the user does to robots in it."""
+        """Record the current step of a run, and the robots that the user places or drags in it."""
         self.last_step = run.step
         for pane in run.panes:
             self.recorders[pane.number].add(pane.simulation.observe_and_decide())

@@ -86,7 +86,7 @@ class ViewerCanvas:
     hovered : HoveredRobot or None
         The robot under the cursor, if there is one.
     is_animated : bool
-        Whether the camera may glide; False while nobody watches.
+        Whether the camera may glide; False while the window is unattended.
     layout : Layout
         Layout of the window, from `arrange`.
     """

@@ -301,7 +301,7 @@ def _get_id(chip: Chip) -> str:
 
 
 def _describe_chip(chip: Chip, tip: str) -> str:
-    """Return the tool tip of a chip: what a click does, with the key."""
+    """Return the tool tip of a chip: the effect of a click, and the key."""
     if chip.kind in ("layer", "row"):
         verb = "Hide" if chip.is_on else "Show"
         return f"{verb}: {tip}"

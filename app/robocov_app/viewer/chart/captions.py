@@ -107,7 +107,7 @@ def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
 
 
 def format_gap(value: float, best: float) -> str:
-    """Format by how much a value exceeds the best one.
+    """Format the excess of a value over the best one.
 
     Examples
     --------

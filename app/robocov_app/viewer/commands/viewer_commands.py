@@ -82,7 +82,7 @@ def list_viewer_commands(viewer: Presenter, layer_titles: dict[str, str]) -> lis
 
 
 def _list_run_commands(viewer: Presenter) -> list[Command]:
-    """Return the commands that play and restart the simulation, or change what it starts from."""
+    """Return the commands that play and restart the simulation, or change its initial conditions."""
     playback = viewer.playback
     files = viewer.files
     add_robot = partial(playback.restart_with_more_robots, 1)

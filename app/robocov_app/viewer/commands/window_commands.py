@@ -57,7 +57,7 @@ def list_window_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWind
 
 
 def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindowActions) -> list[Command]:
-    """Return the commands that move the camera or change what the window shows."""
+    """Return the commands that move the camera or change the content of the window."""
     zoom_in = partial(actions.zoom, ZOOM_STEP)
     zoom_out = partial(actions.zoom, 1 / ZOOM_STEP)
     pan_left = partial(canvas.pan, PAN_STEP_PX, 0)

@@ -216,7 +216,7 @@ def _name_force(kind: str) -> str:
 
 
 def list_surroundings(situation: RobotSituation) -> list[str]:
-    """Describe what the robot touches and senses, and with whom it communicates."""
+    """Describe the objects that the robot touches and senses, and its communication partners."""
     texts = [f"touches {touched.side_text}" for touched in situation.touched]
     goal = situation.goal
     if goal is not None and "attraction" not in situation.forces:

@@ -107,7 +107,7 @@ _BUTTONS_ABOVE_BOTTOM_PX = 74
 _PROGRESS_ABOVE_BOTTOM_PX = 88
 _HINT_ABOVE_BOTTOM_PX = 26
 _TEXT_SIZES_PX = (14.0, 13.0, 12.0)
-"""Sizes of the text, of which the first is used at which the page fits."""
+"""Sizes of the text; the first one at which the page fits is used."""
 _LINE_HEIGHT = 1.5
 """Distance of lines in text sizes."""
 
@@ -261,7 +261,7 @@ class _LessonPage:
             self.y += _ITEM_GAP_PX * self.scale
 
     def _draw_closing(self) -> None:
-        """Draw what was found out, the score of the user's predictions, and what to try next."""
+        """Draw the findings, the score of the user's predictions, and suggestions of next steps."""
         lesson = self.lesson
         self._write_title(_CLOSING_TITLE)
         right_count, answer_count = lesson.score

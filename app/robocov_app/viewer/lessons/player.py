@@ -254,7 +254,7 @@ class LessonPlayer:
 
     @property
     def findings(self) -> list[str]:
-        """What the lesson has shown: as its author says, or else the answers to its questions."""
+        """Findings of the lesson: those given by its author, or else the answers to its questions."""
         if self.lesson.found:
             return list(self.lesson.found)
         questions = [chapter.question for chapter in self.lesson.chapters if chapter.question is not None]
@@ -364,7 +364,7 @@ class LessonPlayer:
     def skip(self, chapters: int) -> None:
         """Go to the chapter that is `chapters` later, or earlier if negative.
 
-        The closing page follows the last chapter, unless nobody is there to read it; then the lesson ends.
+        The closing page follows the last chapter. If the lesson is unattended, it ends instead.
         """
         last = len(self.lesson.chapters) - 1
         if self.state is LessonState.CLOSING:

@@ -191,7 +191,7 @@ class Pane:
         """
         old = self.simulation
         setup = continuation.setup
-        # An unchanged controller keeps its memory. Without memory, it is built anew, as on resuming.
+        # An unchanged controller keeps its memory. Without memory, it is rebuilt, as on resuming.
         keeps_controller = setup.controller == self.controller and has_memory(old.controller)
         controller = None if keeps_controller else setup.controller.build()
         if self._differs_only_in_density(continuation):

@@ -261,7 +261,7 @@ class PaneGroup:
         return events
 
     def _describe_offset(self, number: int, requested: Point) -> str:
-        """Describe how far from the requested position a robot has joined; empty if it is hardly off."""
+        """Describe the offset of a new robot from the requested position; empty if it is tiny."""
         pane = self.panes[0]
         row = pane.get_row(number)
         offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))

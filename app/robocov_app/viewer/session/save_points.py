@@ -36,7 +36,7 @@ class SavePoint:
     run : PaneGroup
         The run.
     run_key : tuple
-        Values at least one of which changes with each edit or step.
+        Values of the run; each edit or step changes at least one of them.
     panes : tuple of Pane
         The panes.
     history : RunHistory
@@ -142,6 +142,6 @@ def _restore_document(timeline: Timeline, point: SavePoint) -> None:
 
 
 def _build_run_key(run: PaneGroup) -> tuple[object, ...]:
-    """Return values of a run, at least one of which changes with each edit or step."""
+    """Return values of a run; each edit or step changes at least one of them."""
     panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
     return run.step, run.drag, id(run.scenario), *panes

@@ -45,7 +45,7 @@ _CONDITIONS = convert_field(
 
 @dataclass(frozen=True, eq=False)
 class SessionScenario:
-    """What the panes of a session start from: one `robocov.Scenario` for each controller.
+    """Initial conditions of the panes of a session: one `robocov.Scenario` for each controller.
 
     Attributes
     ----------

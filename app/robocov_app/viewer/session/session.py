@@ -45,7 +45,7 @@ from robocov_app.viewer.session.timeline import Timeline
 MIN_PUSH_M = 5e-3
 """A robot counts as pushed if an obstacle moves it by more than this; contacts always move it a little."""
 GESTURE_WINDOW_S = 1.0
-"""Changes of the same value within this simulated time, such as by a slider, count as one edit."""
+"""Changes of the same value within this simulated time, for example by a slider, count as one edit."""
 _DRAG_DECIMALS = 4
 _FIELDS_OF_STARTS = {"environment", "robots", "start", "seed"}
 """Fields of a scenario that determine the starting positions, unless these are given."""
@@ -479,7 +479,7 @@ def _change_scenario(old: SessionScenario, changes: Mapping[str, Any]) -> Sessio
 
 
 def _describe_restart(old: SessionScenario, new: SessionScenario) -> str:
-    """Describe what has changed from the scenario before a restart to the new one."""
+    """Describe the changes from the scenario before a restart to the new one."""
     parts = [f"{controller.label} compared" for controller in new.controllers[len(old.controllers) :]]
     if new.environment is not old.environment:
         parts.append(f"map {new.environment.name}")

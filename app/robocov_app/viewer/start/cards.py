@@ -10,7 +10,7 @@ from typing import Any
 
 
 class Target(StrEnum):
-    """What a choice on the start page opens."""
+    """Part of the application that a choice on the start page opens."""
 
     WINDOW = "window"
     LESSON = "lesson"
@@ -19,12 +19,12 @@ class Target(StrEnum):
 
 @dataclass(frozen=True)
 class StartChoice:
-    """What the user has chosen on the start page.
+    """A choice of the user on the start page.
 
     Attributes
     ----------
     title : str
-        What is opened, for the message while it loads.
+        Title for the message during loading.
     target : Target
     options : mapping
         Options of `robocov demo` that differ from the defaults.
@@ -42,9 +42,9 @@ class StartCard:
     Attributes
     ----------
     choice : StartChoice
-        What it opens.
+        Choice made by a click on the card.
     text : str
-        What it shows, in one or two lines.
+        Description of the example, in one or two lines.
     previews : tuple of str
         Names of recorded runs, shown side by side; empty for the drawing of a map.
     labels : tuple of str

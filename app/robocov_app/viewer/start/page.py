@@ -107,7 +107,7 @@ class StartPage(BaseWindow):
     Attributes
     ----------
     choice : StartChoice or None
-        What the user has chosen.
+        The user's choice, or None until there is one.
     model : WindowModel
         Status message.
     theme_name : str
@@ -319,7 +319,7 @@ class StartPage(BaseWindow):
     # Frames
 
     def update(self, seconds: float) -> None:
-        """Advance the examples; close the page once the viewer can open what was chosen."""
+        """Advance the examples; close the page once the viewer can open the user's choice."""
         self.model.pass_time(seconds)
         if self.choice is not None and self._is_ready():
             self.closed = True

@@ -169,7 +169,7 @@ def fit_outline(outline: Outline, box: Rect) -> Rect:
 def draw_outline(
     screen: Surface, outline: Outline, box: Rect, theme: Theme, scale: float, outside: Color
 ) -> None:
-    """Draw the outline of a map in the middle of a box, over what is already there.
+    """Draw the outline of a map in the middle of a box, over the existing content.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ class HandTool(ViewerTool):
         return change_map(session, environment, f"{map_edits.describe_obstacle(moved)} moved")
 
     def cancel(self, session: Session) -> bool:
-        """Let go of what is held, or else clear the selection; return whether there was either."""
+        """Release the held object, or else clear the selection; return whether there was either."""
         if not self.is_holding:
             had_selection = self.inspection.selected is not None
             self.inspection.selected = None

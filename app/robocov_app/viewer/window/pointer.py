@@ -66,7 +66,7 @@ class ViewerPointer(Pointer):
         return self._canvas.layout.scale
 
     def show_action(self, cursor: MouseCursor) -> None:
-        """Show what a press would do, by the cursor shape and a ring around the robot under the cursor."""
+        """Show the effect of a press by the cursor shape and a ring around the robot under the cursor."""
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas

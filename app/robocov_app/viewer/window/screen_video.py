@@ -13,7 +13,7 @@ from robocov_app.runs.encoding import Frame, build_encoder_command
 
 VIDEO_FPS = 30
 _FRAME_TOLERANCE = 1e-6  # a frame that is due up to rounding errors is added
-MAX_WAITING_FRAMES = 45  # if so many frames wait for the encoder, new ones are dropped
+MAX_WAITING_FRAMES = 45  # frames that wait for the encoder; further ones are dropped
 
 
 class ScreenVideo:

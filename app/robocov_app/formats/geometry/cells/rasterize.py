@@ -107,7 +107,8 @@ class CellGrid:
         -----
         This is the grid-intersection digitization of thin sets (Klette and Rosenfeld 2004, Digital Geometry,
         chapter 2): along each row and column of centers, one cell of each interval outside the polygons.
-        Together with the cells whose center is outside, these cells are connected wherever the walls are.
+        Together with the cells whose center is outside, these cells are connected regardless of the positions
+        of the walls.
         """
         cells = np.zeros((self.rows, self.columns), dtype=bool)
         for oriented, is_transposed in ((cells, False), (cells.T, True)):

@@ -42,7 +42,7 @@ _MIN_REPORTED_MOVE_M = 1e-3
 
 
 def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
-    """Convert a foreign map to an environment, and report what was changed.
+    """Convert a foreign map to an environment, and report the changes.
 
     Parameters
     ----------

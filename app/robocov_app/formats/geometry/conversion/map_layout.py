@@ -46,7 +46,7 @@ class MapLayout(NamedTuple):
     deviation: Deviation
 
     def compute_free(self) -> MultiPolygon:
-        """Return the free space between the obstacles, m, computed in the same way as by `Environment`."""
+        """Return the free space between the obstacles, m, computed as in `Environment`."""
         primitives = [primitive.polygon for primitive in self.primitives]
         blocked = shapely.union_all([*self.solid, *primitives], grid_size=GRID_M)
         return to_multipolygon(shapely.difference(self.boundary, blocked, grid_size=GRID_M))

@@ -39,7 +39,7 @@ _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 def restore_primitives(
     layout: MapLayout, simplified: SimplifiedSpace, before: MultiPolygon, conversion: Conversion
 ) -> MapLayout:
-    """Replace polygons of a layout by the circles and walls of which they consist.
+    """Replace polygons of a layout that consist of circles and walls by these primitives.
 
     A polygon stays if its primitives would leave a pocket, a tiny enclosed piece of free space, next to them.
     All polygons stay if walls would have moved by more than the tolerance.

@@ -180,7 +180,7 @@ def _find_containers(areas: Array, tree: STRtree) -> set[int]:
 
 
 def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
-    """Find all pairs of areas of which most of the first lies in the second, larger one.
+    """Find all pairs of an area and a larger one that contains most of it.
 
     Two arrays of indices are returned: of the inner areas, and of the outer areas.
     """

@@ -271,7 +271,7 @@ def _describe(
     *,
     are_solid: bool,
 ) -> None:
-    """Report gaps that were closed in the boundary, and what the other shapes were taken for."""
+    """Report gaps that were closed in the boundary, and the interpretation of the other shapes."""
     if boundary is not None and boundary.gaps:
         report.repaired.append(boundary.gaps)
     # If the format defines the boundary, it also defines what outlines are: no note is needed.

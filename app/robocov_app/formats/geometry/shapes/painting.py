@@ -49,9 +49,9 @@ def is_pale(color: Color | None) -> bool:
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
     """Decide from the paint on filled shapes which of them are floors.
 
-    Nobody draws furniture or walls on an obstacle. So a pale fill with something darker on it is evidently a
-    floor. If there is such a fill, all fills of its color are floors, too, and so are pale fills of the size
-    of a room, because rooms often have different colors.
+    Furniture and walls are never drawn on an obstacle. So a pale fill with darker objects on it is evidently
+    a floor. If there is such a fill, all fills of its color are floors, too, and so are pale fills of the
+    size of a room, because rooms often have different colors.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ class SimplificationCheck:
         return has_wrong_area & (self.allowed > 0.0)
 
     def _measure_area_changes(self) -> Array:
-        """Return by how much each side of the simplified outline changes the area of its ring, (m,) m².
+        """Return the change in area of its ring caused by each side of the simplified outline, (m,) m².
 
         This is the signed area between the side and the run of the outline that it represents. Summed over a
         ring, it is the total change of the ring's area.

@@ -65,7 +65,7 @@ def fit_walls(path: RingVertices, kept: IntArray, simplified: RingVertices, tole
     path : RingVertices
         Result of `replace_stairs`.
     kept : (m,) array of int
-        Indices of the vertices of the path of which the simplified outline consists.
+        Indices of the path's vertices that form the simplified outline.
     simplified : RingVertices
     tolerance : (m,) array, m
 

@@ -114,5 +114,5 @@ class Node:
         return np.array([*values, *default[len(values) :]])
 
     def raise_error(self, expected: str) -> NoReturn:
-        """Raise a MapError that names the place of this value, and what was expected there."""
+        """Raise a MapError with the place of this value and a description of the expected one."""
         raise MapError(f"{self.place}: expected {expected}, got {quote(self.value)}")

@@ -41,7 +41,7 @@ class Token(NamedTuple):
     place: str
 
     def raise_error(self, expected: str) -> NoReturn:
-        """Raise a MapError that names the place of this token, and what was expected there."""
+        """Raise a MapError with the place of this token and a description of the expected one."""
         raise MapError(f"{self.place}: expected {expected}, got {quote(self.text)}")
 
 

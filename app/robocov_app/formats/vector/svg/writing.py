@@ -22,7 +22,7 @@ DEFAULT_SCALE = 0.001
 """Length, in meters, that a millimeter of the drawing represents: true scale."""
 _MARGIN = 0.03
 """Margin around the map, as a fraction of its longer side."""
-# max-width and max-height make a browser window show the whole map, whatever its size.
+# max-width and max-height make a browser window show the whole map, regardless of its size.
 _PAGE = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" {size}

@@ -11,7 +11,7 @@ _Path = tuple[str | int, ...]
 
 
 def check_lesson_references(lesson: LessonModel, where: str, nodes: Sequence[Node]) -> None:
-    """Check that the chapters of a lesson refer only to what the session has, and that they can end.
+    """Check that the chapters of a lesson refer only to existing edits and robots, and that they can end.
 
     Parameters
     ----------

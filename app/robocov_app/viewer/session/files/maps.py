@@ -28,7 +28,7 @@ def refuse_value(where: str, path: tuple[str | int, ...], value: object, expecte
     value : object
         The value.
     expected : str
-        Description of what was expected.
+        Description of the expected value.
     """
     message = f"expected {expected}, got {quote_json(value)}"
     raise MapError.from_mistakes(where, [Mistake.at_path(path, message)])

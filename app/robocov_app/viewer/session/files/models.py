@@ -145,7 +145,7 @@ class LessonModel(_Model):
     title: Annotated[str, Field(min_length=1, max_length=MAX_LESSON_TITLE_CHARS)]
     chapters: Annotated[list[ChapterModel], Field(min_length=1, max_length=MAX_CHAPTERS)]
     found: Annotated[list[Text], Field(max_length=MAX_CLOSING_LINES)] = Field(
-        default=[], description="What the lesson has shown, on its closing page"
+        default=[], description="Findings of the lesson, listed on its closing page"
     )
     next_steps: Annotated[list[Text], Field(max_length=MAX_CLOSING_LINES)] = Field(
         default=[], description="What to try after the lesson, on its closing page"
