@@ -37,7 +37,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
     Parameters
     ----------
     result, rapf : Mapping
-        The result, and that of RAPF, as returned by `robocov_app.benchmark.results.read_result`.
+        The results of the controller and of RAPF, as returned by `robocov_app.benchmark.results.read_result`.
 
     Returns
     -------

@@ -81,7 +81,7 @@ class Oracle(BaseController):
         """Return the memory before the first plan; raise ParameterError if the map has no placement."""
         if self.environment is None or "oracle" not in self.environment.extra:
             raise ParameterError(
-                f"controller {self.name!r}: expected a map with the best placement, which only those of the "
+                f"controller {self.name!r}: expected a map with the best placement, which only maps of the "
                 "benchmark have"
             )
         unknown = (np.full((1, 2), np.nan),) * len(team)

@@ -59,21 +59,21 @@ _SUMMARY_COLUMNS = (
 )
 NOTES = (
     "Score: the mean over all runs of J_ref / J, halved if a robot touched a wall or another one, and halved "
-    "again if the team had not come to rest at the end; a failed run, and one whose team covers another area "
-    "than the reference, counts 0. The score of an entry depends on no other entry. Only entries with all "
-    "runs of a track are ranked on it.",
+    "again if the team had not come to rest at the end; a failed run counts 0, and so does a run that covers "
+    "a different area from the reference. The score of an entry depends on no other entry. Only entries with "
+    "all runs of a track are ranked on it.",
     "Gap: J / J_ref − 1 at the end, the median over runs, its 95 % interval from 12 maps on (bootstrap that "
     "draws whole maps), mean and worst; J_ref is the best known placement, not a proven optimum, so gaps may "
     "be too small; in brackets the median above lower bounds, where all are known. The bounds are certified "
     "for J as it is computed, a sum over 128 x 128 sites, not for the integral that it approximates. "
     "To 5 %: the time from which J stays within 5 % of its final value. ∫J / J_ref: the integral of J over "
     "the run by the reference. Path: mean path length of a robot.",
-    "Medians over runs, but: contacts are the runs in which a robot touched a wall or another one; at rest "
-    "is the fraction of runs at whose end no robot moves 5 cm in any 4 s; rest is the Kaplan-Meier median "
-    "of the time when that starts; runs that do not come to rest are censored. B/s: bytes that a robot "
-    "sends per second, received or not: 20 for a position, 5 for each changed cell of a shared map, 28 for "
-    "each reported position of another robot (number, position, time). µs/s: processor time of the "
-    "controller per robot and second, which depends on the machine.",
+    "Medians over runs, with exceptions: contacts are the runs in which a robot touched a wall or another "
+    "one; at rest is the fraction of runs that end with no robot moving 5 cm in any 4 s; rest is the "
+    "Kaplan-Meier median of the time when that starts; runs that do not come to rest are censored. B/s: "
+    "bytes that a robot sends per second, received or not: 20 for a position, 5 for each changed cell of a "
+    "shared map, 28 for each reported position of another robot (number, position, time). µs/s: processor "
+    "time of the controller per robot and second, which depends on the machine.",
 )
 
 

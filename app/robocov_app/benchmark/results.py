@@ -176,7 +176,7 @@ def read_result(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected a result of robocov benchmark")
     if result.get("suite") != identify_suite():
         raise InputError(
-            f"{path}: suite: expected that of {suite.SUITE_FILE.name} here, got {result.get('suite')}"
+            f"{path}: suite: expected the suite of {suite.SUITE_FILE.name}, got {result.get('suite')}"
         )
     _check_head(result, path)
     for k, row in enumerate(result["rows"]):

@@ -84,7 +84,7 @@ class Arguments(FigureOptions):
         super().__post_init__()
 
     def _check_run_options(self) -> None:
-        """Raise an InputError if an option is given whose value comes from the run."""
+        """Raise an InputError if an option is given although the run sets its value."""
         for name, value in (("--robots", self.robots), ("--radius", self.radius)):
             if value is not None:
                 raise InputError(f"{name}: cannot be combined with --run, which gives its value; got {value}")

@@ -81,7 +81,7 @@ _CAPTION_FACTS_ROW = 14
 _BAR_WIDTH = 190
 _BAR_HEIGHT = 10
 _BAR_RISE = 9
-"""Distance of the top of the color scale above the middle of its row, whose lower part has the ticks."""
+"""Distance of the top of the color scale above the middle of its row; the ticks are below."""
 _BAR_INDENT = 14
 """Space between the color scale and the right edge of the maps."""
 _BAR_LABEL_GAP = 12

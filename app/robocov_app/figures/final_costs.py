@@ -63,7 +63,7 @@ def plot_final_costs(
     label : str
         Label of the value axis.
     width : int, px
-        Width of the page, whose height depends on the number of samples.
+        Width of the page; its height depends on the number of samples.
     scale : float
         Scale of texts and lines.
     theme : Theme

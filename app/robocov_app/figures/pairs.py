@@ -65,7 +65,7 @@ def plot_pairs(
     label : str
         Label of the axis of ratios.
     width : int, px
-        Width of the page, whose height depends on the number of rows.
+        Width of the page; its height depends on the number of rows.
     scale : float
         Scale of texts and lines.
     theme : Theme

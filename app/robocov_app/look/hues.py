@@ -102,7 +102,7 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
 def _color_graph(n: int, adjacency: IntArray) -> IntArray:
     """Color the graph of adjacent cells by DSATUR, with all hues used about equally often.
 
-    DSATUR (Brelaz, 1979) always colors the vertex next whose neighbors have the most different colors. If
+    DSATUR (Brelaz, 1979) always colors next the vertex whose neighbors have the most different colors. If
     they have all colors, the vertex gets the color that is rarest among them.
     """
     neighbors: list[list[int]] = [[] for _ in range(n)]

@@ -100,7 +100,7 @@ def _load_comparison(path: Path) -> list[SavedRun]:
     folders = [path.parent / name for name in content.folders]
     for folder in folders:
         if folder.is_symlink():
-            raise InputError(f"{folder}: expected a folder in that of the comparison, got a link")
+            raise InputError(f"{folder}: expected a folder inside the folder of the comparison, got a link")
     is_complete = bool(content.runs)
     saved = [_load_run(folder) for folder in folders if is_complete or (folder / RUN_FILE).is_file()]
     if not saved:

@@ -222,9 +222,9 @@ class Pages:
 
     @property
     def display_settings(self) -> PageChanged | None:
-        """Size and color scheme of the window, which are those of a page; None if none has reported them.
+        """Size and color scheme of the window, taken from a page; None if no page has reported them.
 
-        They are those of the controlling page. A phone, however, does not shrink the window that others see
+        The controlling page sets them. A phone, however, does not shrink the window that others see
         on a projector: while a wide page is open, a narrow one gets a scaled picture.
         """
         controlling = self.controlling
@@ -233,7 +233,7 @@ class Pages:
         wide = [page for page in self._pages if page.settings is not None and not page.settings.is_narrow]
         if not controlling.settings.is_narrow or not wide:
             return controlling.settings
-        # A page that may control is that of the projector rather than that of a spectator.
+        # Prefer pages that may control: they are more likely on the projector.
         return min(wide, key=lambda page: (not page.may_control, page.number)).settings
 
     def wake(self) -> None:

@@ -14,7 +14,7 @@ from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
-"""Information that a controller uses: what each robot itself senses, and the positions of its neighbors
+"""Information that a controller uses: the measurements of each robot and the positions of its neighbors
 ("own"); in addition maps, and the last known positions of other robots, that neighbors send each other
 ("shared map"); or the whole map from the start ("whole map")."""
 
@@ -108,7 +108,7 @@ class Controller(Protocol):
         """
 
     def decide(self, seen: Observations, memory: Any) -> Decision:
-        """Return the forces of all robots, from what each of them knows.
+        """Return the forces of all robots, each based on the robot's own knowledge.
 
         Parameters
         ----------

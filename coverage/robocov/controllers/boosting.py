@@ -305,7 +305,7 @@ class Boosting(BaseController):
         )
 
     def compute_contributions(self, seen: Observations, view: View, reach: Array) -> Contributions:
-        """Compute what each robot contributes to H, with its gradient and its boosted gradient.
+        """Compute the contribution of each robot to H, with its gradient and its boosted gradient.
 
         Parameters
         ----------

@@ -130,7 +130,7 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
     ----------
     seen : Observations
     previous : (n, rays, 2) array or None, m
-        What this function returned at the previous step. It is returned again if there is no new scan.
+        Result of this function at the previous step. It is returned again if there is no new scan.
 
     Returns
     -------

@@ -165,8 +165,8 @@ class IndividualControllerAdapter:
     ----------
     controller : IndividualController
     name, label, summary : str
-        Those of the individual controller. By default, they are its class name and the first line of its
-        docstring.
+        Name, label and summary of the individual controller. By default, they are its class name and the
+        first line of its docstring.
     information : Information
         Information that it uses; "own" by default.
 
@@ -284,7 +284,7 @@ class IndividualControllerAdapter:
 
 
 def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory: Any) -> OwnView:
-    """Return what one robot knows. The controller may change the arrays, which are copies."""
+    """Return the knowledge of one robot. The controller may change the arrays, which are copies."""
     obstacle_point = None
     if not np.isnan(seen.obstacle_points[robot, 0]):
         obstacle_point = seen.obstacle_points[robot].copy()

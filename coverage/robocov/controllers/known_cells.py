@@ -1,4 +1,4 @@
-"""Cells of the robots, each computed from what its robot knows."""
+"""Cells of the robots, each computed from the knowledge of its robot."""
 
 from typing import Any
 

@@ -47,8 +47,8 @@ def check_rules(environment: Environment, where: str) -> None:
     Raises
     ------
     MapError
-        With the mistakes in obstacles, boundary and density; if there are none, with those of the map as a
-        whole.
+        With the mistakes in obstacles, boundary and density; if there are none, with the mistakes of the map
+        as a whole.
     """
     mistakes = list(_find_ring_mistakes(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
@@ -153,7 +153,7 @@ def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea
 
 
 def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
-    """Yield the mistakes of a map as a whole whose parts are all valid."""
+    """Yield the mistakes of a map as a whole; all its parts must be valid."""
     if len(environment.region.vertices) < 3:
         yield Mistake.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
         return

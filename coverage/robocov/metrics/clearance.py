@@ -132,7 +132,7 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
 def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Array) -> int:
     """Write the smallest gap of each moment to `min_gaps`, (T,) m; return the number of contacts.
 
-    `order`, (T, n), lists the robots by x. Those that do not work, whose positions are nan, come last.
+    `order`, (T, n), lists the robots by x. Robots that do not work, with positions of nan, come last.
     """
     max_diameter = 0.0
     for i in range(len(radius)):

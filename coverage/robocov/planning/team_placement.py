@@ -1,4 +1,4 @@
-"""Goals for a team, based on what one robot knows: a k-median on the nodes of its map.
+"""Goals for a team, based on the knowledge of one robot: a k-median on the nodes of its map.
 
 The cost is (22) on the nodes of a `GridPlanner`, each weighted by its area (times the density):
 

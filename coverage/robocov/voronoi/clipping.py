@@ -239,7 +239,7 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 @inlined_kernel
 def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Cut a polygon by the bisector to a neighbor; write what remains to `cut_polygon`.
+    """Cut a polygon by the bisector to a neighbor; write the remaining polygon to `cut_polygon`.
 
     The points nearer to the generator than to the neighbor remain. The vertices beyond the bisector
     are replaced by the two points where the outline of the polygon crosses it. Return the new number of

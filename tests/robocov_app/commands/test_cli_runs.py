@@ -122,7 +122,7 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
         '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
     )
     (inner / "on").symlink_to(tmp_path / "run")
-    assert "on: expected a folder in that of the comparison, got a link" in complaint(
+    assert "on: expected a folder inside the folder of the comparison, got a link" in complaint(
         capsys, "metrics", str(inner)
     )
 

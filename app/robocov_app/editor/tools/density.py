@@ -1,4 +1,4 @@
-"""The density tool, by which hot spots and areas are dragged and their weights are typed."""
+"""The density tool: hot spots and areas are dragged, and their weights are typed."""
 
 import math
 from typing import Literal, NamedTuple

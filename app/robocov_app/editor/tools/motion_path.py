@@ -1,4 +1,4 @@
-"""The tool for paths of moving obstacles, by which waypoints are clicked or dragged and speeds are typed."""
+"""The tool for paths of moving obstacles: waypoints are clicked or dragged, and speeds are typed."""
 
 from typing import NamedTuple
 

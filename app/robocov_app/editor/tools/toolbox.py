@@ -29,7 +29,7 @@ class EditorToolbox(Toolbox[EditorTool]):
     selector : SelectTool
         Selection tool, to which Escape returns.
     tape : MeasureTool
-        Measuring tool, by whose line the map can be levelled.
+        Measuring tool; its line can level the map.
     density : DensityTool
         Density tool, which has the weight of new areas.
     """

@@ -119,7 +119,7 @@ def render_geodesic_cells(
     zoom = canvas.camera.zoom
     width = _BORDER_WIDTH_PX * canvas.scale
     owners, borders = field.compute_cells(x, y, _get_border_reach(canvas))
-    # The last color is that of points without a robot, whose owner is -1.
+    # The last color is for points without a robot (owner -1).
     n_hues = len(theme.robots)
     colors = [*(theme.get_cell_color(hue) for hue in range(n_hues)), theme.unreached]
     color_indices = np.append(canvas.hues, n_hues).astype(np.uint8)

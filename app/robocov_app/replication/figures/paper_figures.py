@@ -103,7 +103,7 @@ def _get_pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, Fi
 
 
 def describe_figure(number: int, runs: Mapping[str, FigureRun], partition_run: Record) -> str:
-    """Return sentences on what one of the paper's figures shows.
+    """Return sentences that describe one of the paper's figures.
 
     Parameters
     ----------

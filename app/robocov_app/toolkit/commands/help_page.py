@@ -31,9 +31,9 @@ _HINT_MIDDLE_PX = 22
 _WINDOW_MARGIN_PX = 12
 """Minimum distance of the page from the left and right edges of the window."""
 _MIN_SPACE_AROUND_ROWS_PX = 90
-"""Minimum difference of the height of the window and that of the rows."""
+"""Minimum difference between the heights of the window and of the rows."""
 _SPACE_AROUND_ROWS_PX = 66
-"""Difference of the height of the page and that of the rows."""
+"""Difference between the heights of the page and of the rows."""
 
 _COLUMN_COUNT = 3
 _WIDE_COLUMN_COUNT = 4

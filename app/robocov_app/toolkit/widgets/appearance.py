@@ -39,7 +39,7 @@ _SELECTED_TINT = _Tint(hovered=0.15, held=0.25)
 
 
 def shade(page: Page, fraction: float) -> Color:
-    """Return a color between that of the panel (fraction 0) and that of its text (fraction 1)."""
+    """Return a color between the panel's color (fraction 0) and its text color (fraction 1)."""
     return mix(page.theme.panel, page.theme.ink, fraction)
 
 

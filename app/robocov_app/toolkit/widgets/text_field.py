@@ -149,7 +149,7 @@ def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
 
 
 def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placeholder: str) -> None:
-    """Draw the text being edited, with selection, cursor, and what an input method is composing."""
+    """Draw the text being edited, with selection, cursor, and the text that an input method composes."""
     theme = page.theme
     size = page.px(TEXT_PX)
     clip = screen.get_clip()

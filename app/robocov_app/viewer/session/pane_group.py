@@ -247,7 +247,7 @@ class PaneGroup:
         return events
 
     def _stop_failing_robots(self) -> list[AutomaticEvent]:
-        """Let robots fail whose failure time lies in the last step, and return their events."""
+        """Let robots with a failure time in the last step fail, and return their events."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
             return []

@@ -1,4 +1,4 @@
-"""The examples on the start page, and what each of them opens."""
+"""The examples on the start page, and the choice of each."""
 
 from __future__ import annotations
 

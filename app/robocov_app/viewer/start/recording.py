@@ -103,7 +103,7 @@ def record_run(run: RecordedRun) -> dict[str, Any]:
 
 
 def _build_owner_grid(environment: Environment, result: Any) -> IntArray:
-    """Return the robot that covers each cell of a grid, (rows, columns); obstacles get that of a neighbor."""
+    """Return the robot that covers each cell of a grid, (rows, columns); obstacles get a neighbor's robot."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     spacing = max(high_x - low_x, high_y - low_y) / GRID_SITES
     columns = round((high_x - low_x) / spacing)

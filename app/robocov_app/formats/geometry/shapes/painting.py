@@ -1,4 +1,4 @@
-"""Paint of drawings: which filled shapes are floors, and what remains visible of the shapes below them."""
+"""Paint of drawings: floors among the filled shapes, and the visible parts of the shapes below them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
