@@ -150,7 +150,7 @@ class Rating:
         return replace(self, rows=rows, failed=0)
 
     def compute_rest(self) -> tuple[float, float | None]:
-        """Compute how often and how soon the robots came to rest.
+        """Compute the fraction of runs that came to rest, and the median time until rest.
 
         Returns
         -------

@@ -49,7 +49,7 @@ def execute_actions(
 
 
 def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
-    """Return which working robots touch a wall or another robot, (n,) or (runs, n)."""
+    """Return a mask of the working robots that touch a wall or a robot, (n,) or (runs, n)."""
     shape = simulation.working.shape
     positions = simulation.positions.reshape(-1, 2)
     working = simulation.working.ravel()

@@ -261,7 +261,7 @@ def _embed_team(record: Record) -> dict[str, Any]:
 
 
 def _find_working(record: Record, times: Array) -> BoolArray:
-    """Return which robots work at given times, s since the start, as a (T, n) array."""
+    """Return a mask, (T, n), of the robots that work at given times, s since the start."""
     working = np.ones((len(times), len(record.team)), dtype=bool)
     if record.conditions is None:
         return working

@@ -208,7 +208,7 @@ class Conditions:
             )
 
     def compute_working_periods(self, count: int) -> tuple[Array, Array]:
-        """Compute when each robot starts and stops working.
+        """Compute the times at which each robot starts and stops working.
 
         Parameters
         ----------

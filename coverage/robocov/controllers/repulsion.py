@@ -387,7 +387,7 @@ class Poduri(BaseController):
         return links, link_ranges[is_linked]
 
     def _find_critical_links(self, seen: Observations, links: NearNeighbors, link_ranges: Array) -> BoolArray:
-        """Return which links are critical for the robot or, as far as the robot knows, for the neighbor."""
+        """Return a mask of the links critical for the robot or, to its knowledge, for the neighbor."""
         n = len(seen.positions)
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges

@@ -151,7 +151,7 @@ class Visibility(BaseController):
 def find_cells_in_view(
     depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array
 ) -> BoolArray:
-    """Find which points of each robot's view belong to its cell.
+    """Find the points of each robot's view that belong to its cell.
 
     Parameters
     ----------

@@ -276,7 +276,7 @@ def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
 
 
 def _describe_invalid_scalar(item: object) -> str | None:
-    """Return why a value that is not a list or object is not JSON; None if it is."""
+    """Return the reason why a scalar value is not JSON; None if it is."""
     if isinstance(item, float):
         return None if math.isfinite(item) else f"expected a finite number, got {item}"
     if isinstance(item, str):
@@ -321,7 +321,7 @@ def _is_comma_missing(text: str, error: json.JSONDecodeError) -> bool:
 
 
 def _describe_syntax_error(text: str, error: json.JSONDecodeError) -> str:
-    """Return why a text is not JSON, in the same words in all versions of Python."""
+    """Return the reason why a text is not JSON, worded the same in all versions of Python."""
     offset = _find_error(text, error)
     if _is_comma_missing(text, error):
         last_line = text[max(0, offset - _SYNTAX_EXCERPT_CHARACTERS) : offset].splitlines()[-1]

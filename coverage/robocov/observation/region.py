@@ -117,7 +117,7 @@ class Region:
         return float(np.hypot(high_x - low_x, high_y - low_y))
 
     def contains(self, points: Array, tolerance: float = 0.0) -> BoolArray:
-        """Return which points lie inside.
+        """Return a mask of the points inside.
 
         Parameters
         ----------

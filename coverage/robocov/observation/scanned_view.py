@@ -123,7 +123,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
 
 
 def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: Array) -> Array:
-    """Compute how fast the weighted area of a view grows at each of its windows.
+    """Compute the growth rate of the weighted area of a view at each of its windows.
 
     Parameters
     ----------

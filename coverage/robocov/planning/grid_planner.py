@@ -290,7 +290,7 @@ class GridPlanner(MapWindow):
     def find_clear_lines(
         self, position: Array, ends: Array, is_obstructing: BoolArray, ignored_length: float = 0.0
     ) -> BoolArray:
-        """Find which of the straight lines from a position cross no obstructing cell.
+        """Find the straight lines from a position that cross no obstructing cell.
 
         Parameters
         ----------

@@ -333,7 +333,7 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
 def find_clear_lines(
     position: Array, ends: Array, is_obstructing: BoolArray, frame: Frame, ignored_length: float
 ) -> BoolArray:
-    """Find which of the straight lines from a position cross no obstructing cell.
+    """Find the straight lines from a position that cross no obstructing cell.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ def _wrap_array(array: Array) -> batch.Buffer:
 
 
 def compute_mover_states(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
-    """Compute where moving obstacles are and how fast they move.
+    """Compute the positions and velocities of moving obstacles.
 
     Parameters
     ----------

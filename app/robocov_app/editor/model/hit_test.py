@@ -143,7 +143,7 @@ def find_vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Ow
 
 
 def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
-    """Return which of (k, 2) points, m, are in a box between two corners."""
+    """Return a mask of the points, (k, 2) m, in a box between two corners."""
     coordinates = to_array(points)
     is_inside = (coordinates >= np.minimum(a, b)) & (coordinates <= np.maximum(a, b))
     return np.asarray(is_inside.all(axis=1))

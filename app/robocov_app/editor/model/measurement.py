@@ -140,7 +140,7 @@ def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geom
 
 
 def _exceeds_distance(parts: Array, target: shapely.Geometry, distance: float) -> BoolArray:
-    """Return which polygons have a vertex that is farther from the target than a distance, m."""
+    """Return a mask of the polygons with a vertex farther from the target than a distance, m."""
     if target.is_empty:
         return np.ones(len(parts), dtype=bool)
     points, part_of_point = shapely.get_coordinates(parts, return_index=True)

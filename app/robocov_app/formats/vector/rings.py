@@ -109,7 +109,7 @@ class _RingParser:
 
 
 def _measure_depth(value: Any) -> int:
-    """Return how deeply lists are nested, judging by the first item of each."""
+    """Return the depth of nested lists, judging by the first item of each."""
     depth = 0
     while isinstance(value, list) and value:
         depth += 1

@@ -402,7 +402,7 @@ def compute_block_middles(coordinates: Array, size: int) -> Array:
 
 
 def _find_rows_with_differences(values: IntArray) -> BoolArray:
-    """Return which rows of an array, (..., k), contain different values."""
+    """Return a mask of the rows of an array, (..., k), that contain different values."""
     return np.asarray((values[..., 1:] != values[..., :1]).any(axis=-1))
 
 

@@ -273,6 +273,6 @@ def _sum_areas(boxes: Iterable[pygame.Rect | None]) -> int:
 
 
 def _are_same_rows(rows: Array, row: Array) -> Array:
-    """Return which rows, (k, n, 2), equal a given row, (n, 2); nan equals nan."""
+    """Return a mask of the rows, (k, n, 2), that equal a given row, (n, 2); nan equals nan."""
     is_same = (rows == row) | (np.isnan(rows) & np.isnan(row))
     return np.asarray(is_same.all(axis=(1, 2)))

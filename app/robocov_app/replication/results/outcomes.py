@@ -90,7 +90,7 @@ class Outcomes:
         return {name: float(np.median(values[maps == name])) for name in dict.fromkeys(known.maps)}
 
     def compute_placement_spreads(self, contender: str) -> dict[str, float]:
-        """Compute how much the final placement of a contender depends on the starts.
+        """Compute the dependence of a contender's final placement on the starts.
 
         Returns
         -------

@@ -177,7 +177,7 @@ class Pointer:
         gesture.release(event, is_click=is_click)
 
     def count_clicks(self, event: pygame.event.Event, now: float) -> int:
-        """Return how many quick presses were made here in a row, including this one: 2 for a double click."""
+        """Return the number of quick presses in a row here, including this one: 2 for a double click."""
         last = self._last_press
         is_quick = now - last.time_s < DOUBLE_CLICK_S
         is_same_place = self._is_near(last.pixel, event.pos)

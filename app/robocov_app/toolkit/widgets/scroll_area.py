@@ -23,7 +23,7 @@ _BAR_GAP_PX = 4
 _BAR_RIGHT_PX = 1
 """Distance of the scroll bar from the right edge of the area."""
 _KNOB_MARGINS_PX = (4, 2)
-"""How much narrower and lower than its area the knob is drawn."""
+"""Amounts by which the drawn knob is narrower and lower than its area."""
 _HEIGHT_TOLERANCE_PX = 0.5
 
 # Fractions of the color of text in the color of the knob.

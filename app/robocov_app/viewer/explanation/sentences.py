@@ -154,7 +154,7 @@ def list_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
 
 
 def _list_limits(situation: RobotSituation) -> list[str]:
-    """Return which limits of acceleration and speed the robot has reached."""
+    """Describe the limits of acceleration and speed that the robot has reached."""
     texts: list[str] = []
     if not situation.forces:
         texts.append("its controller returned an invalid force")

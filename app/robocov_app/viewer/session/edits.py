@@ -360,7 +360,7 @@ def compare_obstacles(before: Environment, after: Environment) -> EditObstacles:
 
 
 def _count_equal(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
-    """Return how many obstacles at the beginning are the same."""
+    """Return the number of equal obstacles at the beginning."""
     equal_pairs = takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False))
     return sum(1 for _ in equal_pairs)
 

@@ -90,7 +90,7 @@ def find_roomiest_point(
 
 
 def _limit_squares(free: Polygon, sides: Array) -> int:
-    """Return how many squares to use: fewer if testing which centers are inside takes long."""
+    """Return the number of squares to use: fewer if testing their centers takes long."""
     _, low_y, _, high_y = free.bounds
     crossings = count_ray_crossings(sides, np.linspace(low_y, high_y, _MAX_SQUARES))
     return max(min(_MAX_SQUARES, _MAX_SQUARES * _MAX_RAY_CROSSINGS // max(crossings, 1)), 16)

@@ -16,7 +16,7 @@ from robocov_app.formats.geometry.crossings import CrossingCounter, extract_edge
 from robocov_app.formats.geometry.polygons import make_valid, to_multipolygon, unite
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
-"""Which area rings enclose: with "holes", further rings are holes in the first; else SVG's ``fill-rule``."""
+"""Rule for enclosed areas: with "holes", further rings are holes in the first; else SVG's ``fill-rule``."""
 _MAX_RAY_PAIRS = 500_000
 """Number of pairs of a ray and an edge that are compared at once, to limit the memory."""
 
@@ -127,7 +127,7 @@ def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
 
 
 def _test_winding(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
-    """Return which points, (m, 2), are inside by a fill rule.
+    """Return a mask of the points, (m, 2), that are inside by a fill rule.
 
     A ray from the point to the right crosses an odd number of edges (evenodd), or crosses upward and downward
     edges a different number of times (nonzero).

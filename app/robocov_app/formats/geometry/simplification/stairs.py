@@ -96,7 +96,7 @@ class _StairLines(NamedTuple):
 
 
 class _CutCorners(NamedTuple):
-    """Which of m sides are cut corners, and where each corner would be, (m, 2) m."""
+    """Mask of the m sides that are cut corners, and the position of each corner, (m, 2) m."""
 
     is_cut: BoolArray
     positions: Array

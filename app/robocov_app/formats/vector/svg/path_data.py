@@ -147,7 +147,7 @@ class _Pen:
         self._arcs: list[_Arc] = []
 
     def count_remaining(self, kind: str) -> int:
-        """Return how many more times a command may occur."""
+        """Return the maximum number of further repetitions of a command."""
         points = self._max_points - len(self._vertices)
         if kind in "ML":
             return points

@@ -234,7 +234,7 @@ class _ElementCounter:
         self._open: set[Element] = set()
 
     def count(self, element: Element, depth: int) -> tuple[int, int]:
-        """Return how many elements an element draws, and how many of them are shapes."""
+        """Return the number of elements that an element draws, and the number of shapes among them."""
         if element in self._open:
             element.raise_error("uses itself")
         if depth > MAX_NESTING:

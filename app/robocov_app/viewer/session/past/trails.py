@@ -283,7 +283,7 @@ def merge_sections(sections: list[TrailSection], later: Iterable[TrailSection]) 
 
 
 def _compute_deviations(positions: Array, rows: IntArray) -> Array:
-    """Return how much the trajectories change if single rows are removed, (r,) m.
+    """Return the changes of the trajectories if single rows are removed, (r,) m.
 
     A row at which a robot joins or fails has an infinite deviation.
 
