@@ -178,7 +178,7 @@ class LatestWorker(Generic[_Answer]):
         if self.process is None:
             return
         process = self.process
-        # Wakes the writing thread, which ends because the process is no longer that of the worker.
+        # Wakes the writing thread, which ends because the process no longer belongs to the worker.
         self.process = None
         self._has_question.set()
         process.kill()

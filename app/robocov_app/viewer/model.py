@@ -41,7 +41,7 @@ class ViewerModel(WindowModel):
     controllers : list of str
         Names of the controllers that are offered.
     settled_change : Node or None
-        Last node after whose edit the team has settled; it stays set even if the team moves again a little.
+        Last edit after which the team has settled; it stays set even if the team moves again a little.
     """
 
     def __init__(

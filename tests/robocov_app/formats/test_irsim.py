@@ -268,7 +268,7 @@ def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)
     place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
-    expected = "expected a picture next to the file, or one of those of IR-SIM, got 'cave.png'. "
+    expected = "expected a picture next to the file, or a picture of IR-SIM, got 'cave.png'. "
     assert str(caught.value) == place + expected + "IR-SIM is not installed (pip install ir-sim)."
 
 

@@ -39,7 +39,7 @@ class PairsRow(NamedTuple):
     text: str
     pairs: PairedComparison | None
     controller: str
-    """Controller whose style the row has."""
+    """Controller that determines the style of the row."""
 
 
 class CostRow(NamedTuple):

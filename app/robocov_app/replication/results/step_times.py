@@ -20,7 +20,7 @@ from robocov_app.replication.design.plan import TEAM, Plan
 from robocov_app.sweep.parameters import build_swept_team
 
 BASELINE = "rapf"
-"""Controller with whose step times those of the others are compared."""
+"""Reference controller for the step times of all others."""
 TIMING_MAP = "campus"
 """Map on which steps are timed: the largest bundled one, which has space for large teams."""
 STEPS_PER_BLOCK = 50

@@ -29,7 +29,7 @@ class ComparisonActions:
         self._viewer = viewer
 
     def add_pane(self) -> None:
-        """Restart with one more pane, whose controller is one that is not shown yet, if there is one."""
+        """Restart with one more pane, preferably with a controller that is not shown yet."""
         viewer = self._viewer
         present = {pane.controller.name for pane in viewer.session.timeline.panes}
         absent = [name for name in viewer.controllers if name not in present]

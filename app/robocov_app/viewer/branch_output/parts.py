@@ -106,7 +106,7 @@ class BranchPart:
     Attributes
     ----------
     node : Node
-        Node of the document at whose edit the part starts.
+        Node of the document; the part starts at its edit.
     first_step, last_step : int
         First and last step.
     setups : dict of int to PaneSetup

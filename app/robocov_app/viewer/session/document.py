@@ -112,7 +112,7 @@ class Node:
 
 
 class Branch(NamedTuple):
-    """A path through the tree to a node after whose last step nothing was edited.
+    """A path through the tree; nothing was edited after its last step.
 
     Attributes
     ----------

@@ -86,7 +86,7 @@ def _find_packaged_picture(source: Node) -> Path:
     """
     name = source.get_text()
     missing = (
-        f"{source.place}: expected a picture next to the file, or one of those of IR-SIM, got {quote(name)}"
+        f"{source.place}: expected a picture next to the file, or a picture of IR-SIM, got {quote(name)}"
     )
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:

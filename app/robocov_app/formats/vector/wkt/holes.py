@@ -103,7 +103,7 @@ def _find_overlaps(
 def _replace_polygons(
     geometries: list[SourceGeometry], remainders: dict[int, MultiPolygon]
 ) -> list[SourceGeometry]:
-    """Replace polygons by what remains of them; `remainders` is keyed by their indices."""
+    """Replace polygons by their remainders, which are keyed by the indices of the polygons."""
     result: list[SourceGeometry] = []
     for index, geometry in enumerate(geometries):
         if index not in remainders:
