@@ -86,6 +86,8 @@ def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
 def is_usable() -> bool:
     """Return whether the compiled queries give the same results as the public ones on this machine.
 
+    Both are called for a point and a ray near a triangle, and their results are compared.
+
     Returns
     -------
     bool

@@ -44,8 +44,8 @@ _COMPILED_LIST = "compiled.json"
 """File in the cache folder with the names of the kernels whose machine code is there."""
 _POLL_PERIOD_S = 0.25
 """Time between two checks whether more kernels have been compiled."""
-_UNTIL_STDIN_CLOSES = "--until-stdin-closes"
-"""Option that ends the module when the process that started it ends, for whatever reason."""
+_EXIT_WITH_PARENT_OPTION = "--until-stdin-closes"
+"""Command-line option: exit when standard input closes, as it does when the parent process ends."""
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
@@ -210,20 +210,10 @@ class _BackgroundCompilation:
         self._list = folder / _COMPILED_LIST
         self._compiled: set[str] = set()
         self._next_poll_time = 0.0
-        # Importing numba takes a while, too, so it happens in a thread.
+        # Importing numba is slow as well, so a thread of this process does it.
         self._import = threading.Thread(target=import_numba, daemon=True)
         self._import.start()
-        self._process: subprocess.Popen[bytes] | None = None
-        search_path = os.pathsep.join(filter(None, sys.path))
-        with suppress(OSError):
-            self._process = subprocess.Popen(
-                # -P prevents the import of modules from the working folder.
-                [sys.executable, "-P", "-m", __name__, _UNTIL_STDIN_CLOSES],
-                env={**os.environ, "PYTHONPATH": search_path},
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
+        self._process = _start_compilation_process()
 
     def must_interpret(self, kernel: str) -> bool:
         """Return whether a kernel must run as Python, because its machine code is not ready yet."""
@@ -251,6 +241,21 @@ class _BackgroundCompilation:
                 self._process.kill()
 
 
+def _start_compilation_process() -> subprocess.Popen[bytes] | None:
+    """Start a process that compiles all kernels; return None if the system cannot start one."""
+    search_path = os.pathsep.join(filter(None, sys.path))
+    with suppress(OSError):
+        return subprocess.Popen(
+            # -P prevents Python from importing modules from the current directory.
+            [sys.executable, "-P", "-m", __name__, _EXIT_WITH_PARENT_OPTION],
+            env={**os.environ, "PYTHONPATH": search_path},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    return None
+
+
 def _get_marker(folder: Path, example: Example) -> Path:
     """Return the file that exists once an example has been called."""
     return folder / f"{example.__name__}.ready"
@@ -269,7 +274,7 @@ def _save_compiled_list(folder: Path) -> None:
 
 def main() -> None:
     """Compile all kernels at low priority."""
-    if _UNTIL_STDIN_CLOSES in sys.argv[1:]:
+    if _EXIT_WITH_PARENT_OPTION in sys.argv[1:]:
         threading.Thread(target=_exit_when_stdin_closes, daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(5)

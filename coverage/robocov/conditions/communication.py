@@ -241,7 +241,7 @@ class Radio:
         inbox : Inbox
             Messages before the step.
         step : int
-            Number of the step since time zero.
+            Index of the step, from 0 at time zero.
         reported_positions : (n, 2) array, m
             The robots' own estimates of their positions.
         true_positions : (n, 2) array, m
@@ -296,7 +296,7 @@ class Radio:
         inbox : Inbox or None
             After the positions of the step were exchanged; None if nothing is in flight and nothing waits.
         step : int
-            Number of the step since time zero.
+            Index of the step, from 0 at time zero.
         observations : Observations
 
         Returns
@@ -345,9 +345,9 @@ class Radio:
         Parameters
         ----------
         inbox : Inbox or None
-            Messages after the observations of the step; None if nothing is in flight and nothing waits.
+            Messages after the observations of the step; None if no message is in flight or queued.
         step : int
-            Number of the step since time zero.
+            Index of the step, from 0 at time zero.
         messages : sequence of sequence of Message
             New messages of each robot; empty if there are none. Robots that do not work send nothing.
         true_positions : (n, 2) array, m
@@ -378,13 +378,15 @@ class Radio:
         outbox, departing = self._take_from_queues(outbox)
         links = Neighbors.from_ranges(true_positions, self._ranges).restrict_to_working(working)
         transmissions = []
-        for sender, own in enumerate(departing):
-            if own:
+        sent_bytes = 0
+        for sender, sent_messages in enumerate(departing):
+            if sent_messages:
                 is_linked = np.zeros(len(working), dtype=bool)
                 is_linked[links.list_neighbors(sender)] = True
-                transmissions += self._transmit(sender, own, step, is_linked)
+                transmissions += self._transmit(sender, sent_messages, step, is_linked)
+                sent_bytes += sum(message.size for message in sent_messages)
         inbox = replace(inbox, transmissions=(*inbox.transmissions, *transmissions), outbox=outbox)
-        return inbox, sum(message.size for own in departing for message in own)
+        return inbox, sent_bytes
 
     def _pay_for_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
         """Add the bytes of one sending period to the credits, and subtract the positions that are sent.
@@ -425,7 +427,7 @@ class Radio:
     def _transmit(
         self, sender: int, messages: Sequence[Message], step: int, is_linked: BoolArray
     ) -> list[Transmission]:
-        """Send messages of one robot; `is_linked`, (n,) bool, is the mask of the robots in range."""
+        """Send the messages of one robot; `is_linked`, (n,) bool, is the mask of the robots in range."""
         arrival_step = step + max(1, self._latency_steps)
         is_received = np.broadcast_to(is_linked, (len(messages), len(is_linked)))
         if self._conditions.loss:
@@ -445,7 +447,7 @@ class Radio:
         ----------
         inbox : Inbox
         step : int
-            Number of the step since time zero.
+            Index of the step, from 0 at time zero.
         working : (n,) bool array
             Mask of the robots that work.
 

@@ -311,7 +311,7 @@ class Conditions:
         Parameters
         ----------
         data : mapping
-            As `to_dict` returns it.
+            In the format of `to_dict`.
 
         Returns
         -------
@@ -320,7 +320,7 @@ class Conditions:
         Raises
         ------
         ParameterError
-            If a key is missing, or a value cannot be used.
+            If a key is missing or a value is invalid.
         """
         try:
             # Files of earlier versions have no bandwidth.

@@ -30,9 +30,9 @@ def create_generator(seed: int, stream: int, step: int = 0, robot: int | None = 
     stream : int
         Number of the stream, such as `LOSS_STREAM`.
     step : int
-        Number of the step since time zero, from 0.
+        Index of the step, from 0 at time zero.
     robot : int or None
-        Number of the robot, from 0, in a stream with separate numbers for each robot.
+        Index of the robot, from 0, if the stream has separate random numbers for each robot.
 
     Returns
     -------

@@ -334,15 +334,24 @@ class Boosting(BaseController):
     def _sample_views(
         self, seen: Observations, view: View, pairs: NearNeighbors, directions: Array, reach: Array
     ) -> _ViewSamples:
-        """Sample the views of all robots."""
-        angle = 2.0 * np.pi / len(directions)
-        depths = view.distances[..., None] * _SAMPLE_FRACTIONS
-        points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
+        """Sample the views of all robots for numerical integration.
+
+        A view consists of one narrow sector around each ray, which ends at a wall or at the sensing range.
+        Each ray is sampled at k points with equal spacing. A sample represents the part of the sector around
+        it, and the area of that part is the spacing times the width of the sector at the sample.
+        """
+        sector_angle = 2.0 * np.pi / len(directions)
+        # The axes of an array of samples are robot, ray and sample; points have one more, for x and y.
+        depths = view.distances[:, :, None] * _SAMPLE_FRACTIONS
+        offsets = depths[:, :, :, None] * directions[None, :, None, :]
+        points = seen.positions[:, None, None, :] + offsets
+        spacings = view.distances / _SAMPLES_PER_RAY
+        areas = depths * (spacings * sector_angle)[:, :, None]
         wall_distances = np.where(view.hit, view.distances, np.inf)
         undetected = compute_undetected(depths, wall_distances, directions, pairs, reach, self.decay)
         return _ViewSamples(
             depths=depths,
-            areas=depths * (view.distances / _SAMPLES_PER_RAY * angle)[..., None],
+            areas=areas,
             undetected=undetected,
             detection=np.exp(-self.decay * depths),
             weight=evaluate_density(seen.density, points) * undetected,

@@ -285,7 +285,8 @@ def get_gain_values(controller: Any) -> dict[str, Value]:
 def validate_gains(controller: Any) -> None:
     """Validate all gains of a controller, and convert numbers to floats.
 
-    Call it in ``__post_init__`` of a frozen dataclass. Error messages begin with the controller's name.
+    A controller that is a frozen dataclass calls this function in its ``__post_init__`` method. Error
+    messages begin with the controller's name.
 
     Raises
     ------

@@ -228,7 +228,8 @@ class IndividualControllerAdapter:
         memory : IndividualMemories or None
             None if the robots remember nothing.
         robots : iterable of int or None
-            Numbers of the robots for which it is called; by default all. The forces of the others are 0.
+            Indices of the robots for which the controller is called; all robots by default. The forces on the
+            other robots are 0.
 
         Returns
         -------
@@ -284,7 +285,7 @@ class IndividualControllerAdapter:
 
 
 def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory: Any) -> OwnView:
-    """Return the knowledge of one robot. The controller may change the arrays, which are copies."""
+    """Return the view of one robot. Its arrays are copies, because the controller may change them."""
     obstacle_point = None
     if not np.isnan(seen.obstacle_points[robot, 0]):
         obstacle_point = seen.obstacle_points[robot].copy()

@@ -349,6 +349,11 @@ class Poduri(BaseController):
     k_obs: float = gain(0.1, "N m³", "strength of the repulsion from the closest obstacle point")
     rho_obs: float = gain(2.0, "m", "range of that repulsion", low=0.01, high=1e4)
 
+    @property
+    def _min_degree(self) -> float:
+        """K, the number of neighbors that each robot keeps."""
+        return self.neighbours
+
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         """Compute the forces F_cover + F_degree and the repulsion of the closest obstacle point."""
         n = len(seen.positions)
@@ -392,8 +397,8 @@ class Poduri(BaseController):
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges
         rank = _rank_by_distance(links.robot, links.distance)
-        has_few_near = is_near.sum(axis=1) <= self.neighbours
-        is_critical: BoolArray = has_few_near[links.robot] & (rank < self.neighbours)
+        has_few_near = is_near.sum(axis=1) <= self._min_degree
+        is_critical: BoolArray = has_few_near[links.robot] & (rank < self._min_degree)
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
             is_critical[others] = self._is_critical_for_neighbor(seen, links, is_near, others)
@@ -404,25 +409,27 @@ class Poduri(BaseController):
     def _is_critical_for_neighbor(
         self, seen: Observations, links: NearNeighbors, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbor, as far as the robot knows its neighbors.
+        """Return whether the selected links are critical for the neighbor, as far as the robot can tell.
 
-        Entry (i, j) of `near_counts` is the number of robots near j that robot i knows.
+        A link is critical for the neighbor if at most K robots are near it, within η R_c, and fewer than K
+        are nearer to it than the robot is. Only robots that the robot knows count: itself and its neighbors.
         """
-        n = len(is_near)
-        knows = np.eye(n, dtype=bool)
-        robot, neighbor = seen.neighbors.list_pairs()
-        knows[robot, neighbor] = True
-        # Products of float matrices are much faster than those of integers.
+        knows = _find_known_robots(seen)
+        # Entry (i, j) is the number of robots near j that robot i knows. Products of float matrices are much
+        # faster than those of integers.
         near_counts = knows.astype(np.float32) @ is_near.astype(np.float32).T
-        is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbours
-        # The next table has a row of n columns for each link. Only few links remain.
-        remaining = selected[is_critical]
-        distances = np.full((n, n), np.inf)
+        has_few_near = near_counts[links.robot, links.neighbor][selected] <= self._min_degree
+        # The second condition needs n distances for each link, so it is tested only for these links.
+        candidates = selected[has_few_near]
+        distances = np.full(knows.shape, np.inf)
         distances[links.robot, links.neighbor] = links.distance
-        is_nearer = distances[links.neighbor[remaining]] < links.distance[remaining, None]
-        nearer_counts = (is_nearer & knows[links.robot[remaining]]).sum(axis=1)
-        is_critical[is_critical] = nearer_counts < self.neighbours
-        return np.asarray(is_critical)
+        # Entry (c, k) of both arrays is about candidate c and robot k.
+        is_nearer = distances[links.neighbor[candidates]] < links.distance[candidates, None]
+        is_known = knows[links.robot[candidates]]
+        nearer_counts = (is_nearer & is_known).sum(axis=1)
+        is_critical = np.zeros(len(selected), dtype=bool)
+        is_critical[has_few_near] = nearer_counts < self._min_degree
+        return is_critical
 
     def _is_critical_by_reports(
         self, seen: Observations, links: NearNeighbors, link_ranges: Array, selected: IntArray
@@ -438,8 +445,16 @@ class Poduri(BaseController):
             near_range = self.eta * link_ranges[link]
             near_count = (distances <= near_range).sum() + (links.distance[link] <= near_range)
             nearer_count = (distances < links.distance[link]).sum()
-            is_critical[k] = near_count <= self.neighbours and nearer_count < self.neighbours
+            is_critical[k] = near_count <= self._min_degree and nearer_count < self._min_degree
         return is_critical
+
+
+def _find_known_robots(seen: Observations) -> BoolArray:
+    """Return whether robot i knows the position of robot j, (n, n): its own and those of its neighbors."""
+    knows = np.eye(len(seen.positions), dtype=bool)
+    robot, neighbor = seen.neighbors.list_pairs()
+    knows[robot, neighbor] = True
+    return knows
 
 
 def _rank_by_distance(robot: IntArray, distance: Array) -> IntArray:

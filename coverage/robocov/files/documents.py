@@ -151,7 +151,7 @@ def describe_mismatch(expected: str, value: object, *, is_missing: bool = False)
         Description of the expected value.
     value : object
     is_missing : bool
-        Whether there is no value.
+        Whether the value is missing.
 
     Returns
     -------

@@ -250,13 +250,13 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
         If the folder cannot be used, another process is using it, or a file not written by robocov is in the
         way.
     """
-    listing_folder, part = _find_listing_folder(folder)
+    listing_folder, run_name = _find_listing_folder(folder)
     with _open_folder(listing_folder):
         with report_folder_errors(listing_folder):
             owned_files = _list_owned_files(listing_folder)
         if owned_files is None:
             raise InputError(f"{folder}: expected a result of robocov in the folder, found none")
-        result = ResultFolder(listing_folder, owned_files, replaces=False, part=part)
+        result = ResultFolder(listing_folder, owned_files, replaces=False, part=run_name)
         yield result
         result.commit()
 
@@ -279,8 +279,8 @@ def complete_commit(folder: Path) -> None:
     if os.path.lexists(folder / _JOURNAL_FILE):
         with lock_folder(folder, _LOCK_FILE, remove=True), report_folder_errors(folder):
             _carry_out_journal(folder)
-    listing_folder, part = _find_listing_folder(folder, _JOURNAL_FILE)
-    if part:
+    listing_folder, run_name = _find_listing_folder(folder, _JOURNAL_FILE)
+    if run_name:
         raise InputError(f"{folder}: its replacement was interrupted; open {listing_folder} to complete it")
 
 
@@ -399,8 +399,8 @@ def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
         return None
     if not overwrite:
         raise InputError(f"{folder}: the folder is not empty; choose another --out or pass --overwrite")
-    listing_folder, part = _find_listing_folder(folder)
-    if part:
+    listing_folder, run_name = _find_listing_folder(folder)
+    if run_name:
         raise InputError(f"{folder}: belongs to the comparison in {listing_folder}; choose another --out")
     owned_files = _list_owned_files(folder)
     if owned_files is None:

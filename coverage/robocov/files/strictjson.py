@@ -242,6 +242,7 @@ def require_json(value: object, where: str) -> None:
 
 
 def _find_first_mistake(value: Any, path: JsonPath) -> Mistake | None:
+    """Return the first mistake in a value and everything nested in it, or None if it is valid JSON."""
     if not isinstance(value, (dict, list, tuple)):
         message = _describe_invalid_scalar(value)
         return None if message is None else Mistake.at_path(path, message)

@@ -20,7 +20,7 @@ _FLUSH_THREADS = 8
 
 @contextmanager
 def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
-    """Write a file under a temporary name, and give it its own name at the end.
+    """Provide a temporary file that replaces the target when the ``with`` block ends.
 
     If the ``with`` block raises, the temporary file is removed and `target` stays as it was. A link stays a
     link: the file that it points to is replaced. An existing file keeps its permissions.
@@ -30,7 +30,7 @@ def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
     target : Path
         The file to create or replace.
     durable : bool
-        Flush the file to the disk before it gets its name.
+        Flush the file to the disk before it replaces the target.
 
     Yields
     ------

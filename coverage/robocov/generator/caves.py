@@ -138,17 +138,19 @@ class _CaveBuilder:
     start_area: BaseGeometry
 
     def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
-        """Build the core of a cave: the area where the center of a robot may be, in one piece.
+        """Build the core of a cave: the connected area where the center of a robot may be.
 
-        It consists of the areas where a random field on a mesh is below 0 (the chambers), of the area around
-        the start (the hall), and of tunnels that join them.
+        The core is the union of the chambers, which are the areas where a random field on a mesh is below 0,
+        the hall, which is the area around the start, and tunnels that connect them. `seed` determines the
+        shapes of the tunnels.
         """
         low_area = shapely.simplify(extract_area_below_zero(points, values), self.tolerance)
         low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
         min_area = _MIN_CHAMBER_UNIT_AREAS * self.request.unit**2
         chambers = [chamber for chamber in shapely.get_parts(low_area) if chamber.area >= min_area]
-        # The free space results later from dilating the core by at least `min_radius`. The start is eroded by
-        # that radius now, so that it becomes free as a whole, but not much more.
+        # Dilating the core by at least `min_radius` will later turn it into the free space. The hall is
+        # therefore the start area eroded by `min_radius`: dilation restores the entire start area, and little
+        # else.
         hall = self.start_area.buffer(-self.min_radius)
         if hall.is_empty:
             hall = self.start_area.centroid
@@ -201,17 +203,18 @@ def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
 
 
 def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int) -> BaseGeometry:
-    """Return the core at the level that leaves about the requested area blocked after dilation.
+    """Return the core of a cave that leaves about the requested fraction of the map blocked after dilation.
 
-    The core is where the field is below the level. The higher the level, the larger is the core, and the less
-    is blocked, so that bisection finds it.
+    The chambers of the core are the areas where a random field is below some level. Raising the level
+    enlarges them, so that less of the map is blocked. The level is therefore found by bisection.
     """
+    radius = _LEVEL_RADIUS * builder.min_radius
     low = float(values.min())
     high = float(values.max())
     for _ in range(_LEVEL_STEPS):
         level = (low + high) / 2.0
         core = builder.build_core(points, values - level, seed)
-        space = builder.dilate(core, _LEVEL_RADIUS * builder.min_radius)
+        space = builder.dilate(core, radius)
         if builder.compute_excess(space) > 0.0:
             low = level
         else:
@@ -220,7 +223,10 @@ def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int)
 
 
 def _choose_radius(builder: _CaveBuilder, core: BaseGeometry) -> float:
-    """Return the dilation of a core that leaves about the requested area blocked, m, found by bisection."""
+    """Return the radius of dilation, m, that leaves about the requested fraction of the map blocked.
+
+    Dilating the core by a larger radius blocks less of the map. The radius is found by bisection.
+    """
     low = builder.min_radius
     high = _MAX_RADIUS * builder.min_radius
     for _ in range(_RADIUS_STEPS):

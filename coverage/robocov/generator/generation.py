@@ -212,9 +212,9 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         if complete_environment is not None:
             return complete_environment
     raise ParameterError(
-        f"area: no layout of {request.count} {map_kind.obstacle_name} was found that blocks {request.area:g} "
-        f"of {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m. "
-        f"Try another area, a narrower gap or another number of {map_kind.obstacle_name}"
+        f"area: found no {request.width:g} x {request.height:g} m layout of {request.count} "
+        f"{map_kind.obstacle_name} with a blocked fraction of {request.area:g} and gaps of "
+        f"{request.gap:g} m. Try another area, a narrower gap or another number of {map_kind.obstacle_name}"
     )
 
 

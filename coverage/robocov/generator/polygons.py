@@ -1,6 +1,7 @@
 """Maps of the kind `polygons`: scattered obstacles, convex polygons, L and U shapes."""
 
 import math
+from collections import deque
 
 import numpy as np
 import shapely
@@ -63,7 +64,7 @@ def scatter_polygons(
         None if the obstacles do not fit.
     """
     areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.count)
-    areas = np.sort(areas)[::-1]  # The largest is placed first.
+    areas = np.sort(areas)[::-1]  # The largest obstacle is placed first.
     areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
         return None
@@ -71,22 +72,21 @@ def scatter_polygons(
     shapely.prepare(start_disc)
     names = list(SHAPE_PROBABILITIES)
     shapes = rng.choice(names, size=request.count, p=list(SHAPE_PROBABILITIES.values()))
-    # The last one is placed next.
-    waiting = list(zip(shapes.tolist(), areas.tolist(), strict=True))[::-1]
+    waiting = deque(zip(shapes.tolist(), areas.tolist(), strict=True))
     placed: list[tuple[str, float]] = []
     outlines: list[shapely.Polygon] = []
     moves = 0
     while waiting:
-        shape, area = waiting[-1]
+        shape, area = waiting[0]
         outline = _place_shape(request, shape, area, np.array(outlines, dtype=object), start_disc, rng)
         if outline is not None:
             outlines.append(outline)
-            placed.append(waiting.pop())
+            placed.append(waiting.popleft())
         elif moves < _MAX_MOVES and placed:
-            # Another obstacle makes room, and is placed again after this one.
+            # Remove a random obstacle to make room, and place it again right after the current one.
             moves += 1
             removed = int(rng.integers(len(placed)))
-            waiting.insert(-1, placed.pop(removed))
+            waiting.insert(1, placed.pop(removed))
             outlines.pop(removed)
         else:
             return None

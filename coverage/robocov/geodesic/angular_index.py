@@ -100,7 +100,8 @@ class AngularWallIndex(NamedTuple):
         ----------
         source_count : int
         bin_count : int
-            Number of angular bins of each source, a power of 2: their indices wrap around by a bit mask.
+            Number of angular bins of each source. It must be a power of 2, because a bit mask is used to wrap
+            the indices of bins around after a full turn.
         max_entries : int
             Maximum number of entries, for all sources together.
 

@@ -326,6 +326,8 @@ class Geodesics:
         -------
         (n, m) array, grid steps
         """
+        # A shortest path that is not straight leads from the source to its last corner, possibly via other
+        # corners, and from there straight to the target.
         index, from_sources, _ = self._compute_corner_distances(sources, must_be_straight=False)
         distances = np.empty((len(sources), len(targets)))
         for first in range(0, len(targets), _TARGETS_PER_BLOCK):

@@ -95,7 +95,7 @@ class LowerBound:
     value : float, m³
         Lower bound on the cost (22) of any placement.
     placement_mean_distance : float, m
-        Mean distance of the given placement.
+        Mean distance of the placement that was passed to `compute_lower_bound`.
     prices : (m,) array, m
         Prices of the sites that prove the bound; nan in components of the free space without a robot.
 
@@ -235,7 +235,7 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
     higher profit than any in the table. They are added to it, and the next search is smoothed half as much.
     Without smoothing, the dual would have no gradient where two positions are equally profitable.
     """
-    prices = dual.first_prices
+    prices = dual.initial_prices
     for smoothing in _ROUGH_SMOOTHINGS:
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
     best: _Proof | None = None
@@ -278,10 +278,10 @@ class _Dual:
     site_data : SiteData
         The same sites for kernels.
     placement_cost : float, m
-        Cost of the given placement.
+        Cost of the placement from which the dual was built.
     max_prices : (m,) array, m
         Largest prices of the searches, which limit the number of entries in the table.
-    first_prices : (m,) array, m
+    initial_prices : (m,) array, m
         Prices with which the search starts.
     candidate_spacing : float, grid steps
         Spacing of the candidates among the sites.
@@ -298,20 +298,23 @@ class _Dual:
     site_data: SiteData
     placement_cost: float
     max_prices: Array
-    first_prices: Array
+    initial_prices: Array
     candidate_spacing: float
     triangles: Array
     table: PriceTable
 
     @classmethod
     def build(cls, cost: CoverageCost, positions: Array, radius: float) -> _Dual:
-        """Build the sites, the triangles, the first prices and the table.
+        """Build the dual problem for a team with as many robots as a placement.
+
+        The placement should have a low cost: the initial prices are derived from it, and its robots are among
+        the first candidate positions. The dual covers the components of the free space that contain them.
 
         Parameters
         ----------
         cost : CoverageCost
         positions : (n, 2) array, m
-            The given placement.
+            The placement.
         radius : float, m
             Radius of the robots.
 
@@ -321,17 +324,15 @@ class _Dual:
         """
         geodesics = cost.geodesics
         result = cost(positions)
-        # The positions of the robots, (n, 2) grid steps, and whether each robot is in each component of the
-        # free space, (n, c).
+        # `robots` are the positions in grid steps, (n, 2), and `is_inside`, (n, c), is true where a robot is
+        # in a component.
         robots, is_inside = geodesics.snap_to_free_space(positions)
         is_covered = np.asarray(is_inside.any(axis=0))
         site_numbers = np.flatnonzero(result.owner >= 0)
-        site_positions = cost.points[site_numbers]
         site_data = _build_site_data(cost, site_numbers)
-        placement_cost = float(site_data.weights @ result.distances[site_numbers])
         components = np.array(cost.environment.free.geoms)[is_covered]
         configuration_space = _build_configuration_space(components, radius)
-        max_prices, first_prices = _compute_first_prices(geodesics, robots, site_data.sites)
+        max_prices, initial_prices = _compute_initial_prices(geodesics, robots, site_data.sites)
         stride = _choose_candidate_stride(len(site_numbers), len(positions))
         dual = cls(
             geodesics=geodesics,
@@ -339,18 +340,25 @@ class _Dual:
             is_covered=is_covered,
             site_numbers=site_numbers,
             site_data=site_data,
-            placement_cost=placement_cost,
+            placement_cost=float(site_data.weights @ result.distances[site_numbers]),
             max_prices=max_prices,
-            first_prices=first_prices,
+            initial_prices=initial_prices,
             candidate_spacing=stride * cost.spacing / geodesics.grid.unit,
             triangles=geodesics.grid.snap(_triangulate(configuration_space)),
             table=PriceTable.build_empty(),
         )
-        # The table starts with the robots and some of the sites where a robot can be.
-        is_candidate = shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])
-        candidates = dual._thin_out(site_data.sites[is_candidate])
-        dual.add_candidates(np.concatenate([robots, candidates]))
+        site_candidates = dual._choose_site_candidates(configuration_space, cost.points[site_numbers])
+        dual.add_candidates(np.concatenate([robots, site_candidates]))
         return dual
+
+    def _choose_site_candidates(self, configuration_space: shapely.Geometry, site_positions: Array) -> Array:
+        """Return evenly spread sites where the center of a robot can be, (p, 2) grid steps.
+
+        The positions of all sites, (m, 2), are in meters, like the configuration space.
+        """
+        x, y = site_positions.T
+        is_candidate = shapely.intersects_xy(configuration_space, x, y)
+        return self._thin_out(self.site_data.sites[is_candidate])
 
     @property
     def unit(self) -> float:
@@ -550,7 +558,7 @@ def _triangulate(area: shapely.Geometry) -> Array:
     return np.asarray(rings[:, :3])
 
 
-def _compute_first_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
+def _compute_initial_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
     """Return maximum and initial prices, (m,) m each, for robots and sites in grid steps."""
     distances = geodesics.compute_grid_distances(robots, sites) * geodesics.grid.unit
     missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
@@ -560,5 +568,5 @@ def _compute_first_prices(geodesics: Geodesics, robots: Array, sites: Array) -> 
     # An initial price is halfway between the distances of the nearest robot and the next one. If there is
     # only one robot, it exceeds the distances of all sites.
     single_robot_prices = nearest + nearest.max()
-    first_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
-    return distances[_MAX_PRICE_RANK - 1], first_prices
+    initial_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
+    return distances[_MAX_PRICE_RANK - 1], initial_prices

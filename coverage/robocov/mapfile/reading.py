@@ -37,7 +37,7 @@ def load_map(source: str | Path) -> Environment:
     Parameters
     ----------
     source : str or Path
-        Path of a map file, or, as a str without suffix and separator, the name of a bundled map.
+        Path of a map file, or the name of a bundled map, which is a str without suffix or separator.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     where : str
         Name of the file in messages.
     folder : Path or None
-        Folder of the pictures to which the map refers.
+        Folder of the images named in the map; None if the map does not come from a file.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def from_json(document: dict[str, Any], where: str = "map", folder: Path | None 
     where : str
         Name of the document in messages.
     folder : Path or None
-        Folder of the pictures to which the map refers.
+        Folder of the images named in the map; None if the map does not come from a file.
 
     Returns
     -------
@@ -184,7 +184,7 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
     where : str
         Name of the map in messages.
     folder : Path or None
-        Folder of the picture to which the density may refer.
+        Folder of the image that the density may name; None if it does not come from a file.
 
     Returns
     -------

@@ -153,7 +153,7 @@ def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea
 
 
 def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
-    """Yield the mistakes of a map as a whole; all its parts must be valid."""
+    """Yield the mistakes in the combination of the parts of a map, each of which is valid by itself."""
     if len(environment.region.vertices) < 3:
         yield Mistake.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
         return
@@ -161,7 +161,7 @@ def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
         yield Mistake.at_path(("obstacles",), "no free space is left inside the boundary")
         return
     density = environment.density
-    # Integrals are computed only if necessary, because loading the necessary modules takes a second.
+    # Integrate the density only if necessary, because importing the modules for it takes a second.
     if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
         yield Mistake.at_path(("density",), f"{NO_WEIGHT} in the free space")
     for name, start in environment.starts.items():

@@ -53,7 +53,7 @@ class _Sectors(NamedTuple):
     end: Array
     """Angle at which it ends."""
     wall: IntArray
-    """Number of the wall."""
+    """Index of the wall."""
 
 
 def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -> CoveredAreas:

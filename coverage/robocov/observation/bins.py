@@ -69,7 +69,9 @@ def sort_into_bins(
 ) -> Bins:
     """Sort points into square bins, which are numbered row by row.
 
-    Points within reach of each other are in the same bin or in adjacent ones.
+    Points within reach of each other are in the same bin or in adjacent ones. This is a counting sort: it
+    counts the points in each bin, computes where each bin starts in `order`, and then writes the points
+    there.
 
     Parameters
     ----------
@@ -104,16 +106,17 @@ def sort_into_bins(
     scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0
     columns = find_bin(width, scale) + 1
     rows = find_bin(height, scale) + 1
-    # A counting sort. First, starts[b + 2] is the number of points in bin b.
+    # Count the points: starts[b + 2] is the number of points in bin b.
     for b in range(columns * rows + 2):
         starts[b] = 0
     for i in range(first, stop):
         b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
         starts[b + 2] += 1
-    # Summed up, starts[b + 1] is where bin b begins.
+    # Add up the counts: starts[b + 1] becomes the number of points in the bins before b, where bin b begins.
     for b in range(columns * rows):
         starts[b + 2] += starts[b + 1]
-    # As bin b fills, starts[b + 1] advances to its end, which is where bin b + 1 begins.
+    # Write each point at starts[b + 1], and advance that index. Once bin b is full, the index has moved to
+    # its end, where bin b + 1 begins, as described above for `starts`.
     for i in range(first, stop):
         b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
         order[starts[b + 1]] = i

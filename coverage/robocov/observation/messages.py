@@ -63,7 +63,7 @@ class ReceivedMessage(NamedTuple):
     Attributes
     ----------
     sender : int
-        Number of the robot that sent it, from 0.
+        Index of the robot that sent it, from 0.
     payload : object
         The content.
     """

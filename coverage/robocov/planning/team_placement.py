@@ -111,8 +111,8 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
         return team.previous_goals
     distances = planner.source_distances[is_usable]
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
-    # The robots outside the plan together are one more source, the last one, which is fixed. Row q contains
-    # the weighted distances of a target q from all sources.
+    # Treat the robots outside the plan together as one more source, which is fixed; see `_improve_sources`.
+    # Row q contains the weighted distances from target q to all sources.
     target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
     weighted_distances = np.ascontiguousarray((target_distances * weights[is_target]).T)
 
@@ -146,14 +146,16 @@ def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> In
 def _improve_sources(
     weighted_distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
 ) -> IntArray:
-    """Return goals for the robots of the plan, as sources, (k,), with a lower cost than the chosen ones.
+    """Return goals of a lower cost for the robots of the plan, as indices of sources, (k,).
 
-    Sources are the possible goals. Row q of `weighted_distances` contains those of a target q to all of them.
-    Its last column does not belong to a source, but to the nearest robot outside the plan. That column is
-    always chosen, like the goals of fixed robots.
+    Sources are the nodes that may become goals, and `chosen` contains the current one of each robot. Entry
+    (q, s) of `weighted_distances` is the weighted distance from target q to source s. Robots outside the plan
+    do not move, but targets near them need no other robot. They are therefore treated as one more source, in
+    the last column, at the distance of the nearest of these robots. It is always chosen, like the goals of
+    fixed robots.
     """
-    # The order does not depend on the robot that plans, so that all robots choose the same of two equally
-    # good plans.
+    # Sort the robots in an order that does not depend on which of them plans, so that all robots choose the
+    # same of two equally good plans.
     order = np.lexsort(team.previous_goals.T)
     outside_source = weighted_distances.shape[1] - 1
     improved_sources = improve_sources(
@@ -173,10 +175,10 @@ def _move_first_source(
 ) -> IntArray:
     """Return sources, (k,), with that of the first robot moved to the best position in its own cell.
 
-    Sources are the possible goals, and `chosen` those of the robots of the plan. `is_in_own_cell` says for
-    each source whether no other robot is nearer to it. Row q of `weighted_distances` contains those of a
-    target q to all sources. Its last column belongs to the nearest robot outside the plan, which serves its
-    targets where it is.
+    Sources are the nodes that may become goals, and `chosen` contains the current one of each robot of the
+    plan. `is_in_own_cell` marks the sources to which no other robot is nearer. Entry (q, s) of
+    `weighted_distances` is the weighted distance from target q to source s. As in `_improve_sources`, the
+    last column represents the robots outside the plan, which do not move.
     """
     outside_source = weighted_distances.shape[1] - 1
     moved_sources = move_first_source(

@@ -174,8 +174,8 @@ def _group_cells(
 ) -> tuple[IntArray, IntArray]:
     """Return the first cell of each group, and the group of each cell, (rows, columns), or `NO_VERTEX`.
 
-    A group consists of the cells of the graph within `max_steps` of its first cell, from neighbor to
-    neighbor, that are not in an earlier group. They are found by a breadth-first search.
+    The first cell of a group is the first one of the graph that is not in an earlier group. A breadth-first
+    search adds the other cells: those that it reaches within `max_steps` steps from neighbor to neighbor.
     """
     columns = is_in_graph.shape[1]
     group = np.full(is_in_graph.shape, NO_VERTEX)

@@ -74,7 +74,7 @@ class SimulationBatch:
     Raises
     ------
     StartError
-        If the starts are not an array of this shape, or a robot would start in a wall or in another robot.
+        If the shape of the starts is not (runs, n, 2), or a robot would start in a wall or in another robot.
     ParameterError
         If an obstacle moves, the control period is out of range, or team and starts differ in size.
 
@@ -200,7 +200,7 @@ class SimulationBatch:
         Raises
         ------
         ParameterError
-            If forces are not finite or not of this shape, or the controller fails.
+            If forces are not finite, their shape is not (runs, n, 2), or the controller fails.
         """
         next_memories = self._memories
         messages: list[Sequence[Sequence[Message]]] = []
@@ -328,7 +328,7 @@ class SimulationBatch:
         Parameters
         ----------
         run : int
-            Number of the run, from 0.
+            Index of the run, from 0.
         starts : (n, 2) array, m
             Positions of its robots, which are at rest.
 

@@ -61,7 +61,7 @@ def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:
     scanning : Scanning or None
         None if they never scan.
     step : int
-        Number of the step, starting from 0.
+        Index of the step, from 0.
     dt : float, s
         Control period.
 

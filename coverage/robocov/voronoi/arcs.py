@@ -109,11 +109,13 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
 
 @kernel
 def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, float, float]:
-    """Return the moments of the circular segment on a chord of length 1.
+    """Return the area, first moment and polar moment of the circular segment on a chord of length 1.
 
-    They are the area, the first moment about the line of the chord, away from the center, and the polar
-    moment about the middle of the chord. With s and c the sine and cosine of the half angle x, and
-    h = (x - s c - 2/3 s³) / s⁵, which is 1/5 at zero, all three are sums of terms that do not cancel.
+    The first moment is about the line of the chord, positive away from the center of the circle, and the
+    polar moment is about the middle of the chord. Let x be the half angle, s its sine and c its cosine. The
+    usual formulas, such as (x - s c) / (4 s²) for the area, subtract almost equal numbers if x is small. They
+    are therefore rewritten in terms of h = (x - s c - 2/3 s³) / s⁵, which tends to 1/5 as x tends to 0: the
+    area, for example, is s (2/3 + s² h) / 4.
     """
     s = np.sin(half_angle)
     c = np.cos(half_angle)
@@ -121,6 +123,7 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
     if squared_sine > _MAX_SERIES_SQUARED_SINE:
         h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / squared_sine
     else:
+        # Evaluate the power series of h in s² by Horner's method.
         h = 0.0
         for coefficient in series:
             h = h * squared_sine + coefficient

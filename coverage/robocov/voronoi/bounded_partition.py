@@ -102,8 +102,8 @@ def partition(
     region : Region
         The cells divide it.
     neighbors : Neighbors or None
-        Communication graph. Cell i is cut only by the bisectors to the neighbors of robot i, and depends, to
-        the last bit, on nothing else. By default each robot is a neighbor of all others.
+        Communication graph. Cell i is clipped only along the bisectors to the neighbors of robot i, and
+        depends, to the last bit, on nothing else. By default each robot is a neighbor of all others.
     triangulation : (2, 8 n + 4) int32 array or None
         `Cells.triangulation` of the previous partition. If the generators have moved only a little since
         then, reusing it takes a fraction of the time. The cells are the same, to the last bit unless four
@@ -185,7 +185,7 @@ def to_generators(values: object) -> Array:
     Raises
     ------
     InputError
-        If they are not numbers of this shape.
+        If the values are not numbers, or their shape is not (n, 2).
     """
     try:
         points = np.array(values, dtype=np.float64, order="C")
@@ -283,8 +283,8 @@ def _compute_cells(
     """Compute all cells; return the number of edges, or `_NOT_FINITE`.
 
     If the mesh has columns, all robots must be neighbors of each other, and the cells follow from their
-    Delaunay triangulation. Otherwise, or if the triangulation fails, each cell is clipped by the bisectors to
-    the robot's neighbors. After a failure, the first corner of the mesh is `NOT_TRIANGULATED`.
+    Delaunay triangulation. Otherwise, or if the triangulation fails, each cell is clipped along the bisectors
+    to the robot's neighbors. After a failure, the first corner of the mesh is `NOT_TRIANGULATED`.
     """
     for i in range(len(points)):
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):

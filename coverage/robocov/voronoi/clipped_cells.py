@@ -1,4 +1,4 @@
-"""Cells that are clipped by all neighbors of their robots, one robot at a time."""
+"""Cells that are clipped along the bisectors to all neighbors, one robot at a time."""
 
 from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
@@ -17,7 +17,7 @@ from robocov.voronoi.clipping import (
 def compute_clipped_cells(
     points: Array, sides: Array, neighbors: NeighborPositions, cells: CellArrays
 ) -> int:
-    """Compute all cells, each clipped by the bisectors to the neighbors of its robot.
+    """Compute all cells, each clipped along the bisectors to the neighbors of its robot.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Clipping of one cell: the region is cut by the bisectors between a robot and its neighbors.
+"""Clipping of one cell: the region is cut along the bisectors between a robot and its neighbors.
 
 All coordinates are relative to the generator of the cell, so that a tiny cell far from the origin keeps its
 full precision.
@@ -122,7 +122,7 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     dx, dy : float, m
         Offset of the neighbor from the generator.
     robot : int
-        Number of the neighbor.
+        Index of the neighbor.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int)
     dx, dy : float, m
         Offset of the neighbor from the generator.
     robot : int
-        Number of the neighbor.
+        Index of the neighbor.
     """
     neighbors[row, DX] = dx
     neighbors[row, DY] = dy
@@ -155,7 +155,7 @@ def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int)
 
 @inlined_kernel
 def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: Array, i: int) -> CellPolygon:
-    """Cut the region by the bisectors between robot i and its neighbors.
+    """Compute the cell of robot i: clip the region along the bisectors between the robot and its neighbors.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     sides : (k, 5) array
         The region, as `Region.sides`.
     i : int
-        Number of the robot.
+        Index of the robot.
 
     Returns
     -------
@@ -239,48 +239,54 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 @inlined_kernel
 def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Cut a polygon by the bisector to a neighbor; write the remaining polygon to `cut_polygon`.
+    """Write the part of a convex polygon that is nearer to the generator than to a neighbor.
 
-    The points nearer to the generator than to the neighbor remain. The vertices beyond the bisector
-    are replaced by the two points where the outline of the polygon crosses it. Return the new number of
-    vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the bisector.
+    The part is written to `cut_polygon`: the vertices beyond the bisector between generator and neighbor are
+    replaced by the two points where the outline of the polygon crosses the bisector. Column `OTHER_CELL` of a
+    vertex is the cell on the other side of the edge that begins there, which is the neighbor's cell for the
+    new edge along the bisector.
+
+    Return the new number of vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the
+    bisector.
     """
     farthest = _compute_excess(polygon, count, neighbor_rows, row)
     if farthest == _NO_VERTEX:
         return _NOT_CUT
     # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
-    # are those from `first_cut` to `last_cut`; `after` is the vertex after them, and `before` the one before.
+    # are those from `first_cut` to `last_cut`. The others, from `first_kept` to `last_kept`, are kept.
     last_cut = farthest
-    after = _get_next_vertex(last_cut, count)
-    while after != farthest and polygon[after, _EXCESS] > 0.0:
-        last_cut = after
-        after = _get_next_vertex(last_cut, count)
-    if after == farthest:
+    first_kept = _get_next_vertex(last_cut, count)
+    while first_kept != farthest and polygon[first_kept, _EXCESS] > 0.0:
+        last_cut = first_kept
+        first_kept = _get_next_vertex(last_cut, count)
+    if first_kept == farthest:
         # All vertices are beyond the bisector.
         return 0
     first_cut = farthest
-    before = _get_previous_vertex(first_cut, count)
-    while polygon[before, _EXCESS] > 0.0:
-        first_cut = before
-        before = _get_previous_vertex(first_cut, count)
-    # Copy the vertices that remain, from `after` to `before`, and close the outline along the bisector.
+    last_kept = _get_previous_vertex(first_cut, count)
+    while polygon[last_kept, _EXCESS] > 0.0:
+        first_cut = last_kept
+        last_kept = _get_previous_vertex(first_cut, count)
     new_count = 0
-    k = after
+    k = first_kept
     while k != first_cut:
         for column in (X, Y, OTHER_CELL):
             cut_polygon[new_count, column] = polygon[k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
+    # The new edge begins where the edge from `last_kept` to `first_cut` crosses the bisector.
     robot = neighbor_rows[row, ROBOT]
-    if polygon[before, _EXCESS] == 0.0:
-        # The bisector passes through `before`, where the new edge begins.
+    if polygon[last_kept, _EXCESS] == 0.0:
+        # The crossing is at `last_kept` itself, which is already in `cut_polygon`.
         cut_polygon[new_count - 1, OTHER_CELL] = robot
     else:
-        _add_crossing(polygon, cut_polygon, new_count, before, first_cut, robot)
+        _add_crossing(polygon, cut_polygon, new_count, last_kept, first_cut, robot)
         new_count += 1
-    if polygon[after, _EXCESS] < 0.0:
-        # The rest of the edge from `last_cut` to `after` still borders on the same cell.
-        _add_crossing(polygon, cut_polygon, new_count, after, last_cut, polygon[last_cut, OTHER_CELL])
+    # The new edge ends where the edge from `last_cut` to `first_kept` crosses the bisector. If the crossing
+    # is at `first_kept` itself, no vertex is needed.
+    if polygon[first_kept, _EXCESS] < 0.0:
+        # The rest of the edge from `last_cut` to `first_kept` still borders on the same cell.
+        _add_crossing(polygon, cut_polygon, new_count, first_kept, last_cut, polygon[last_cut, OTHER_CELL])
         new_count += 1
     return new_count
 
@@ -351,7 +357,7 @@ def write_cell(
     points : (n, 2) array, m
         The generators.
     i : int
-        Number of the robot.
+        Index of the robot.
     cells : CellArrays
         Changed in place. Edges that do not fit into its array are counted, but not written.
     edge_count : int
@@ -370,11 +376,11 @@ def write_cell(
     moment_sum_y = 0.0
     k = polygon.start
     for edge in range(edge_count, edge_count + polygon.vertex_count):
-        after = _get_next_vertex(k, polygon.vertex_count)
+        next_vertex = _get_next_vertex(k, polygon.vertex_count)
         start_x = vertices[k, X]
         start_y = vertices[k, Y]
-        end_x = vertices[after, X]
-        end_y = vertices[after, Y]
+        end_x = vertices[next_vertex, X]
+        end_y = vertices[next_vertex, Y]
         cross = start_x * end_y - end_x * start_y
         doubled_area += cross
         moment_sum_x += cross * (start_x + end_x)
@@ -386,7 +392,7 @@ def write_cell(
             edges[edge, EDGE_END_Y] = end_y
             edges[edge, EDGE_CELL] = i
             edges[edge, EDGE_OTHER_CELL] = vertices[k, OTHER_CELL]
-        k = after
+        k = next_vertex
     factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
     cells.mass[i] = max(0.5 * doubled_area, 0.0)
     cells.centroid[i, 0] = points[i, 0] + moment_sum_x * factor

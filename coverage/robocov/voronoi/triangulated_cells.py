@@ -70,7 +70,7 @@ class _Fan(NamedTuple):
 def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
     """Compute all cells from a Delaunay triangulation.
 
-    A cell that was clipped by too few robots is too large. The cells are therefore correct if their areas add
+    A cell that lacks the edge to a neighbor is too large. The cells are therefore correct if their areas add
     up to the area of the region.
 
     Parameters
@@ -164,15 +164,16 @@ def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
 def _compute_region_area(sides: Array) -> float:
     """Return the area of the region, m².
 
-    Its vertices are the starts of its sides. They are taken relative to the center, which limits rounding.
+    The shoelace formula is applied to its vertices, which are the starts of its sides. Their coordinates are
+    taken relative to the center of the region, to reduce rounding errors.
     """
     x, y, _ = _compute_center_and_size(sides)
     area = 0.0
     for k in range(len(sides)):
-        after = k + 1 if k + 1 < len(sides) else 0
+        next_side = k + 1 if k + 1 < len(sides) else 0
         area += 0.5 * (
-            (sides[k, SIDE_X] - x) * (sides[after, SIDE_Y] - y)
-            - (sides[after, SIDE_X] - x) * (sides[k, SIDE_Y] - y)
+            (sides[k, SIDE_X] - x) * (sides[next_side, SIDE_Y] - y)
+            - (sides[next_side, SIDE_X] - x) * (sides[k, SIDE_Y] - y)
         )
     return area
 
@@ -184,7 +185,7 @@ def _find_cell(
     """Find the cell of robot i from the triangles around it.
 
     The neighbors of the robot are the other corners of these triangles, and the vertices of its cell are
-    their circumcenters. If the cell may reach beyond the region, the region is clipped by the bisectors to
+    their circumcenters. If the cell may reach beyond the region, the region is clipped along the bisectors to
     these neighbors instead.
     """
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])

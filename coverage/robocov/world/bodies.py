@@ -72,8 +72,8 @@ def build_robot(mass: float, radius: float, team: int | None = None) -> tuple[py
     mass : float, kg
     radius : float, m
     team : int or None
-        Number of the team, from 0 to ``MAX_TEAMS_PER_SPACE - 1``, in a space that several teams share
-        without touching each other. By default the robot touches every other one.
+        Index of the robot's team, from 0 to ``MAX_TEAMS_PER_SPACE - 1``, if several teams share the space:
+        robots of different teams do not collide. By default, the robot collides with all others.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def _wrap_array(array: Array) -> batch.Buffer:
 
 
 def compute_mover_states(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
-    """Compute the positions and velocities of moving obstacles.
+    """Compute the displacements and velocities of moving obstacles.
 
     Parameters
     ----------

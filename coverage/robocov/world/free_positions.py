@@ -152,7 +152,7 @@ def require_free_starts(
     tolerance : float, m
         Overlaps up to this depth are accepted.
     is_present : (n,) bool array or None
-        Mask of the robots that are checked; by default all are.
+        Mask of the robots to check; all robots by default.
 
     Raises
     ------

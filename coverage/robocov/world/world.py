@@ -149,7 +149,7 @@ class World:
         self._contact_solver: ContactSolver | None = None
 
     def place(self, run: int, positions: Array) -> None:
-        """Move the robots of a run to other positions, at rest and facing along +x.
+        """Move the robots of a run to new positions, at rest and facing along +x.
 
         Parameters
         ----------

@@ -293,8 +293,8 @@ def test_impossible_requests_are_rejected(parameters):
         generate_map(0, **parameters)
     obstacle_name = GENERATORS[parameters["kind"]].obstacle_name
     assert str(caught.value).startswith(
-        f"area: no layout of {parameters['obstacles']} {obstacle_name} was found "
-        f"that blocks {parameters['area']:g} of "
+        f"area: found no 10 x 10 m layout of {parameters['obstacles']} {obstacle_name} "
+        f"with a blocked fraction of {parameters['area']:g} and "
     )
 
 
@@ -336,7 +336,7 @@ def test_layouts_of_registered_kinds_are_checked(layout, area, is_valid, monkeyp
         assert environment.obstacles == tuple(layout)
         assert environment.name == "custom 0"
     else:
-        with pytest.raises(ParameterError, match="of 6 blocks was found"):
+        with pytest.raises(ParameterError, match="layout of 6 blocks with a blocked fraction"):
             generate_map(0, kind="custom", area=area)
         # Each attempt has different random numbers.
         assert len(set(numbers)) == len(numbers) > 1

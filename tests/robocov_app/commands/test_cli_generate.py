@@ -114,7 +114,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("--obstacles 0", "--obstacles: expected a whole number from 1 to 100000, got 0"),
         ("--area 2", "--area: expected a number from 0.01 to 0.9, got 2.0"),
         ("--area nan", "--area: expected a number from"),
-        ("--area 0.8", "--area: no layout of 6 obstacles was found"),
+        ("--area 0.8", "--area: found no 10 x 10 m layout of 6 obstacles with a blocked fraction of 0.8"),
         ("--gap 0.1", "--gap: expected a number from 0.21 to 3.33333, got 0.1"),
         ("--side 0", "--side: expected a number from 1 to 1000, got 0.0"),
         ("--width 5", "--width: requires --height"),
