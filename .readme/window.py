@@ -123,7 +123,7 @@ def draw_import_dialog(theme: str, name: str) -> None:
             # Type the size of a pixel, whose field has the focus.
             pygame.event.post(pygame.Event(pygame.TEXTINPUT, text=f"{METERS_PER_PIXEL:g}"))
             window.run_frame(0.1)
-            dialog.form.set("min_stroke", "0.1")
+            dialog.form.set_text("min_stroke", "0.1")
             dialog.form.cycle_color(BLUE)
             for _ in range(8):
                 window.run_frame(0.1)

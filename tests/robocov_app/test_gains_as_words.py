@@ -180,21 +180,24 @@ def test_laws_of_the_window_say_words() -> None:
         before.with_gain("target", "mediam")
 
 
-def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
+def test_in_the_window_words_are_buttons_lists_and_commands(tmp_path: Path) -> None:
     with open_viewer(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
-        target = lambda: driver.session.timeline.panes[0].controller.get_value("target")  # noqa: E731
-        chosen = lambda word: driver.get_widget("button", f"target:{word}").value  # noqa: E731
-        assert target() == "centroid" and chosen("centroid")
-        driver.push_button("target:median")
-        assert target() == "median" and driver.session.timeline.events[-1].text.endswith("target = median")
-        assert chosen("median") and not chosen("centroid")
+        get_value = lambda name: driver.session.timeline.panes[0].controller.get_value(name)  # noqa: E731
+        assert get_value("cells") == "distance" and driver.get_widget("button", "cells:distance").value
+        driver.push_button("cells:time")
+        assert get_value("cells") == "time"
+        assert driver.session.timeline.events[-1].text.endswith("cells = time")
+        assert driver.get_widget("button", "cells:time").value
+        assert not driver.get_widget("button", "cells:distance").value
+        driver.choose_option("target", "median")
+        assert get_value("target") == "median"
         driver.viewer.attempt(lambda: driver.window.commands.run_text("target sens"))
         driver.settle()
-        assert target() == "sensing" and chosen("sensing")
+        assert get_value("target") == "sensing"
         driver.viewer.attempt(lambda: driver.window.commands.run_text("target 3"))
         assert driver.viewer.has_error_message and "one of centroid, sensing, median" in driver.viewer.message
         driver.push_button("reset:target")
-        assert target() == "centroid"
+        assert get_value("target") == "centroid"
 
 
 def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_too_many_robots_are_reported_and_change_nothing() -> None:
     before = describe_state(viewer.session)
     viewer.attempt(lambda: run_text(viewer, "robots 900"))
     assert viewer.has_error_message
-    assert "room" in viewer.message
+    assert "space for about" in viewer.message
     assert describe_state(viewer.session) == before
 
 

@@ -110,7 +110,7 @@ class TestRobotProperties:
         team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.1, 0.3]))
         properties = RobotProperties.from_team(team)
         labels = [parameter.label for parameter in list_limit_parameters(properties)]
-        assert [label for label in labels if "≠" in label] == ["radius ≠"]
+        assert [label for label in labels if "≠" in label] == ["Radius ≠"]
         equal = replace_limit(properties, "team.radius", 0.2)
         assert equal.build_team((1, 2, 3)).radius.tolist() == [0.2] * 3
 
