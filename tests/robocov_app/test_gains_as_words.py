@@ -14,10 +14,10 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.figures.gains import Dependence, GainGrid, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.report.analysis.groups import find_varying_gains, format_gains
-from robocov_app.report.plots.dependences import build_dependence_plots
+from robocov_app.report.plots.parameter_plots import build_parameter_plots
 from robocov_app.report.results.loading import load_result
 from robocov_app.report.tables.controllers import build_controllers_table
 from robocov_app.sweep.gains import build_gains
@@ -133,7 +133,7 @@ def test_tables_hold_words(swept_folder: Path, tmp_path: Path) -> None:
 def test_a_report_tells_words(swept_folder: Path) -> None:
     result = load_result(swept_folder)
     assert find_varying_gains(result) == {"target": ["rapf"]}
-    plots = build_dependence_plots(result, "k")
+    plots = build_parameter_plots(result, "k")
     assert [plot.title for plot in plots] == ["target"]
     assert "medians at centroid:" in plots[0].svg and "median:" in plots[0].svg
     assert (
@@ -156,7 +156,7 @@ def test_values_of_words_are_told_where_they_are_many() -> None:
 def test_words_have_even_places_and_no_line_between_them() -> None:
     places, values = np.repeat([0.0, 1.0, 2.0], 4), np.arange(12.0)
     words = ("centroid", "sensing", "median")
-    row = Dependence("RAPF", choose_controller_styles(["rapf"])["rapf"], places, values)
+    row = GainResults("RAPF", choose_controller_styles(["rapf"])["rapf"], places, values)
     axes = plot_gains([row], "target", (420, 290), "cost", words).axes[0]
     assert [tick.get_text() for tick in axes.get_xticklabels()] == list(words)
     _, medians = axes.lines

@@ -20,7 +20,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
@@ -210,7 +210,7 @@ def _measure_costs(
     if yardstick is not None:
         calls["yardstick"] = partial(yardstick, cost, moving)
     duration = _QUICK_DURATION_S if quick else _FULL_DURATION_S
-    return measure_in_alternation(calls, _MIN_ROUNDS, duration, before_round=moving.move)
+    return measure_interleaved(calls, _MIN_ROUNDS, duration, before_round=moving.move)
 
 
 def _measure_by_marching(cost: CoverageCost, moving: MovingRobots) -> float:

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Case, Row, measure_interleaved
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
 ROBOTS = 6
@@ -86,7 +86,7 @@ def _measure_environments(quick: bool) -> Iterator[Row]:
     }
     # CPU time, because a step of many environments is long enough to be interrupted by other programs.
     rounds = _QUICK_ROUNDS if quick else _FULL_ROUNDS
-    times = measure_in_alternation(calls, rounds, clock=process_time)
+    times = measure_interleaved(calls, rounds, clock=process_time)
     for name, count, min_speed_ratio in (("single", 1, SINGLE_GOAL), ("vector", ENVIRONMENTS, VECTOR_GOAL)):
         seconds = times[name] / count
         yield Row(

@@ -103,7 +103,7 @@ class Row:
         }
 
 
-def measure_in_alternation(
+def measure_interleaved(
     calls: Mapping[str, Call],
     min_rounds: int,
     min_duration: float = 0.0,
@@ -111,7 +111,7 @@ def measure_in_alternation(
     clock: Callable[[], float] = perf_counter,
     before_round: Call = lambda: None,
 ) -> dict[str, float]:
-    """Time several calls in alternation, so that other programs slow all of them down equally.
+    """Time several calls in turn, round after round, so that other programs slow all of them down equally.
 
     The first round is a warm-up and does not count.
 

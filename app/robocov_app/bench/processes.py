@@ -9,7 +9,7 @@ from functools import partial
 from itertools import count
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Case, Row, measure_interleaved
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -66,7 +66,7 @@ def _measure_sweep(seeds: int) -> Iterator[Row]:
             ],
         }
         # CPU time of all processes, because a sweep runs in several of them.
-        times = measure_in_alternation(calls, 1, clock=_get_processor_time)
+        times = measure_interleaved(calls, 1, clock=_get_processor_time)
     seconds = times["sweep"] / len(study)
     yield Row(
         "sweep",
@@ -95,7 +95,7 @@ def _measure_starts(quick: bool) -> Iterator[Row]:
         name: partial(run_silently, [sys.executable, *arguments]) for name, arguments in commands.items()
     }
     rounds = _QUICK_START_ROUNDS if quick else _FULL_START_ROUNDS
-    times = measure_in_alternation(calls, rounds)
+    times = measure_interleaved(calls, rounds)
     for name in COMMANDS:
         yield Row(
             "start",

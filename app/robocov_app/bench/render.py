@@ -13,7 +13,7 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
 from robocov_app.render.painter import Painter
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import encode_png, save_video
@@ -52,7 +52,7 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
     canvas = pygame.Surface(SIZE_PX)
     scenes = cycle([build_record_scene(record, k) for k in range(len(record))])
     calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": build_clearing_call(canvas)}
-    times = measure_in_alternation(calls, _QUICK_FRAME_ROUNDS if quick else _FULL_FRAME_ROUNDS)
+    times = measure_interleaved(calls, _QUICK_FRAME_ROUNDS if quick else _FULL_FRAME_ROUNDS)
     yield Row(
         "render",
         "one frame",
@@ -85,7 +85,7 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
             "video": lambda: save_video(path, frames),
             "png": lambda: [encode_png(frame) for frame in frames],
         }
-        times = measure_in_alternation(calls, _QUICK_ENCODING_ROUNDS if quick else _FULL_ENCODING_ROUNDS)
+        times = measure_interleaved(calls, _QUICK_ENCODING_ROUNDS if quick else _FULL_ENCODING_ROUNDS)
     for name, call in (("video encoded", "video"), ("PNGs encoded", "png")):
         yield Row(
             "render",

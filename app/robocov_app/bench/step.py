@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation, SimulationBatch
-from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
 
 
 class Ratios(NamedTuple):
@@ -74,7 +74,7 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         "space": partial(space.step, simulation.dt),
         "delaunay": lambda: Delaunay(simulation.positions),
     }
-    times = measure_in_alternation(calls, _get_rounds(robots, quick))
+    times = measure_interleaved(calls, _get_rounds(robots, quick))
     step = times["step"]
     goals = GOALS[robots]
     earlier_ratios = EARLIER_RATIOS[robots]
@@ -124,7 +124,7 @@ def _measure_batch(quick: bool) -> Iterator[Row]:
             space.step(simulation.dt)
 
     calls: dict[str, Call] = {"step": simulation.step, "space": step_spaces}
-    times = measure_in_alternation(calls, _get_rounds(BATCH_ROBOTS, quick))
+    times = measure_interleaved(calls, _get_rounds(BATCH_ROBOTS, quick))
     yield Row(
         "step",
         "one step per run",

@@ -11,7 +11,7 @@ import pygame
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row, measure_in_alternation
+from robocov_app.bench.measure import Case, Row, measure_interleaved
 from robocov_app.bench.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_display
@@ -75,7 +75,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
             clear()
             pygame.display.flip()
 
-        bare = measure_in_alternation({"bare": clear_and_flip}, len(measured.frames))["bare"]
+        bare = measure_interleaved({"bare": clear_and_flip}, len(measured.frames))["bare"]
     figures = (
         (
             "whole frame",

@@ -331,7 +331,7 @@ def _arrange_below(
 def _arrange_beside(
     page: FigurePage, maps_fraction: float, footer_height: float, *, has_curves: bool
 ) -> _Arrangement:
-    """Arrange one map to the right of the curves or, without curves, maps over the whole page."""
+    """Arrange one map to the right of the curves or, if there are no curves, maps over the whole page."""
     width, height = page.size
     scale = page.scale
     head = _HEAD * scale

@@ -35,7 +35,7 @@ _CELL_SIZE = 0.96
 _MAX_DECIMALS = 4
 
 
-class Dependence(NamedTuple):
+class GainResults(NamedTuple):
     """Results of the runs of one controller against a gain.
 
     Attributes
@@ -76,7 +76,7 @@ class GainGrid:
 
 @plain_style()
 def plot_gains(
-    dependences: Sequence[Dependence],
+    all_results: Sequence[GainResults],
     gain: str,
     size: tuple[int, int],
     label: str,
@@ -86,7 +86,7 @@ def plot_gains(
 
     Parameters
     ----------
-    dependences : sequence of Dependence
+    all_results : sequence of GainResults
     gain : str
         Name of the gain.
     size : (width, height), px
@@ -106,16 +106,16 @@ def plot_gains(
         axes.set_xlim(-0.5, len(choices) - 0.5)
         axes.set_xticks(range(len(choices)), list(choices))
     else:
-        gains = np.concatenate([dependence.gains for dependence in dependences])
+        gains = np.concatenate([results.gains for results in all_results])
         unlimited_position = _set_number_axis(axes, gains)
-    for dependence in dependences:
-        positions = dependence.gains
+    for results in all_results:
+        positions = results.gains
         if unlimited_position is not None:
             positions = np.where(np.isnan(positions), unlimited_position, positions)
-        _draw_dependence(axes, dependence, positions, is_joined=not choices)
-    set_value_axis(axes.yaxis, np.concatenate([dependence.values for dependence in dependences]))
+        _draw_results(axes, results, positions, is_joined=not choices)
+    set_value_axis(axes.yaxis, np.concatenate([results.values for results in all_results]))
     style_axes(axes, LIGHT, _shorten_name(gain), label, grid="y")
-    if len(dependences) > 1:
+    if len(all_results) > 1:
         axes.legend(frameon=False, fontsize=SMALL, labelcolor=to_plot_color(LIGHT.ink), borderaxespad=0.2)
     return get_figure(axes)
 
@@ -228,7 +228,7 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
 
 
 def _set_logarithmic_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
-    """Set the limits of a logarithmic axis; return the position of "no limit" or, without it, `high`."""
+    """Set the limits of a logarithmic axis; return the position of "no limit", or `high` if it has none."""
     axes.set_xscale("log")
     margin = (high / low) ** _MARGIN_FRACTION
     end = high
@@ -239,7 +239,7 @@ def _set_logarithmic_limits(axes: Axes, low: float, high: float, *, has_unlimite
 
 
 def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
-    """Set the limits of a linear axis; return the position of "no limit" or, without it, `high`."""
+    """Set the limits of a linear axis; return the position of "no limit", or `high` if it has none."""
     if high > low:
         margin = _MARGIN_FRACTION * (high - low)
     else:
@@ -251,31 +251,31 @@ def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bo
     return end
 
 
-def _draw_dependence(axes: Axes, dependence: Dependence, positions: Array, *, is_joined: bool) -> None:
+def _draw_results(axes: Axes, results: GainResults, positions: Array, *, is_joined: bool) -> None:
     """Draw the runs of a controller as points, and the median at each position if there are few positions.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    dependence : Dependence
+    results : GainResults
     positions : (m,) array
         Positions of the gains on the axis.
     is_joined : bool
         Whether a line connects the medians.
     """
-    style = dependence.style
-    label = _shorten_name(dependence.label)
+    style = results.style
+    label = _shorten_name(results.label)
     color = to_plot_color(style.get_color(LIGHT))
     # Only every step-th run is drawn.
     step = math.ceil(len(positions) / MAX_DRAWN_RUNS)
     points: dict[str, Any] = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}
-    axes.plot(positions[::step], dependence.values[::step], style.mark, markersize=3.6, alpha=0.5, **points)
+    axes.plot(positions[::step], results.values[::step], style.mark, markersize=3.6, alpha=0.5, **points)
     levels = np.unique(positions)
     if len(levels) > MAX_LEVELS:
         # An empty plot adds the entry in the legend.
         axes.plot([], [], style.mark, markersize=5.0, label=label, **points)
         return
-    medians = np.array([np.median(dependence.values[positions == level]) for level in levels])
+    medians = np.array([np.median(results.values[positions == level]) for level in levels])
     axes.plot(
         levels,
         medians,

@@ -174,7 +174,7 @@ class PolicyController:
         return Decision(forces, memory=memory)
 
     def _needs_new_actions(self, seen: Observations, memory: PolicyMemory) -> bool:
-        """Return whether to ask the policy: after each new scan or, without rays, after each period."""
+        """Return whether a decision is due: after each new scan or, with no rays, after each period."""
         if self.layout.rays:
             return seen.scans is not None
         return seen.time >= memory.next_time - _TIME_TOLERANCE_S

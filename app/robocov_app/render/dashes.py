@@ -15,7 +15,7 @@ def cut_into_dashes(points: Array, lengths: Sequence[float]) -> Array:
     points : (k, 2) array, px
         Points of the curve, at least two.
     lengths : sequence of float, px
-        Lengths of dashes and gaps in turn; without any, the curve is solid.
+        Lengths of dashes and gaps in turn; if empty, the curve is solid.
 
     Returns
     -------

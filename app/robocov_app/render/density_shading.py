@@ -110,7 +110,7 @@ def color_density(fractions: Array, theme: Theme) -> NDArray[np.uint8]:
 
 
 def get_density_range(environment: Environment) -> tuple[float, float]:
-    """Return the lowest and the highest density of an environment; without a density, both are 1."""
+    """Return the lowest and the highest density of an environment; both are 1 if it has no density."""
     if environment.density is None:
         return 1.0, 1.0
     return compute_density_range(environment.density, environment.region.bounds)

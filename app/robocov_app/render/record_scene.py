@@ -31,7 +31,7 @@ def build_record_scene(
     cost : str
         The coverage cost as text.
     fields : DistanceFields, optional
-        Computes the distances to the nearest robot; without it, the scene has none.
+        Computes the distances to the nearest robot. If it is None, the scene has none.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class Scene:
         The map, with moving obstacles at their positions.
     team : Team
     snapshot : Snapshot or None
-        State and knowledge of the robots; without it, only the map is drawn.
+        State and knowledge of the robots. If it is None, only the map is drawn.
     starts : (n, 2) array or None, m
     trail : (k, n + f, 2) array or None, m
         Positions so far, the oldest first. The n robots of the scene come before f robots that have failed
@@ -118,7 +118,7 @@ class Scene:
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
 
     def get_failed_radius(self, number: int) -> float:
-        """Return the radius of a failed robot, m; without an entry, that of the first working robot."""
+        """Return the radius of a failed robot, m; if it is unknown, that of the first working robot."""
         return self.failed_radii.get(number, float(self.team.radius[0]))
 
     def get_number(self, row: int) -> int:

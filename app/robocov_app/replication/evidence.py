@@ -110,7 +110,7 @@ class ControllerEvidence:
 
 @cache
 def load_profile(controller: str) -> ControllerProfile:
-    """Return the profile of a controller; without an entry in the file, its summary describes it."""
+    """Return the profile of a controller. A controller without an entry in the file gets its summary."""
     controller_class = load_controller_class(controller)
     profiles = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8"))
     entry = profiles.get(controller, {})

@@ -30,9 +30,9 @@ from robocov_app.report.descriptions import list_lifetimes
 from robocov_app.report.embedding import MAX_BYTES, ReplayRun
 from robocov_app.report.pictures import draw_map, draw_run, has_path
 from robocov_app.report.plots.costs import build_cost_plots, build_final_cost_plots
-from robocov_app.report.plots.dependences import build_dependence_plots
 from robocov_app.report.plots.metrics import build_metric_plots
 from robocov_app.report.plots.pairs import build_pair_plots
+from robocov_app.report.plots.parameter_plots import build_parameter_plots
 from robocov_app.report.plots.plot import MAX_PANELS, GroupStyles
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 from robocov_app.report.tables.controllers import build_controllers_table, build_gain_sets_table
@@ -131,7 +131,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
         "metrics": build_metric_plots(result, runs, styles, f"{key}m"),
         "finals": build_final_cost_plots(result, styles, f"{key}f"),
         **_build_comparison_variables(result, styles, key),
-        "dependences": build_dependence_plots(result, f"{key}d"),
+        "parameter_plots": build_parameter_plots(result, f"{key}d"),
         "selection_note": selection.note if len(runs) > 1 else "",
         "has_unknown_paths": any(not has_path(run.record) for run in runs),
         "has_moving_obstacles": any(run.record.environment.has_moving_obstacles for run in runs),

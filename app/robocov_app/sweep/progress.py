@@ -112,7 +112,7 @@ class ProgressReporter:
     is_quiet : bool
         Whether nothing is printed.
     bar : rich.progress.Progress or None
-        The bar to update; without it, lines are printed.
+        The bar to update. If it is None, lines are printed.
     """
 
     def __init__(self, title: str, *, is_quiet: bool = False, bar: Progress | None = None) -> None:

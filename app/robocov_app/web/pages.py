@@ -222,10 +222,10 @@ class Pages:
 
     @property
     def display_settings(self) -> PageChanged | None:
-        """Size and color scheme of the window, taken from a page; None if no page has reported them.
+        """Size and color scheme that the window adopts; None until the controlling page has reported its own.
 
-        The controlling page sets them. A phone, however, does not shrink the window that others see
-        on a projector: while a wide page is open, a narrow one gets a scaled picture.
+        The controlling page determines them, with one exception: a phone must not shrink the window that a
+        class sees on a projector. While a wide page is open, a controlling phone gets a scaled image.
         """
         controlling = self.controlling
         if controlling is None or controlling.settings is None:

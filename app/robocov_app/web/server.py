@@ -243,7 +243,7 @@ class WebDisplay:
         return parse_cookies(request.headers.get_all("Cookie")).get(self._cookie_name, "")
 
     def _read_token(self, request: Request) -> str:
-        """Return the token in the address of a request; without one, the token in its cookie."""
+        """Return the token in the address of a request or, if there is none, the one in its cookie."""
         return get_token(request.path) or self._read_cookie(request)
 
     def _is_known(self, token: str) -> bool:

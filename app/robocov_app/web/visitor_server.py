@@ -326,8 +326,8 @@ class VisitorServer:
     async def _make_room(self) -> bool:
         """Make room for another window; return False if `max_windows` are in use.
 
-        If necessary, the spare window is ended; without one, a window that has already ended is removed, or
-        the one that has been idle longest is ended.
+        If necessary, the spare window is ended. If there is no spare window, a window that has already ended
+        is removed, or the one that has been idle longest is ended.
         """
         spare = self._spare
         taken = sum(not window.has_closed for window in self._windows.values())

@@ -14,7 +14,7 @@ from called import complaint
 from matplotlib.figure import Figure
 
 from robocov_app.bench import cost, learning, plot, processes, render, step, window
-from robocov_app.bench.measure import Row, measure_in_alternation
+from robocov_app.bench.measure import Row, measure_interleaved
 from robocov_app.cli import main
 from robocov_app.commands import bench
 
@@ -50,7 +50,7 @@ def test_calls_alternate_and_have_median_times():
 
     calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
     prepared = partial(noted, "before", clock.work(*[100.0] * 3))
-    assert measure_in_alternation(calls, 3, clock=clock, before_round=prepared) == {"slow": 2.0, "quick": 0.5}
+    assert measure_interleaved(calls, 3, clock=clock, before_round=prepared) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
     round_ = [("slow", False), ("quick", False)]
     assert order == [*round_, *[("before", False), *round_] * 3]
@@ -62,7 +62,7 @@ def test_rounds_continue_until_the_minimum_time():
     clock = Clock()
     for least, seconds, rounds in ((2, 6.5, 7), (5, 2.0, 5)):
         made, work = [], clock.work(*[1.0] * 20)
-        measure_in_alternation({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
+        measure_interleaved({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
         assert len(made) == 1 + rounds
 
 

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from robocov_app.figures.gains import (
     MAX_DRAWN_RUNS,
     MAX_LEVELS,
-    Dependence,
     GainGrid,
+    GainResults,
     plot_gain_grid,
     plot_gains,
 )
@@ -22,7 +22,7 @@ VALUES = np.arange(20.0)
 
 def draw_axes(gains: np.ndarray, values: np.ndarray, gain: str) -> Axes:
     style = choose_controller_styles(["rapf"])["rapf"]
-    return plot_gains([Dependence("RAPF", style, gains, values)], gain, (420, 290), "cost").axes[0]
+    return plot_gains([GainResults("RAPF", style, gains, values)], gain, (420, 290), "cost").axes[0]
 
 
 def get_texts(ticks) -> list[str]:

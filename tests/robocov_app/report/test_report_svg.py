@@ -9,7 +9,7 @@ from reported_results import HOSTILE
 
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.final_costs import Sample, plot_final_costs
-from robocov_app.figures.gains import Dependence, GainGrid, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report.svg import inline_svg
@@ -44,7 +44,7 @@ FIGURES = {
         scale=1.25,
     ),
     "gains": lambda name="RAPF": plot_gains(
-        [Dependence(name, STYLES["lloyd"], np.array([1.0, 2.0, np.nan] * 9), np.ones(27))],
+        [GainResults(name, STYLES["lloyd"], np.array([1.0, 2.0, np.nan] * 9), np.ones(27))],
         name,
         PANEL,
         "distance (m)",

@@ -99,7 +99,7 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
-    """Repair self-intersecting outlines: the selected ones or, without a selection, all.
+    """Repair self-intersecting outlines: the selected ones, or all if none are selected.
 
     An obstacle may become several obstacles. Only the largest part of a boundary is kept.
     """

@@ -234,7 +234,7 @@ def open_wall(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
 
 
 def _open_wall_between(sketch: Sketch, key: int, start: float, end: float) -> Change:
-    """Remove a wall between two distances along its line, m; the rest keeps name and note."""
+    """Cut a door into a wall, from `start` to `end`, m along the wall; the pieces keep its name and note."""
     line = _build_wall_line(sketch, key)
     wall = sketch.get_item(key).shape
     assert isinstance(wall, env.WallObstacle)

@@ -63,7 +63,7 @@ class CornerCut(NamedTuple):
 
 
 ComputeCut: TypeAlias = Callable[[float], CornerCut]  # takes the angle by which a corner turns, rad
-RedrawRings: TypeAlias = Callable[
+RingTransform: TypeAlias = Callable[
     [tuple[Ring, ...], bool], tuple[Ring, ...]
 ]  # takes the rings of an object, and whether they are closed
 
@@ -359,10 +359,10 @@ def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """
     require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
 
-    def redraw(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
+    def simplify_rings(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
         return _simplify_rings(rings, tolerance, is_closed)
 
-    changed, replaced = _redraw(sketch, selection, redraw)
+    changed, replaced = _transform_rings(sketch, selection, simplify_rings)
     count = sum(len(old) - len(new) for old, new in replaced)
     require(count, "no vertex can be removed at this tolerance")
     description = f"{count} vertices removed"
@@ -376,38 +376,39 @@ def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN
     is_possible = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
     require(is_possible, f"expected an angle of up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
 
-    def redraw(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
+    def straighten_rings(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
         return tuple(_straighten_ring(ring, degrees, is_closed) for ring in rings)
 
-    changed, replaced = _redraw(sketch, selection, redraw)
+    changed, replaced = _transform_rings(sketch, selection, straighten_rings)
     require(replaced, f"no edge to straighten is within {degrees:g} degrees of the horizontal or vertical")
     description = f"{format_count(len(replaced), 'outline')} straightened"
     return Change(changed, selection.without_vertices(), description)
 
 
-def _redraw(
-    sketch: Sketch, selection: Selection, redraw: RedrawRings
+def _transform_rings(
+    sketch: Sketch, selection: Selection, transform: RingTransform
 ) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
-    """Redraw the rings of the selected obstacles and boundary; without a selection, of all obstacles.
+    """Transform the rings of the selected obstacles and boundary, or of all obstacles if none are selected.
 
     Returns
     -------
     sketch : Sketch
-        The redrawn map.
+        The map with the new rings.
     replaced : list of tuple of Ring
         Each ring that has changed, before and after.
     """
-    owners: Collection[Owner] = sketch.index_by_key.keys()
+    candidates: Collection[Owner] = sketch.index_by_key.keys()
     if selection.items or selection.boundary:
-        owners = selection.owners
-    redrawn = [owner for owner in sketch.owners if owner in owners and sketch.list_rings(owner)]
-    require(redrawn, "select polygons, walls or the boundary first")
+        candidates = selection.owners
+    # Circles, for example, have no rings.
+    owners = [owner for owner in sketch.owners if owner in candidates and sketch.list_rings(owner)]
+    require(owners, "select polygons, walls or the boundary first")
     changed = sketch
     replaced: list[tuple[Ring, Ring]] = []
-    for owner in redrawn:
+    for owner in owners:
         _, _, is_closed = sketch.list_rings(owner)[0]
         rings = sketch.list_vertex_rings(owner)
-        new_rings = redraw(rings, is_closed)
+        new_rings = transform(rings, is_closed)
         replaced += [(old, new) for old, new in zip(rings, new_rings, strict=True) if old != new]
         if new_rings != rings:
             changed = changed.with_rings(owner, new_rings)

@@ -114,7 +114,7 @@ class Document:
 
     @property
     def title(self) -> str:
-        """Name of the file; without a file, the suggested name or the name of the map."""
+        """Name of the file or, if there is none, the suggested name or the name of the map."""
         if self.path is not None:
             return self.path.name
         return self.stem or self.history.sketch.name

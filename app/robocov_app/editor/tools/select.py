@@ -177,7 +177,7 @@ class SelectTool(EditorTool):
         drag.end()
 
     def cancel(self, context: EditorContext) -> bool:
-        """Cancel the drag; without one, select the owners of selected vertices, or else nothing."""
+        """Cancel the drag, or else select the owners of selected vertices, or else clear the selection."""
         had_something = bool(self.drag or context.selection)
         if self.drag is not None:
             self._stop()

@@ -41,7 +41,7 @@ def prefer_vertices(selection: Selection) -> Selection:
 
 
 def align(editor: Editor, side: transform.Side) -> None:
-    """Align the selected vertices or, without any, the selected objects at a side."""
+    """Align the selected vertices at a side or, if no vertices are selected, the selected objects."""
     selection = editor.selection
     if not selection.vertices:
         selection = require_selection(editor)
@@ -66,7 +66,7 @@ def remove_last(editor: Editor) -> None:
 
 
 def delete(editor: Editor) -> None:
-    """Delete the selected vertices or, without any, the selected objects."""
+    """Delete the selected vertices or, if no vertices are selected, the selected objects."""
     selection = prefer_vertices(require(editor.selection, "nothing is selected: click something first"))
     if selection.vertices:
         editor.apply(vertices.delete_vertices(editor.sketch, selection))
@@ -123,14 +123,14 @@ def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
 
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
-    """Return the change that moves the selected vertices or, without any, objects by a displacement, m."""
+    """Return the change that moves the selected vertices, or else the selected objects, by (dx, dy), m."""
     if selection.vertices:
         return vertices.move_vertices(editor.sketch, selection, dx, dy)
     return transform.move(editor.sketch, selection, dx, dy)
 
 
 def cancel(editor: Editor) -> None:
-    """Drop the typed value; without one, cancel the tool's action, or else choose the selection tool."""
+    """Clear the typed value, or else cancel the tool's action, or else choose the selection tool."""
     if editor.typed:
         editor.typed = ""
         return
@@ -149,7 +149,7 @@ def select_next(editor: Editor, step: int) -> None:
         return
     selected = [order.index(owner) for owner in select_owners(editor.selection).owners if owner in order]
     if not selected:
-        # Without a selection, start at the first object, or at the last one.
+        # If nothing is selected, start at the first object, or at the last one.
         index = 0 if step > 0 else -1
     elif step > 0:
         index = max(selected) + step
@@ -235,7 +235,7 @@ def convert_to_areas(editor: Editor) -> None:
 
 
 def fix_problem(editor: Editor) -> None:
-    """Fix the chosen problem or, without one, the first that can be fixed automatically."""
+    """Fix the chosen problem or, if none is chosen, the first that can be fixed automatically."""
     problems = editor.problems
     if editor.problem is not None:
         problems = (editor.problem,)

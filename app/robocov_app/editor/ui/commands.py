@@ -255,7 +255,7 @@ def _build_combine_group(editor: Editor) -> EditorCommandGroup:
 
 
 def _build_vertex_group(editor: Editor) -> EditorCommandGroup:
-    """Build the group of commands on corners, walls, outlines and paths of obstacles."""
+    """Build the group of commands that edit vertices, walls, outlines and the paths of obstacles."""
     bevel = partial(actions.trim_corners, editor, vertices.bevel_corners)
     round_corners = partial(actions.trim_corners, editor, vertices.round_corners)
     widen = partial(actions.scale_wall_width, editor, WALL_WIDTH_STEP)
@@ -271,7 +271,7 @@ def _build_vertex_group(editor: Editor) -> EditorCommandGroup:
     )
     group.add_edit("straighten", "Straighten nearly level edges", vertices.straighten, "shift+l")
     group.add_edit(
-        "path:repeat", "Obstacle goes in a loop, or back and forth", paths.toggle_repeat, "shift+o"
+        "path:repeat", "Switch the path between a loop and back and forth", paths.toggle_repeat, "shift+o"
     )
     group.add_edit("path:none", "Remove an obstacle's path", paths.remove_path, "alt+o")
     group.add("wider", "Wider walls", widen, "]", repeats=True)

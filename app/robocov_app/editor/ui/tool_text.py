@@ -13,8 +13,8 @@ _INVALID_FIRST_CHARACTERS_WHEN_IDLE = frozenset("x×*/ ;%,-+@<°")
 _COMMAND_MODIFIERS = pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
 
 
-def type_for_tool(editor: Editor, event: pygame.event.Event) -> bool:
-    """Handle a key as part of a value for the tool; return whether the key was used."""
+def edit_typed_value(editor: Editor, event: pygame.event.Event) -> bool:
+    """Edit the value that is being typed for the tool with a key; return whether the key was used."""
     if not _accepts_text(editor) or event.mod & _COMMAND_MODIFIERS:
         return False
     text = editor.typed

@@ -24,7 +24,7 @@ from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode import PlayWindow, build_play_change, open_play_window
 from robocov_app.editor.ui.pointer import EditorPointer
-from robocov_app.editor.ui.tool_text import type_for_tool
+from robocov_app.editor.ui.tool_text import edit_typed_value
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
 from robocov_app.render.camera import Camera
@@ -315,7 +315,7 @@ class EditorWindow(CommandWindow):
         self.canvas.show_problem(self.editor.problem)
 
     def _edit_name(self) -> None:
-        """Put the text cursor into the name of the selected object or, without one, of the map."""
+        """Put the text cursor into the name of the selected object or, if there is none, of the map."""
         tab = "map"
         field = "title"
         if len(self.editor.selection.owners) == 1:
@@ -414,10 +414,10 @@ class EditorWindow(CommandWindow):
         self.documents.open(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Use a key for a text field, or as part of a value for the tool; return whether it was used."""
+        """Use a key for a text field or for the value typed for the tool; return whether it was used."""
         if super().use_key(event):
             return True
-        return not self.panel.ui.is_busy and type_for_tool(self.editor, event)
+        return not self.panel.ui.is_busy and edit_typed_value(self.editor, event)
 
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press, as input or as the key of a command."""

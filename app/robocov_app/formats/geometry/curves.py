@@ -42,7 +42,7 @@ def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS)
     Raises
     ------
     ValueError
-        If there would be more points.
+        If more than `maximum` points are needed.
 
     Notes
     -----
@@ -92,9 +92,9 @@ def flatten_arcs(
     Raises
     ------
     ValueError
-        If there would be more points.
+        If more than `maximum` points are needed.
     """
-    # The longer half axis is the larger singular value of [u v].
+    # The larger semi-axis is the larger singular value of the matrix [u v].
     square = (u**2 + v**2).sum(axis=1)
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     radius = np.sqrt((square + np.sqrt(np.maximum(square**2 - 4.0 * area**2, 0.0))) / 2.0)

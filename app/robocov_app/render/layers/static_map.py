@@ -86,19 +86,19 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_blocked_area(canvas: Canvas, scene: Scene, *, fill: Color, moving_fill: Color, edge: Color) -> None:
-    """Draw all obstacles, in the colors of the caller.
+    """Draw the obstacles: those at rest with their outlines, then the moving ones.
 
     Parameters
     ----------
     canvas : Canvas
-        Its surface must be transparent, so that courtyards within obstacles show the layers below.
+        Its surface must be transparent, so that the layers below show through courtyards.
     scene : Scene
     fill, moving_fill, edge : Color
         Colors of obstacles at rest, of moving ones and of outlines.
     """
     outlines: list[Array] = []
     # Largest first: a courtyard must be cleared before the obstacles in it are drawn.
-    polygons = sorted(scene.environment.blocked.geoms, key=_compute_negative_outer_area)
+    polygons = sorted(scene.environment.blocked.geoms, key=_compute_outer_area, reverse=True)
     for polygon in polygons:
         outer = _get_corners(canvas, polygon.exterior)
         inner = [_get_corners(canvas, ring) for ring in polygon.interiors]
@@ -117,8 +117,9 @@ def _get_corners(canvas: Canvas, ring: shapely.LinearRing) -> Array:
     return canvas.camera.to_pixels(np.asarray(ring.coords)[:-1])
 
 
-def _compute_negative_outer_area(polygon: shapely.Polygon) -> float:
-    return -float(shapely.Polygon(polygon.exterior).area)
+def _compute_outer_area(polygon: shapely.Polygon) -> float:
+    """Return the area within the outer ring of a polygon, including its courtyards."""
+    return float(shapely.Polygon(polygon.exterior).area)
 
 
 def _draw_moving_obstacle(

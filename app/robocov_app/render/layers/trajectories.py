@@ -25,8 +25,8 @@ MIN_STEP_PX = 2.0
 """Minimum distance between the corners of a drawn trajectory."""
 SECTION_PX = 16.0
 """Length of the sections that are added to the page; shorter ends are drawn again in each frame."""
-MIN_CROWD = 400
-"""With at least this many robots, the ends of trajectories are not antialiased."""
+MAX_ANTIALIASED_ENDS = 399
+"""Maximum number of robots whose trajectories have antialiased ends; with more, this would take too long."""
 _WAVE_PX_PER_RAD = 2.9
 _WAVE_HEIGHT_PX = 3
 """Length per radian and amplitude of the wave in the legend, at scale 1."""
@@ -190,19 +190,19 @@ class TrajectoriesLayer:
         return find_visible_box(points, MARGIN_PX + width, self._page)
 
     def _draw_ends(self, canvas: Canvas, ends: list[list[float]], pen: Pen) -> None:
-        """Draw the open paths up to the current positions, px.
+        """Draw the open path of each robot up to its current position, which is given in pixels.
 
-        They are mostly covered by the robots, so seams and jagged edges do not show.
+        The robots cover most of these lines, so seams and jagged edges do not show.
         """
         width = canvas.scale_width(pen.width / canvas.scale)
-        is_smooth = len(ends) < MIN_CROWD
+        is_antialiased = len(ends) <= MAX_ANTIALIASED_ENDS
         for path, end, color in zip(self._open_paths, ends, pen.colors, strict=True):
             if _is_absent(path) or _is_at_start(path, end):
                 continue
             points = [*path, end]
             if width > 1:
                 canvas.draw_outline(np.array(points), color, width, is_closed=False)
-            elif is_smooth:
+            elif is_antialiased:
                 canvas.draw_thin_path(points, color)
             else:
                 pygame.draw.lines(canvas.surface, color, False, points)

@@ -13,7 +13,9 @@ from robocov_app.replication.assets import ASSETS
 PAPER = ("rapf", "rpf", "lloyd")
 """Controllers of the paper's claims."""
 OURS = ("atlas", "atlas-shared")
-"""The project's own controllers; the goals are about the first one."""
+"""The project's own controllers."""
+MAIN_CONTROLLER = OURS[0]
+"""The controller that the project's goals are about."""
 
 BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]
 """The best gains of each tuned controller."""

@@ -150,13 +150,13 @@ def _build_common_options(plan: Plan) -> dict[str, Any]:
     }
 
 
-def build_figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[str, Study]:
+def build_figure_studies(plan: Plan, paper_contenders: Sequence[Contender] = ()) -> dict[str, Study]:
     """Build the sweeps whose runs are shown in figures; trajectories and costs are recorded in fine steps.
 
     Parameters
     ----------
     plan : Plan
-    papers : sequence of Contender
+    paper_contenders : sequence of Contender
         The paper's contenders. If some of them have their best gains, only the sweeps of figures 4 to 8 with
         these gains are built.
 
@@ -165,7 +165,7 @@ def build_figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[s
     dict
         Sweeps by name.
     """
-    best = tuple(contender for contender in papers if contender.key.endswith("-best"))
+    best = tuple(contender for contender in paper_contenders if contender.key.endswith("-best"))
     studies = {}
     for name, case in FIGURE_CASES.items():
         # Figures that compare with Lloyd's algorithm are not drawn for the best gains.
@@ -205,15 +205,15 @@ def build_gains_study(plan: Plan) -> Study:
     )
 
 
-def build_convex_contest(plan: Plan, papers: Sequence[Contender]) -> Contest:
+def build_convex_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
     """Build the sweep of the paper's contenders in convex regions, where RPF does not run."""
-    participants = [contender for contender in papers if contender.controller != "rpf"]
+    participants = [contender for contender in paper_contenders if contender.controller != "rpf"]
     return build_contest(plan, build_convex_maps(plan), participants, CONVEX_KINDS, plan.convex_seeds)
 
 
-def build_claims_contest(plan: Plan, papers: Sequence[Contender]) -> Contest:
+def build_claims_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
     """Build the sweep of the paper's contenders on non-convex maps."""
-    return build_contest(plan, build_claim_maps(plan), papers, KINDS, plan.seeds)
+    return build_contest(plan, build_claim_maps(plan), paper_contenders, KINDS, plan.seeds)
 
 
 def build_baseline_gains_study(plan: Plan) -> Study | None:
@@ -230,7 +230,7 @@ def build_baseline_gains_study(plan: Plan) -> Study | None:
 
 
 def build_beyond_contests(
-    plan: Plan, best: contenders.BestGains, papers: Sequence[Contender]
+    plan: Plan, best: contenders.BestGains, paper_contenders: Sequence[Contender]
 ) -> dict[str, Contest]:
     """Build the sweeps of contenders beyond the paper, without the gain grids.
 
@@ -239,7 +239,7 @@ def build_beyond_contests(
     plan : Plan
     best : Mapping
         The best gains of the baselines; baselines without an entry keep their defaults.
-    papers : sequence of Contender
+    paper_contenders : sequence of Contender
         The paper's contenders; the strongest also run on the unseen maps.
 
     Returns
@@ -256,7 +256,7 @@ def build_beyond_contests(
         seeds = beyond.get_seeds(participants[0].controller)
         contests[name] = build_contest(plan, build_baseline_maps(plan), participants, beyond.starts, seeds)
     if beyond.unseen:
-        strongest = (OWN[0], *contenders.select_strongest(papers))
+        strongest = (OWN[0], *contenders.select_strongest(paper_contenders))
         unseen = build_unseen_maps(plan)
         contests["unseen"] = build_contest(plan, unseen, strongest, beyond.starts, beyond.seeds)
     contests["targets"] = build_contest(plan, maps, contenders.TARGETS, beyond.map_starts, (0,))
@@ -338,9 +338,9 @@ def build_probe_studies(plan: Plan, *, beyond: bool) -> list[Study]:
     list of Study
     """
     name = "blocks-a"
-    papers = (RAPF_SHARED, RPF_SHARED, LLOYD)
+    paper_contenders = (RAPF_SHARED, RPF_SHARED, LLOYD)
     paper_maps = (StudyMap(name, load_map(name)),)
-    studies = [build_contest(plan, paper_maps, papers, ("paper",), (0,)).study]
+    studies = [build_contest(plan, paper_maps, paper_contenders, ("paper",), (0,)).study]
     if beyond:
         short_plan = replace(plan, duration=min(plan.beyond.probe, plan.duration))
         maps = (load_study_map(name),)

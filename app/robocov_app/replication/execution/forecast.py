@@ -82,20 +82,20 @@ def _list_studies(folder: Path, plan: Plan, *, claims: bool, beyond: bool) -> di
     The best gains are not known yet, but the number of runs hardly depends on them.
     """
     sweeps = studies.build_figure_studies(plan)
-    papers: tuple[Contender, ...] = UNTUNED
+    paper_contenders: tuple[Contender, ...] = UNTUNED
     if claims or (beyond and is_gain_grid_finished(folder, plan)):
-        papers = _guess_paper_contenders(plan)
+        paper_contenders = _guess_paper_contenders(plan)
     if claims:
-        sweeps |= studies.build_figure_studies(plan, papers)
+        sweeps |= studies.build_figure_studies(plan, paper_contenders)
         sweeps["gains"] = studies.build_gains_study(plan)
-        sweeps["convex"] = studies.build_convex_contest(plan, papers).study
+        sweeps["convex"] = studies.build_convex_contest(plan, paper_contenders).study
     if claims or beyond:
-        sweeps["claims"] = studies.build_claims_contest(plan, papers).study
+        sweeps["claims"] = studies.build_claims_contest(plan, paper_contenders).study
     if beyond:
         tuning = studies.build_baseline_gains_study(plan)
         if tuning is not None:
             sweeps[studies.BASELINE_GAINS] = tuning
-        for name, contest in studies.build_beyond_contests(plan, {}, papers).items():
+        for name, contest in studies.build_beyond_contests(plan, {}, paper_contenders).items():
             sweeps[name] = contest.study
         sweeps |= studies.build_conditions_studies(plan)
     return sweeps

@@ -75,7 +75,7 @@ def record_partition() -> Record:
 
 
 def run_figures(
-    folder: Path, plan: Plan, options: RunnerOptions, papers: Sequence[Contender] = ()
+    folder: Path, plan: Plan, options: RunnerOptions, paper_contenders: Sequence[Contender] = ()
 ) -> dict[str, FigureRun]:
     """Execute the runs that are shown in figures.
 
@@ -84,7 +84,7 @@ def run_figures(
     folder : Path
     plan : Plan
     options : RunnerOptions
-    papers : sequence of Contender
+    paper_contenders : sequence of Contender
         The paper's contenders, for the figures with the best gains.
 
     Returns
@@ -98,7 +98,7 @@ def run_figures(
         If a run failed.
     """
     runs: dict[str, FigureRun] = {}
-    for name, study in studies.build_figure_studies(plan, papers).items():
+    for name, study in studies.build_figure_studies(plan, paper_contenders).items():
         for row, run in _read_figure_runs(run_study(study, folder, name, options)):
             case = "other" if row["start"] == "other" else name.split("-")[1]
             runs[f"{case}/{row['controller']}"] = run
@@ -121,10 +121,10 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     """
     figures = run_figures(folder, plan, options)
     gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
-    papers = build_paper_contenders(find_best_gains(gains))
-    best_figures = run_figures(folder, plan, options, papers)
-    convex = studies.build_convex_contest(plan, papers)
-    claims = studies.build_claims_contest(plan, papers)
+    paper_contenders = build_paper_contenders(find_best_gains(gains))
+    best_figures = run_figures(folder, plan, options, paper_contenders)
+    convex = studies.build_convex_contest(plan, paper_contenders)
+    claims = studies.build_claims_contest(plan, paper_contenders)
     maps = (*convex.study.maps, *claims.study.maps)
     references |= find_map_references(maps, folder, plan, options)
     convex_folder = run_study(convex.study, folder, "convex", options)
@@ -133,7 +133,7 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     claims_outcomes = read_outcomes(claims_folder, claims, references)
     names = [
         *studies.build_figure_studies(plan),
-        *studies.build_figure_studies(plan, papers),
+        *studies.build_figure_studies(plan, paper_contenders),
         "gains",
         "convex",
         "claims",
@@ -145,7 +145,7 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
         gains=gains,
         convex=convex_outcomes,
         claims=claims_outcomes,
-        contenders=papers,
+        contenders=paper_contenders,
         references=references,
         worst=repeat_worst_runs(claims.study, claims_outcomes, RAPF_SHARED, _WORST_RUNS),
         runs=runs,
@@ -169,9 +169,9 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     -------
     BeyondResults
     """
-    papers, claims, references = _get_baselines(folder, plan, options, paper)
+    paper_contenders, claims, references = _get_baselines(folder, plan, options, paper)
     gains = _run_baseline_gain_grids(folder, plan, options)
-    contests = studies.build_beyond_contests(plan, find_best_gains(gains), papers)
+    contests = studies.build_beyond_contests(plan, find_best_gains(gains), paper_contenders)
     maps = (*build_generated_maps(plan.beyond.maps), *build_unseen_maps(plan))
     references |= find_map_references(maps, folder, plan, options)
     sweeps = {name: contest.study for name, contest in contests.items()}
@@ -194,7 +194,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
         plan=plan,
         outcomes=all_outcomes,
         unseen=outcomes.get("unseen"),
-        contenders=(*papers, *ranked_contenders),
+        contenders=(*paper_contenders, *ranked_contenders),
         gains=gains,
         steps=time_steps(folder, plan, options),
         worst=repeat_worst_runs(own_study, all_outcomes, OWN[0], plan.beyond.worst),
@@ -213,23 +213,33 @@ def _get_baselines(
     """Return the paper's contenders, their outcomes and the references; execute missing runs."""
     if paper is not None:
         return paper.contenders, paper.claims, {**paper.references}
-    return _run_claims_only(folder, plan, options)
+    return _run_baselines(folder, plan, options)
 
 
-def _run_claims_only(
+def _run_baselines(
     folder: Path, plan: Plan, options: RunnerOptions
 ) -> tuple[tuple[Contender, ...], Outcomes, References]:
-    """Run the paper's contenders on non-convex maps; return them, their outcomes and the references."""
+    """Run the paper's contenders on the non-convex maps of its claims.
+
+    Each contender is a controller with a set of gains; some have the best gains of the gain grid.
+
+    Returns
+    -------
+    contenders : tuple of Contender
+    outcomes : Outcomes
+    references : References
+        Reference placements on the maps.
+    """
     gains: dict[str, GainOutcomes] = {}
     references: References = {}
     if is_gain_grid_finished(folder, plan):
         # All runs exist already, but the table may be missing; this writes it.
         gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
-    papers = build_paper_contenders(find_best_gains(gains))
-    contest = studies.build_claims_contest(plan, papers)
+    paper_contenders = build_paper_contenders(find_best_gains(gains))
+    contest = studies.build_claims_contest(plan, paper_contenders)
     references |= find_map_references(contest.study.maps, folder, plan, options)
     target = run_study(contest.study, folder, "claims", options)
-    return papers, read_outcomes(target, contest, references), references
+    return paper_contenders, read_outcomes(target, contest, references), references
 
 
 def _run_baseline_gain_grids(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, GainOutcomes]:

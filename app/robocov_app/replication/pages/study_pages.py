@@ -19,7 +19,7 @@ from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims import goals, judge_beyond_claims, summarize_verdicts, thresholds
 from robocov_app.replication.claims.claim import GOALS, RIVALS, Claim
 from robocov_app.replication.design import contenders, studies, study_maps
-from robocov_app.replication.design.contenders import LABELS, OURS
+from robocov_app.replication.design.contenders import LABELS, MAIN_CONTROLLER, OURS
 from robocov_app.replication.design.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
 from robocov_app.replication.evidence import (
     ControllerEvidence,
@@ -206,7 +206,7 @@ def build_beyond_page(figure_files: Mapping[str, FigureFile], results: BeyondRes
         "conditions": collect_degradations(results, summaries),
         "captions": CAPTIONS,
         "controllers": [(item, _draw_evidence_strips(item, evidence)) for item in evidence],
-        "failures": _show_failures(results.worst, results.outcomes, OURS[0], others),
+        "failures": _show_failures(results.worst, results.outcomes, MAIN_CONTROLLER, others),
         "images": figure_files,
         "tuned": is_tuned,
         "unseen_families": UNSEEN,
@@ -216,15 +216,18 @@ def build_beyond_page(figure_files: Mapping[str, FigureFile], results: BeyondRes
 
 
 def _draw_evidence_strips(item: ControllerEvidence, evidence: Sequence[ControllerEvidence]) -> Markup:
-    """Draw the medians of a controller on all maps and, below, those of our main controller for comparison.
+    """Draw a strip with the medians of a controller on all maps, above that of a baseline.
 
-    Our main controller itself is compared with RAPF.
+    The baseline is the project's main controller. The main controller itself is compared with RAPF, the
+    controller of the paper.
     """
     highest = 0.0
-    for other in evidence:
-        highest = max([highest, *other.medians_by_map.values()])
-    compared = "rapf" if item.profile.controller == OURS[0] else OURS[0]
-    rows = [item, *(other for other in evidence if other.profile.controller == compared)]
+    for row in evidence:
+        highest = max([highest, *row.medians_by_map.values()])
+    baseline = MAIN_CONTROLLER
+    if item.profile.controller == MAIN_CONTROLLER:
+        baseline = "rapf"
+    rows = [item, *(row for row in evidence if row.profile.controller == baseline)]
     strips = [
         DotStrip(row.summaries[0].contender.label, row.profile.controller in OURS, row.medians_by_map)
         for row in rows

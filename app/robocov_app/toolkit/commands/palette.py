@@ -60,8 +60,9 @@ def list_options(table: CommandTable, text: str) -> list[Option]:
     """
     name, argument_text = split_command(text)
     command = table.find_with_argument(name)
-    is_complete = bool(argument_text) or text.rstrip() != text
-    if command is not None and command.argument is not None and is_complete:
+    # A space after the name of a command asks for its argument.
+    is_name_complete = argument_text != "" or text[-1:].isspace()
+    if command is not None and command.argument is not None and is_name_complete:
         return _list_completions(table, command, command.argument, argument_text, text)[:MAX_OPTIONS]
     return [_build_option(table, match) for match in table.search(text)[:MAX_OPTIONS]]
 

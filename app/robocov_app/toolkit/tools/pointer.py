@@ -134,15 +134,25 @@ class Pointer:
         self._button = 0
 
     def handle_event(self, event: pygame.event.Event, now: float) -> None:
-        """Handle a mouse event that arrives at time `now`, s."""
+        """Pass a mouse event to the part of the window under the mouse or, over the map, to a gesture.
+
+        Parameters
+        ----------
+        event : pygame.event.Event
+        now : float
+            Current time, s, for the detection of double clicks.
+        """
         if event.type != pygame.MOUSEWHEEL:
             self.pixel = event.pos
-        is_for_part = not self.is_busy and offer_event(self._parts, event)
+        # While a button is held down over the map, its gesture gets all events.
+        is_used_by_part = False
+        if not self.is_busy:
+            is_used_by_part = offer_event(self._parts, event)
         if event.type == pygame.MOUSEMOTION:
             self.move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
             self.release(event)
-        elif is_for_part:
+        elif is_used_by_part:
             self.leave()
         elif event.type == pygame.MOUSEBUTTONDOWN:
             for part in self._parts:

@@ -181,7 +181,7 @@ def show_tabs(
     Returns
     -------
     str or None
-        Name of the button that was just clicked; None if none was, or only the selected one.
+        Name of the button that was just clicked; None if no button was clicked, or the selected one was.
     """
     page.row(*(widths or [0.0] * len(names)), below=_TABS_GAP_PX)
     picked = None

@@ -42,7 +42,7 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
     Returns
     -------
     str or None
-        Option that was just picked; None if none was, or only the current one.
+        Option that was just picked; None if no option was picked, or the current one was.
     """
     rect = page.cell()
     picked = _read_list(page, key, options)

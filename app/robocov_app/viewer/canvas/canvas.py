@@ -319,7 +319,9 @@ class ViewerCanvas:
     def _list_scans(
         self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
     ) -> list[tuple[Array, Array]]:
-        """Return the scan of the selected robot; without a selection, of all robots unless they are too many.
+        """Return the scan of the selected robot or, if none is selected, the scans of all robots.
+
+        Nothing is returned for teams so large that each scan would have too few rays.
 
         Returns
         -------

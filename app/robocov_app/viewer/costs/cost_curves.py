@@ -36,29 +36,32 @@ class CostCurves:
             self._past_version = session.timeline.past_version
             self._viewer.costs.forget()
         for pane in session.timeline.panes:
-            self._ask_for_pane(pane)
-        self._ask_for_first_seconds()
+            self._request_pane_cost(pane)
+        self._request_first_seconds()
         self._add_answers()
 
-    def _ask_for_pane(self, pane: Pane) -> None:
-        """Request the cost of a pane, unless it is known and no path from the cursor is shown."""
+    def _request_pane_cost(self, pane: Pane) -> None:
+        """Request the cost of a pane at the displayed step, unless the latest answer is still valid.
+
+        While the path to the cursor is shown, the cost is requested in every frame, because the cursor moves.
+        """
         session = self._viewer.session
         costs = self._viewer.costs
         positions = session.displayed.get_positions(pane)
-        point = self._find_path_target()
-        known = costs.known.get(pane.number)
-        is_known = (
-            known is not None
-            and point is None
-            and abs(known.time - session.displayed.time) < TIME_TOLERANCE_S
-            and np.array_equal(known.result.positions, positions)
+        path_target = self._find_path_target()
+        latest = costs.known.get(pane.number)
+        is_valid = (
+            latest is not None
+            and path_target is None
+            and abs(latest.time - session.displayed.time) < TIME_TOLERANCE_S
+            and np.array_equal(latest.result.positions, positions)
         )
-        if not is_known:
+        if not is_valid:
             costs.request(
                 pane.number,
                 session.displayed.time,
                 positions,
-                point,
+                path_target,
                 session.displayed.get_setup(pane).speed_limits,
             )
 
@@ -69,7 +72,7 @@ class CostCurves:
             return None
         return np.array(cursor)
 
-    def _ask_for_first_seconds(self) -> None:
+    def _request_first_seconds(self) -> None:
         """Request costs of the first seconds, which had passed before costs could be computed on the map.
 
         They are requested backwards in time from the first known cost. While the run plays, requests for them

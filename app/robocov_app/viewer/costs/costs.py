@@ -64,7 +64,7 @@ class _SharedSites(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CostRequest:
-    """Request for the cost on a map; without positions, only a request to prepare the map.
+    """Request for the cost on a map, or only to prepare the map if there are no positions.
 
     Attributes
     ----------

@@ -307,21 +307,14 @@ class _LessonPage:
             self.y += _LINE_HEIGHT * self.text_px * self.scale
 
     def _draw_answer(self, number: int, answer: MarkedAnswer) -> None:
-        """Draw an answer in a frame: a button until the user has answered, then with its mark."""
+        """Draw an answer in a frame: as a button while the question is open, with its mark afterwards."""
         top = self.y
         scale = self.scale
-        theme = self.theme
-        colors = {
-            AnswerMark.RIGHT: theme.start,
-            AnswerMark.WRONG: theme.error,
-            AnswerMark.CHOSEN: theme.accent,
-        }
         is_open = self.lesson.state is LessonState.ASKING
-        default_edge = theme.accent
-        if not is_open:
-            default_edge = mix(theme.panel, theme.ink, _CLOSED_ANSWER_STRENGTH)
-        edge = colors.get(answer.mark, default_edge)
-        ink = theme.ink if is_open or answer.mark is not AnswerMark.NONE else theme.faint
+        edge = self._choose_answer_edge(answer, is_open=is_open)
+        ink = self.theme.ink
+        if not is_open and answer.mark is AnswerMark.NONE:
+            ink = self.theme.faint
         text_width = self.width - (_ANSWER_INDENT_PX + _ANSWER_RIGHT_INDENT_PX) * scale
         lines = wrap_text(answer.text, round(self.text_px * scale), text_width)
         height = round((_LINE_HEIGHT * self.text_px * len(lines) + _ANSWER_HEIGHT_PX) * scale)
@@ -332,7 +325,7 @@ class _LessonPage:
         draw_rounded_box(
             self.screen,
             box,
-            theme.background,
+            self.theme.background,
             edge=edge,
             radius=round(_ANSWER_RADIUS_PX * scale),
             width=max(round(scale * edge_px), 1),
@@ -345,6 +338,20 @@ class _LessonPage:
         self.y = box.bottom + _ANSWER_GAP_PX * scale
         if is_open:
             self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
+
+    def _choose_answer_edge(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
+        """Return the color of an answer's frame; it depends on the mark, if the answer has one."""
+        theme = self.theme
+        match answer.mark:
+            case AnswerMark.RIGHT:
+                return theme.start
+            case AnswerMark.WRONG:
+                return theme.error
+            case AnswerMark.CHOSEN:
+                return theme.accent
+        if is_open:
+            return theme.accent
+        return mix(theme.panel, theme.ink, _CLOSED_ANSWER_STRENGTH)
 
     def _draw_chapters(self) -> None:
         """Draw the list of chapters above the progress bar; in a small window, a row of dots."""

@@ -129,7 +129,7 @@ class Timeline:
 
     @property
     def destination(self) -> tuple[Node, int]:
-        """Node and step to which the seek in progress leads; without one, those of the present."""
+        """Target of the seek in progress, as a node and a step; the present if there is no seek."""
         if self.pending_seek is None:
             return self.head, self.step
         return self.pending_seek.node, self.pending_seek.step

@@ -81,7 +81,7 @@ class BrushTool(ViewerTool):
         return None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Continue the stroke with equally spaced dabs; without a stroke, only move the brush."""
+        """Continue the stroke with equally spaced dabs. If no stroke is in progress, only move the brush."""
         if not self.is_painting or self._cursor is None:
             self._cursor = event.unsnapped_point
             return

@@ -40,7 +40,7 @@ def list_facts(
     frame_rate, step_rate : float
         Frames and simulated steps per second.
     video_duration : float or None
-        Duration of the video being recorded, s; None if none is recorded.
+        Duration of the video being recorded, s; None if no video is being recorded.
     """
     session = viewer.session
     time = session.displayed.time

@@ -150,7 +150,7 @@ def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], whe
 
 
 def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
-    """Return the index of the part with the most robots of the file; without robots, of the largest part."""
+    """Return the index of the part with the most robots or, in a file without robots, of the largest part."""
     robots = conversion.foreign.robots[:MAX_FILE_ROBOTS]
     if not robots:
         return 0

@@ -122,9 +122,10 @@ def _build_raw_pixels(occupancy: NDArray[np.float32], unknown: BoolArray) -> NDA
 def _build_scale_pixels(
     occupancy: NDArray[np.float32], unknown: BoolArray, *, has_alpha: bool
 ) -> NDArray[np.uint8]:
-    """Return the pixels of a map of mode scale, the bottom row first.
+    """Return the pixels of a map in the mode "scale": the darker a pixel, the higher its occupancy.
 
-    They are a (rows, columns) array, or (rows, columns, 2) with alpha, which is 0 for unknown cells.
+    The shape is (rows, columns), from the bottom row up, or (rows, columns, 2) with an alpha channel, which
+    is 0 for unknown cells.
     """
     darkness = FREE_THRESHOLD + occupancy * (OCCUPIED_THRESHOLD - FREE_THRESHOLD)
     darkness = np.where(occupancy <= 0.0, 0.0, darkness)

@@ -87,7 +87,7 @@ class ShapeReader:
             self._add_walls(self._compute_subpaths(element, state), state, stroke, element)
 
     def _add_fill(self, element: Element, state: ElementState, fill: Paint, stroke: Paint | None) -> None:
-        """Add a filled shape with its stroke, if any; without an area, only the stroke is added, as walls."""
+        """Add a filled shape and its stroke, if any. If the shape has no area, its stroke becomes walls."""
         if self._add_disc(element, state, fill):
             if stroke is not None:
                 with suppress(ValueError):  # a huge disc has too many points for edges, but needs none itself

@@ -58,7 +58,7 @@ class RunSaver:
         self._messages: list[tuple[str, bool]] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
-        """Start to save the branch of a session up to its present, in a new folder.
+        """Start saving the branch of a session, up to its present, as a run in a new folder.
 
         Parameters
         ----------

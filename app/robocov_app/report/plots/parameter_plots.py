@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.controllers.gains import Value, format_value
-from robocov_app.figures.gains import MAX_LEVELS, Dependence, GainGrid, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import MAX_LEVELS, GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report.analysis.groups import RunGroup, find_varying_gains, group_by_controller
 from robocov_app.report.analysis.scaling import Scales, compute_medians, scale_distance
@@ -24,7 +24,7 @@ from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
 
 _MAX_MISSING_FRACTION = 0.5
-"""If a larger fraction of the combinations of two gains is missing, they were not tried on a grid."""
+"""If more combinations of two gains are missing, they do not form a grid."""
 
 
 class _Parameter(NamedTuple):
@@ -80,7 +80,7 @@ class _DistanceAxis(NamedTuple):
     scales: Scales
 
 
-def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
+def build_parameter_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     """Build the plots of final mean distances against parameters.
 
     Parameters
@@ -172,22 +172,22 @@ def _build_plot(
     key: str,
 ) -> PagePlot | None:
     """Build the plot of distances against a parameter; return None if no distance is known."""
-    dependences = []
+    all_results = []
     for group in groups:
-        dependence = _collect_dependence(parameter, group, axis.scales, styles[group.controller])
-        if len(dependence.values):
-            dependences.append(dependence)
-    if not dependences:
+        results = _collect_results(parameter, group, axis.scales, styles[group.controller])
+        if len(results.values):
+            all_results.append(results)
+    if not all_results:
         return None
-    figure = plot_gains(dependences, parameter.title, PANEL_SIZE_PX, axis.label, parameter.choices)
-    texts = "; ".join(_describe_dependence(dependence, parameter) for dependence in dependences)
+    figure = plot_gains(all_results, parameter.title, PANEL_SIZE_PX, axis.label, parameter.choices)
+    texts = "; ".join(_describe_results(results, parameter) for results in all_results)
     description = f"{axis.label} against {parameter.title}. {texts}."
     return PagePlot(parameter.title, inline_svg(figure, key, description))
 
 
-def _collect_dependence(
+def _collect_results(
     parameter: _Parameter, group: RunGroup, scales: Scales, style: CurveStyle
-) -> Dependence:
+) -> GainResults:
     """Collect the finite scaled distances of the runs of a group, and the coordinates of the parameter."""
     coordinates = []
     distances = []
@@ -196,32 +196,35 @@ def _collect_dependence(
         if np.isfinite(distance):
             coordinates.append(parameter.to_coordinate(parameter.get_value(run)))
             distances.append(distance)
-    return Dependence(group.label, style, np.array(coordinates), np.array(distances))
+    return GainResults(group.label, style, np.array(coordinates), np.array(distances))
 
 
-def _describe_dependence(dependence: Dependence, parameter: _Parameter) -> str:
-    """Describe a dependence: the median at each value or, with many values, their range and the best one."""
-    coordinates = np.unique(dependence.gains)
+def _describe_results(results: GainResults, parameter: _Parameter) -> str:
+    """Describe results by the median at each value; if there are many values, by their range and the best."""
+    coordinates = np.unique(results.gains)
     if len(coordinates) > MAX_LEVELS:
-        low = np.nanmin(dependence.gains)
-        high = np.nanmax(dependence.gains)
-        best = parameter.format_coordinate(dependence.gains[int(np.argmin(dependence.values))])
-        runs = f"{dependence.label}, {len(dependence.values)} runs"
+        low = np.nanmin(results.gains)
+        high = np.nanmax(results.gains)
+        best = parameter.format_coordinate(results.gains[int(np.argmin(results.values))])
+        runs = f"{results.label}, {len(results.values)} runs"
         return f"{runs} from {low:.3g} to {high:.3g}, the lowest value at {best}"
     medians = []
     for coordinate in coordinates.tolist():
-        has_value = dependence.gains == coordinate
+        has_value = results.gains == coordinate
         if np.isnan(coordinate):
-            has_value = np.isnan(dependence.gains)
-        median = np.median(dependence.values[has_value])
+            has_value = np.isnan(results.gains)
+        median = np.median(results.values[has_value])
         medians.append(f"{parameter.format_coordinate(coordinate)}: {median:.3f}")
-    return f"{dependence.label}, medians at {', '.join(medians)}"
+    return f"{results.label}, medians at {', '.join(medians)}"
 
 
 def _build_grid_plot(
     group: RunGroup, first: _Parameter, second: _Parameter, axis: _DistanceAxis, *, key: str
 ) -> PagePlot | None:
-    """Build the plot of medians over two gains of a controller; return None if they were not on a grid."""
+    """Build the plot of the median distance for each combination of two gains of a controller.
+
+    Return None if the combinations in the runs do not form a grid.
+    """
     known_runs = [run for run in group.runs if np.isfinite(scale_distance(run, axis.scales))]
     distances = np.array([scale_distance(run, axis.scales) for run in known_runs])
     first_values = [first.to_coordinate(first.get_value(run)) for run in known_runs]
@@ -230,10 +233,7 @@ def _build_grid_plot(
     rows, row_indices = np.unique(second_values, return_inverse=True)
     if not (1 < len(columns) <= MAX_LEVELS and 1 < len(rows) <= MAX_LEVELS):
         return None
-    medians = np.full((len(rows), len(columns)), np.nan)
-    for row, column in set(zip(row_indices.tolist(), column_indices.tolist(), strict=True)):
-        is_in_cell = (row_indices == row) & (column_indices == column)
-        medians[row, column] = np.median(distances[is_in_cell])
+    medians = _compute_cell_medians(distances, row_indices, column_indices)
     if np.isnan(medians).mean() > _MAX_MISSING_FRACTION:
         return None
     grid = GainGrid(
@@ -250,6 +250,27 @@ def _build_grid_plot(
         distance = "final distance in m"
     span = _describe_grid(medians, first, second, columns, rows)
     return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance}, {span}."))
+
+
+def _compute_cell_medians(distances: Array, row_indices: IntArray, column_indices: IntArray) -> Array:
+    """Return the median of the distances in each cell of a grid; nan for cells without runs.
+
+    Parameters
+    ----------
+    distances : (k,) array
+        Final distance of each run.
+    row_indices, column_indices : (k,) arrays of int
+        Cell of each run.
+
+    Returns
+    -------
+    (rows, columns) array
+    """
+    medians = np.full((row_indices.max() + 1, column_indices.max() + 1), np.nan)
+    for row, column in set(zip(row_indices.tolist(), column_indices.tolist(), strict=True)):
+        is_in_cell = (row_indices == row) & (column_indices == column)
+        medians[row, column] = np.median(distances[is_in_cell])
+    return medians
 
 
 def _describe_grid(medians: Array, first: _Parameter, second: _Parameter, columns: Array, rows: Array) -> str:
