@@ -443,7 +443,7 @@ def _spread_over_pixels(blocks: BorderPixels, height: int, width: int) -> Border
 
 
 def _select_different(sites: IntArray, sources: IntArray) -> IntArray:
-    """Return the sites of each row with different sources, at most `_MAX_CANDIDATES`.
+    """Return, for each row, up to `_MAX_CANDIDATES` sites with distinct sources.
 
     Parameters
     ----------

@@ -159,17 +159,15 @@ def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOu
     fresh = [largest]
     while fresh:
         current = fresh.pop()
-        near = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
-        for k in near.tolist():
-            other: ClosedOutline = outlines[k]
-            belongs = k in containers or (
-                other.parent_place != "" and other.parent_place == largest.parent_place
-            )
-            if other in members or not belongs:
+        neighbors = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
+        for k in neighbors.tolist():
+            neighbor: ClosedOutline = outlines[k]
+            has_same_parent = neighbor.parent_place != "" and neighbor.parent_place == largest.parent_place
+            if neighbor in members or not (k in containers or has_same_parent):
                 continue
-            if are_edge_to_edge(current.area, other.area, drawing.snap):
-                members.add(other)
-                fresh.append(other)
+            if are_edge_to_edge(current.area, neighbor.area, drawing.snap):
+                members.add(neighbor)
+                fresh.append(neighbor)
     return members
 
 
