@@ -34,6 +34,9 @@ class TestReadability:
         for fill in theme.robots:
             assert compute_contrast(choose_text_color(fill), fill) >= 4.0
 
+    def test_names_on_obstacles(self, theme):
+        assert compute_contrast(choose_text_color(theme.obstacle), theme.obstacle) >= 4.5
+
     def test_marks_and_curves_on_the_page(self, theme):
         marks = [theme.start, theme.final, theme.trajectory, theme.others[0], theme.velocity]
         marks += [*theme.controllers.values(), *theme.forces.values()]

@@ -20,7 +20,7 @@ from robocov_app.editor.canvas.view import (
 )
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.look.colors import Color, mix
+from robocov_app.look.colors import Color, choose_text_color, mix
 from robocov_app.look.lengths import round_up
 from robocov_app.render import fonts
 from robocov_app.render.camera import Camera
@@ -41,7 +41,6 @@ MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pi
 MAX_REDRAWN_FRACTION = 0.5  # of the image; if more has changed, all of it is redrawn
 MAX_BOXES = 40  # more boxes are merged into one
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
-NAME_INK_SHARE = 0.9  # of the ink in the color of names, which are on obstacles
 OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
 _TRANSPARENT = (0, 0, 0, 0)
 
@@ -250,7 +249,7 @@ class Sheet:
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
         """Write the names of obstacles, shortened if necessary; none on obstacles that are too small."""
         size = canvas.scale_text_size(canvas.theme.small_text)
-        color = mix(canvas.theme.obstacle, canvas.theme.ink, NAME_INK_SHARE)
+        color = choose_text_color(canvas.theme.obstacle)
         zoom = canvas.camera.zoom
         for item in items:
             name = item.shape.name
