@@ -48,7 +48,7 @@ class Sheet:
     """Where places of the map are in the window."""
 
     def __init__(self, bounds: tuple[float, float, float, float], legend_rows: int = 1) -> None:
-        left, top, width, height = build_layout(SIZE, 1.0, 1, 1.0, plot=False).arena
+        left, top, width, height = build_layout(SIZE, 1.0, 1, 1.0, plot=False, toolbars=False).arena
         above = 10 + 22 * legend_rows
         view = float(left), float(top + above), float(width), height - above - STRIP_HEIGHT_PX
         self.camera = Camera.fit(bounds, view, MARGIN_PX)
