@@ -141,15 +141,16 @@ def _place_robots(count: int) -> Array:
 
 
 def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
-    """Compile the kernels of examples, unless their machine code is already in the cache.
+    """Compile the kernels that example functions call, unless their machine code is already in the cache.
 
-    Without a cache folder the kernels are compiled for this process. If another process is compiling the same
-    kernels, this function waits for it.
+    An example calls a group of kernels with arguments of the same types as in a simulation. Numba compiles a
+    kernel at its first call, so that calling the example compiles the group. If another process is doing
+    this, the function waits for it. Without a cache folder, the machine code is only for this process.
 
     Parameters
     ----------
-    examples : sequence of functions
-        By default those that a run and its summary need.
+    examples : sequence of Example
+        By default those of a run and its summary.
     """
     folder = open_cache_folder()
     for example in examples:
@@ -164,7 +165,7 @@ def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
 
 
 def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
-    """Return whether the machine code of the kernels of examples is in the cache.
+    """Return whether the machine code of the kernels that example functions call is in the cache.
 
     Parameters
     ----------

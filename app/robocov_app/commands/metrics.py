@@ -85,10 +85,10 @@ def command(options: Arguments) -> None:
 
 def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:
     from robocov.metrics.run_metrics import compute_run_metrics
-    from robocov.record import select_nearest_moments
+    from robocov.record import select_nearest_steps
 
     record = saved.record
-    samples = len(select_nearest_moments(record.time, options.rate))
+    samples = len(select_nearest_steps(record.time, options.rate))
     with show_progress(f"measuring {record.label}", samples, quiet=options.json) as update:
         return compute_run_metrics(record, options.rate, make_counter(update))
 

@@ -17,7 +17,7 @@ _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "use it directly with robocov check, run and edit"),
-    (_FORMAT + r"(?:run|comparison)\"", "a result of robocov", "use robocov replay with its folder"),
+    (_FORMAT + r"(?:run|comparison)\"", "a robocov result", "use robocov replay with its folder"),
     (_FORMAT, "a file of robocov, but not a map", "use robocov report for folders of results"),
     (r"\0\0'\x0a", "a shapefile", _OGR),
     (r"SQLite format 3\0.{52}GP", "a GeoPackage", _OGR),

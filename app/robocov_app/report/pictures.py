@@ -153,7 +153,7 @@ def draw_run(
     ----------
     record : Record
     history : CostHistory or None
-        Cost along the run, for the description.
+        Cost over the run, for the description.
     width, height : float, px
         Maximum size.
     has_numbers : bool

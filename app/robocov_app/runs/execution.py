@@ -11,7 +11,7 @@ from typing import Any
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
 from robocov.files.result_names import COST_FILE
-from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarize
+from robocov.metrics import CostHistory, compute_cost_history, select_sampled_steps, summarize
 from robocov.metrics.cost_history import DEFAULT_RATE_HZ
 from robocov.record import Record
 from robocov.scenario import Scenario
@@ -124,7 +124,7 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     end = float(record.time[-1])
     if interruption.requested and end > 0:
         rate = min(rate, MAX_SAMPLES_AFTER_INTERRUPTION / end)
-    samples = len(select_sampled_moments(record, rate))
+    samples = len(select_sampled_steps(record, rate))
     with show_progress("coverage cost", samples, quiet=quiet) as update:
         history = compute_cost_history(record, cost, rate, make_counter(update))
     return Run(record, history, summarize(record, history))

@@ -72,7 +72,7 @@ def draw_frames(
     scale : float or None
         Scale of text and lines. By default, one that suits the size.
     cost : CostHistory or None
-        The coverage cost along the run. Each frame shows its latest value.
+        The coverage cost over the run. Each frame shows its latest value.
     rows : (k,) int array or None
         Indices of the recorded steps that the frames show. By default, the result of `select_frame_rows`.
     fields : DistanceFields or None

@@ -196,7 +196,7 @@ def avoid_collisions(
 def limit_approach_speed(
     velocities: Array, offsets: Array, clearance: Array, rate: float, braking: Array, max_speed: Array
 ) -> Array:
-    """Compute the velocities nearest to the desired ones that are slow enough toward close objects.
+    """Change velocities as little as possible so that robots can stop before they reach objects.
 
     Parameters
     ----------
@@ -214,20 +214,29 @@ def limit_approach_speed(
     Returns
     -------
     (n, 2) array, m/s
-        Within the clearance of an object, they point away from it. If no velocity does so for all of these
-        objects, they approach none of them.
+        The velocities nearest to the desired ones that satisfy the limits (see Notes).
+
+    Notes
+    -----
+    With the gap g = distance - clearance, the speed of a robot toward an object is limited to
+
+        min(rate g, sqrt(2 braking g))    if g >= 0,
+        max(rate g, -max_speed / 2)       if g < 0: the robot has to move away.
+
+    A robot between objects may be unable to move away from all of them at once. For this robot, negative
+    limits are replaced by 0: it approaches none of the objects.
     """
     distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
     normals = offsets / np.where(distance > 0.0, distance, np.nan)[..., None]
     gap = np.nan_to_num(distance - clearance)
     limits = np.minimum(rate * gap, np.sqrt(2.0 * braking * np.maximum(gap, 0.0)))
-    # A robot that must move away at full speed could do nothing else, such as avoid a third object.
+    # At full speed away from one object, a robot could not avoid another one.
     limits = np.maximum(limits, -0.5 * max_speed[:, None])
-    slowed, is_feasible = find_nearest_allowed(velocities, -normals, limits, max_speed)
+    limited, is_feasible = find_nearest_allowed(velocities, -normals, limits, max_speed)
     if is_feasible.all():
-        return slowed
-    stopped, _ = find_nearest_allowed(velocities, -normals, np.maximum(limits, 0.0), max_speed)
-    return np.where(is_feasible[:, None], slowed, stopped)
+        return limited
+    not_approaching, _ = find_nearest_allowed(velocities, -normals, np.maximum(limits, 0.0), max_speed)
+    return np.where(is_feasible[:, None], limited, not_approaching)
 
 
 @kernel

@@ -140,11 +140,11 @@ def gain(
     default : float or None
         Default value, within the range.
     unit : str
-        "1" if there is none.
+        Such as "N/m"; "1" for a dimensionless gain.
     meaning : str
         Description on one line.
     low, high : float
-        Range, including both.
+        Smallest and largest allowed values.
     optional : bool
         Whether None is allowed, which means no limit.
     whole : bool

@@ -76,7 +76,7 @@ class CoverageCost:
     CoverageResult : The result of an evaluation.
     TimeVaryingCost : The cost of a map whose obstacles move.
     find_optimum : Find positions of low cost.
-    compute_cost_history : The cost along a run.
+    compute_cost_history : The cost over a run.
 
     Notes
     -----

@@ -230,8 +230,8 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
 def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
     """Find the robot that is nearest to each site in a straight line.
 
-    For a group of neighboring tiles, most robots are too far away to be the nearest one for any site. For
-    each tile of the group, the remaining robots are sieved once more.
+    Most robots are too far from a group of neighboring tiles to be nearest to any of its sites. Such robots
+    are dropped once for each group, and those that are too far from a single tile once for each tile.
     """
     search.reach[:] = 0.0
     group_robot_count = 0
@@ -253,14 +253,15 @@ def _list_nearest_candidates(
 ) -> int:
     """Write the candidates that may be nearest to some point of a box to `result`; return their number.
 
-    The candidates are the robots in the first `candidate_count` entries of `candidates`.
+    The candidates are the robots in the first `candidate_count` entries of `candidates`. If one of them is at
+    most a distance d from every point of the box, then a robot farther than d from the box is not nearest to
+    any of its points. The smallest such d leaves the fewest candidates.
     """
-    # No point of the box is farther from its nearest robot than from any one robot. For each robot, the point
-    # that is farthest from it is a corner of the box.
     max_squared_distance = np.inf
     for k in range(candidate_count):
         x = robots[candidates[k], 0]
         y = robots[candidates[k], 1]
+        # Offsets to the corner of the box that is farthest from the robot.
         dx = max(x - boxes[box, LOW_X], boxes[box, HIGH_X] - x)
         dy = max(y - boxes[box, LOW_Y], boxes[box, HIGH_Y] - y)
         max_squared_distance = min(max_squared_distance, dx * dx + dy * dy)

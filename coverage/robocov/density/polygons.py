@@ -194,9 +194,11 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Return the edges of a closed, counter-clockwise ring as jumps: inside it, φ is larger by `step`.
+    """Convert a closed, counter-clockwise ring to jumps, one for each edge.
 
-    A jump runs from its lower to its upper end, with the change of φ from its left to its right side.
+    The density φ inside the ring exceeds φ outside by `step`. A jump runs from the lower to the upper end of
+    its edge, and contains the change of φ from its left side to its right side: -step if the inside of the
+    ring is on the left, and +step if it is on the right.
     """
     start = points[:-1]
     end = points[1:]

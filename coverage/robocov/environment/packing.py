@@ -17,8 +17,9 @@ _ROW_SPACING = math.sqrt(3) / 2
 The area per point is the same number.
 """
 _PACKING_TRIALS = 6
-"""Number of random packings that are tried if there is room for at most `_MAX_FEW_POINTS`; otherwise one."""
-_MAX_FEW_POINTS = 300
+"""Number of random packings from which the densest one is chosen."""
+_MAX_POINTS_FOR_TRIALS = 300
+"""Maximum number of points for which several packings are tried; larger packings take longer."""
 _LATTICE_TRIALS = 20
 """Number of random positions and orientations to try for a lattice."""
 _MAX_LATTICE_STEPS = 2000
@@ -67,7 +68,9 @@ def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
 
 
 def pack_densely(area: BaseGeometry, spacing: float) -> Array:
-    """Pack as many points as possible into an area. The result is deterministic.
+    """Pack points into an area as densely as possible: the best of several random packings.
+
+    The result is deterministic.
 
     Parameters
     ----------
@@ -81,7 +84,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
     """
     best = np.empty((0, 2))
     max_points = compute_max_points(area, spacing)
-    trials = _PACKING_TRIALS if max_points <= _MAX_FEW_POINTS else 1
+    trials = _PACKING_TRIALS if max_points <= _MAX_POINTS_FOR_TRIALS else 1
     for trial in range(trials):
         rng = np.random.default_rng(trial)
         lattice = pack_lattice(rng, area, max_points, spacing)

@@ -250,13 +250,14 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
         If the folder cannot be used, another process is using it, or a file not written by robocov is in the
         way.
     """
-    listing_folder, run_name = _find_listing_folder(folder)
-    with _open_folder(listing_folder):
-        with report_folder_errors(listing_folder):
-            owned_files = _list_owned_files(listing_folder)
+    # A run of a comparison belongs to the result of the comparison, in the folder above.
+    result_root, run_name = _find_result_root(folder)
+    with _open_folder(result_root):
+        with report_folder_errors(result_root):
+            owned_files = _list_owned_files(result_root)
         if owned_files is None:
-            raise InputError(f"{folder}: expected a result of robocov in the folder, found none")
-        result = ResultFolder(listing_folder, owned_files, replaces=False, part=run_name)
+            raise InputError(f"{folder}: expected a folder with a robocov result, found none")
+        result = ResultFolder(result_root, owned_files, replaces=False, part=run_name)
         yield result
         result.commit()
 
@@ -279,9 +280,9 @@ def complete_commit(folder: Path) -> None:
     if os.path.lexists(folder / _JOURNAL_FILE):
         with lock_folder(folder, _LOCK_FILE, remove=True), report_folder_errors(folder):
             _carry_out_journal(folder)
-    listing_folder, run_name = _find_listing_folder(folder, _JOURNAL_FILE)
+    result_root, run_name = _find_result_root(folder, _JOURNAL_FILE)
     if run_name:
-        raise InputError(f"{folder}: its replacement was interrupted; open {listing_folder} to complete it")
+        raise InputError(f"{folder}: its replacement was interrupted; open {result_root} to complete it")
 
 
 def is_report(path: Path) -> bool:
@@ -399,23 +400,24 @@ def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
         return None
     if not overwrite:
         raise InputError(f"{folder}: the folder is not empty; choose another --out or pass --overwrite")
-    listing_folder, run_name = _find_listing_folder(folder)
+    result_root, run_name = _find_result_root(folder)
     if run_name:
-        raise InputError(f"{folder}: belongs to the comparison in {listing_folder}; choose another --out")
+        raise InputError(f"{folder}: belongs to the comparison in {result_root}; choose another --out")
     owned_files = _list_owned_files(folder)
     if owned_files is None:
         raise InputError(
-            f"{folder}: the content of the folder is not a result of robocov, so --overwrite leaves it "
-            "alone; choose another --out"
+            f"{folder}: the content of the folder is not a robocov result, so --overwrite does not replace "
+            "it; choose another --out"
         )
     return owned_files
 
 
-def _find_listing_folder(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
-    """Return the folder whose manifest or journal lists the files of a folder, and the name of the run.
+def _find_result_root(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
+    """Return the folder of the whole result to which a folder belongs, and the name of the run in it.
 
-    For the folder of one run of a comparison, these are the folder of the comparison and the name of the
-    run. For any other folder, they are the folder itself and "".
+    For the folder of one run of a comparison, these are the folder of the comparison, where the manifest or
+    journal `list_name` lists the files of the run, and the name of the run. For any other folder, they are
+    the folder itself and "".
     """
     if os.path.lexists(folder / list_name):
         return folder, ""

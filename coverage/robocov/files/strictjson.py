@@ -265,7 +265,7 @@ def _find_first_mistake(value: Any, path: JsonPath) -> Mistake | None:
 
 
 def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
-    """Return the mistake of the first key that is not a string, or of the first duplicate one."""
+    """Build the mistake of the first key that is not a string, or of the first duplicate one."""
     for key in value:
         if not isinstance(key, str) or not _is_encodable(key):
             prefix = f"{format_path(path)}: " if path else ""

@@ -386,11 +386,11 @@ class _SharedWall(NamedTuple):
 
 
 def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
-    """Add doors that connect all rooms, and some more; return whether all rooms are connected.
+    """Add doors until all rooms are connected, and a few more; return whether all rooms are connected.
 
-    The walls between two rooms are visited in random order, but those of the corridor first. A door is added
-    if it connects rooms that are not connected yet, directly or via others. At random, some more are added,
-    which make loops. A piece of wall remains on both sides of each door.
+    The shared walls are processed in random order, the walls of the corridor before all others. A wall gets a
+    door if the rooms on its two sides are not connected yet, directly or via other rooms. Other walls get a
+    door at random, which closes a loop of rooms. A piece of wall remains on both sides of each door.
     """
     room_groups = DisjointSet(range(len(plan.rooms)))
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
@@ -399,7 +399,7 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
     widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(shared_walls))
 
     def compute_sort_key(k: int) -> tuple[bool, float]:
-        """Return a key that puts doors to the corridor first, and is random otherwise."""
+        """Return a key that sorts the walls of the corridor first, and is random otherwise."""
         return plan.corridor not in shared_walls[k].rooms, float(order_keys[k])
 
     for k in sorted(range(len(shared_walls)), key=compute_sort_key):

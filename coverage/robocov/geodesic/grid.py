@@ -38,7 +38,7 @@ class Grid:
 
     @classmethod
     def from_square(cls, low: Array, side: float) -> Grid:
-        """Build the grid of a square.
+        """Build the finest grid on which a square is at most 2**48 grid steps wide.
 
         Parameters
         ----------
@@ -50,15 +50,16 @@ class Grid:
         Returns
         -------
         Grid
+            Its unit is the side, rounded up to a power of two, divided by 2**48.
 
         Examples
         --------
         >>> grid = Grid.from_square(np.array([0.0, 0.0]), side=8.0)
-        >>> grid.unit == 2.0**-45
+        >>> grid.unit == 8.0 / 2.0**48
         True
         """
-        exponent = math.ceil(math.log2(side)) - GRID_BITS
-        return cls(np.asarray(low, dtype=float), 2.0**exponent)
+        side_exponent = math.ceil(math.log2(side))
+        return cls(origin=np.asarray(low, dtype=float), unit=2.0 ** (side_exponent - GRID_BITS))
 
     def snap(self, points: Array) -> Array:
         """Convert points to grid coordinates, rounded to whole steps.

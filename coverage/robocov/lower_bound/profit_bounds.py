@@ -187,7 +187,7 @@ def _add_site(
     distance = np.inf
     if is_visible(site_data.walls, wall_index, ONLY_SOURCE, site_x, site_y):
         distance = straight_length
-        _lower_to_tangent(scratch, straight_length, dx, dy, straight_length)
+        _apply_tangent_bound(scratch, straight_length, dx, dy, straight_length)
     distance = min(distance, _lower_by_corners(site_data, scratch, center, site))
     weight = site_data.weights[site]
     for vertex in range(3):
@@ -211,27 +211,30 @@ def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Ce
         if length - center.radius < max(min_distances[0], min_distances[1], min_distances[2]):
             dx = center.x - corners[corner, 0]
             dy = center.y - corners[corner, 1]
-            _lower_to_tangent(scratch, length, dx, dy, scratch.corner_distances[k])
+            _apply_tangent_bound(scratch, length, dx, dy, scratch.corner_distances[k])
     return min_length
 
 
 @kernel
-def _lower_to_tangent(
+def _apply_tangent_bound(
     scratch: TriangleScratch, length: float, dx: float, dy: float, first_length: float
 ) -> None:
-    """Lower the distance bounds of the vertices where the tangent of a path length is below them.
+    """Replace the distance bound of each vertex by the tangent of a path length if that is smaller.
 
-    The length of a path from a point to a site is a convex function of the point, and is therefore never
-    below its tangent at the center. The slope of the tangent is that of the first segment of the path.
-    `length` is the length of the path from the center, and `first_length` that of its first segment, whose
-    end is at -(dx, dy) from the center.
+    The length of a path is a convex function of its start. Its tangent at the center of the triangle is
+    therefore a lower bound on the length of the path from any other point, here from each vertex.
+
+    The path from the center has the given length. Its first segment has the length `first_length`, and runs
+    from the center to the point at -(dx, dy). The tangent rises in the direction (dx, dy), away from the end
+    of this segment, with slope 1.
     """
     # If the segment is empty, its direction (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)
     for vertex in range(3):
-        rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]
-        tangent = length + rise / divisor
-        scratch.min_distances[vertex] = min(scratch.min_distances[vertex], tangent)
+        vertex_x = scratch.vertices[vertex, 0]
+        vertex_y = scratch.vertices[vertex, 1]
+        rise = (dx * vertex_x + dy * vertex_y) / divisor
+        scratch.min_distances[vertex] = min(scratch.min_distances[vertex], length + rise)
 
 
 def halve_triangles(triangles: Array) -> Array:

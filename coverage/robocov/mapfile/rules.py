@@ -107,7 +107,7 @@ def _find_line_mistakes(path: JsonPath, line: Ring, noun: str) -> Iterator[Mista
 
 
 def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> Mistake:
-    """Return the mistake of a ring that crosses or touches itself; it names the two edges."""
+    """Build the mistake of a ring that crosses or touches itself; it names the two edges."""
     reason = shapely.is_valid_reason(polygon)
     # The reason ends with the point, as in "Self-intersection[5 5]".
     x, y = (float(number) for number in reason[reason.index("[") + 1 : -1].split())

@@ -96,7 +96,7 @@ def validate_document(document: object, where: str) -> MapModel:
 
 
 def _build_mistake(detail: ErrorDetails) -> Mistake:
-    """Return the mistake for an error of pydantic."""
+    """Convert an error of pydantic to a mistake."""
     path = list(detail["loc"])
     key = str(path[0])
     if key == "starts" and path[2:] == ["[key]"]:
@@ -108,7 +108,7 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
     if not kinds or len(path) < object_length:
         return _build_member_mistake(path, detail, MapModel)
     if len(path) == object_length:
-        return _build_kind_mistake(tuple(path), detail["input"], list(kinds))
+        return _build_unknown_kind_mistake(tuple(path), detail["input"], list(kinds))
     # The path of pydantic contains the kind after the object; the path in the file does not.
     model = kinds[str(path[object_length])]
     path = path[:object_length] + path[object_length + 1 :]
@@ -119,7 +119,7 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
 
 
 def _build_member_mistake(path: list[int | str], detail: ErrorDetails, model: type[Model]) -> Mistake:
-    """Return the mistake in a member of an object with a model, by its path in the file."""
+    """Build the mistake of a missing, unknown or wrong member of an object, at a path in the file."""
     if detail["type"] == "extra_forbidden":
         return _build_unknown_key_mistake(path, model)
     # The steps after the last key are indices in nested lists, such as 2 and 0 in vertices[2][0].
@@ -137,8 +137,8 @@ def _build_unknown_key_mistake(path: list[Any], model: type[Model]) -> Mistake:
     return Mistake(tuple(path), f"{prefix}{describe_unknown_name('key', str(key), known)}", at_key=True)
 
 
-def _build_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mistake:
-    """Return the mistake of an obstacle, a start or a density whose kind is unknown."""
+def _build_unknown_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mistake:
+    """Build the mistake of an obstacle, a start or a density that has no known kind."""
     expected = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
         return Mistake.at_path(path, describe_mismatch(f"an object whose kind is {expected}", value))

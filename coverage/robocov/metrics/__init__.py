@@ -1,6 +1,6 @@
 """Metrics of recorded runs.
 
-- `cost_history`: the coverage cost along a run
+- `cost_history`: the coverage cost over a run
 - `settling`: whether a team is at rest, and when it came to rest
 - `motion`: path lengths and stuck robots
 - `clearance`: distances to walls and other robots, and contacts
@@ -22,7 +22,7 @@ from robocov.metrics.cost_history import (
     CostHistory,
     compute_cost_history,
     compute_mean_over_run,
-    select_sampled_moments,
+    select_sampled_steps,
 )
 from robocov.metrics.motion import compute_path_lengths, count_stuck_robots
 from robocov.metrics.settling import (
@@ -48,6 +48,6 @@ __all__ = [
     "find_settling_time",
     "is_team_at_rest",
     "measure_robot_gaps",
-    "select_sampled_moments",
+    "select_sampled_steps",
     "summarize",
 ]

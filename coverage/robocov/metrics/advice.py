@@ -131,12 +131,12 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     is_new_contact[1:] &= ~is_touching[:-1]
     counts = np.zeros(len(record.team), dtype=np.intp)
     for robot in np.flatnonzero(is_new_contact.any(axis=0)).tolist():
-        moments = np.flatnonzero(is_new_contact[:, robot])
-        normals = record.positions[moments, robot] - record.obstacle_points[moments, robot]
+        steps = np.flatnonzero(is_new_contact[:, robot])
+        normals = record.positions[steps, robot] - record.obstacle_points[steps, robot]
         normals /= np.maximum(compute_point_distances(normals, np.zeros(2)), _MIN_DISTANCE_M)[:, None]
         # The cosine is nan, and the walls are not opposite, if a robot sensed nothing.
         is_opposite = (normals[:-1] * normals[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
-        is_soon = np.diff(record.time[moments]) <= MAX_ZIGZAG_PERIOD_S
+        is_soon = np.diff(record.time[steps]) <= MAX_ZIGZAG_PERIOD_S
         counts[robot] = int((is_opposite & is_soon).sum())
     return counts
 

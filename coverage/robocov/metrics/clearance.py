@@ -23,10 +23,10 @@ _REACH_FACTOR = 4.0
 
 
 class RobotGaps(NamedTuple):
-    """Gaps between the rims of robots along a run."""
+    """Gaps between the rims of robots over a run."""
 
     min_gaps: Array
-    """(T,) m, the smallest gap between two working robots at each moment; inf if fewer than two work."""
+    """(T,) m, the smallest gap between two working robots at each time step; inf if fewer than two work."""
     contacts: int
     """Number of times that two robots came into contact."""
 
@@ -45,30 +45,36 @@ def compute_clearances(record: Record) -> Array:
     """
     if record.conditions is not None or record.environment.has_moving_obstacles:
         return _compute_clearances_by_queries(record)
-    return _compute_clearances_from_record(record)
+    return _compute_clearances_from_sensed_points(record)
 
 
-def _compute_clearances_from_record(record: Record) -> Array:
-    """Return the clearances if the walls never change, using the obstacle points that robots sensed.
+def _compute_clearances_from_sensed_points(record: Record) -> Array:
+    """Compute the distances between robots and the nearest obstacle points that they sensed.
 
-    Where a robot sensed no obstacle, the nearest wall is queried.
+    The record must be of walls that do not change, and of exact sensing. If a robot sensed no obstacle, its
+    nearest wall is beyond its sensing range, and is found by queries with growing ranges.
     """
     positions = record.positions.reshape(-1, 2)
     nearest = record.obstacle_points.reshape(-1, 2).copy()
-    rows = np.flatnonzero(np.isnan(nearest[:, 0]))
-    if len(rows) > 0:
+    missing_rows = np.flatnonzero(np.isnan(nearest[:, 0]))
+    if len(missing_rows) > 0:
         sensor = RangeSensor(build_solid_pieces(record.environment))
         reach = _FIRST_REACH_M
-        while len(rows) > 0:
-            nearest[rows] = sensor.find_nearest_points(positions[rows], np.full(len(rows), reach))
-            rows = rows[np.isnan(nearest[rows, 0])]
+        while len(missing_rows) > 0:
+            nearest[missing_rows] = sensor.find_nearest_points(
+                positions[missing_rows], np.full(len(missing_rows), reach)
+            )
+            missing_rows = missing_rows[np.isnan(nearest[missing_rows, 0])]
             reach *= _REACH_FACTOR
     distances = compute_point_distances(positions, nearest).reshape(record.positions.shape[:2])
     return np.asarray(distances - record.team.radius)
 
 
 def _compute_clearances_by_queries(record: Record) -> Array:
-    """Return the clearances if sensing is noisy or the walls change: query the walls at each moment."""
+    """Compute the clearances by a query for the nearest wall at each time step.
+
+    This also applies to noisy sensing, and to walls that change: moving obstacles and failed robots.
+    """
     environment = record.environment
     working = record.working
     radius = record.team.radius
@@ -77,13 +83,13 @@ def _compute_clearances_by_queries(record: Record) -> Array:
     width, height = np.ptp(environment.region.vertices, axis=0)
     reach = np.full(len(radius), float(np.hypot(width, height)))
     clearances = np.full(working.shape, np.inf)
-    for moment, positions in enumerate(record.positions):
-        failed_robots = np.column_stack([positions, radius])[has_failed[moment]]
-        sensor.set_time(float(record.time[moment]), failed_robots)
-        rows = np.flatnonzero(working[moment])
+    for step, positions in enumerate(record.positions):
+        failed_robots = np.column_stack([positions, radius])[has_failed[step]]
+        sensor.set_time(float(record.time[step]), failed_robots)
+        rows = np.flatnonzero(working[step])
         nearest = sensor.find_nearest_points(positions[rows], reach[rows])
         distances = compute_point_distances(positions[rows], nearest)
-        clearances[moment, rows] = distances - radius[rows]
+        clearances[step, rows] = distances - radius[rows]
     return clearances
 
 
@@ -130,7 +136,7 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
 
 @kernel
 def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Array) -> int:
-    """Write the smallest gap of each moment to `min_gaps`, (T,) m; return the number of contacts.
+    """Write the smallest gap of each time step to `min_gaps`, (T,) m; return the number of contacts.
 
     `order`, (T, n), lists the robots by x. Robots that do not work, with positions of nan, come last.
     """
@@ -161,7 +167,7 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
 
 @kernel
 def _compute_distance(positions: Array, t: int, i: int, j: int) -> float:
-    """Return the distance between the centers of robots i and j at moment t, m."""
+    """Return the distance between the centers of robots i and j at time step t, m."""
     return math.sqrt(
         (positions[t, i, 0] - positions[t, j, 0]) ** 2 + (positions[t, i, 1] - positions[t, j, 1]) ** 2
     )

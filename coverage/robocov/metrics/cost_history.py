@@ -1,4 +1,4 @@
-"""The coverage cost along a run."""
+"""The coverage cost over a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.drawing import Drawable
 from robocov.errors import format_count, require_type
-from robocov.record import Record, select_nearest_moments
+from robocov.record import Record, select_nearest_steps
 
 DEFAULT_RATE_HZ = 10.0
 """Samples of the coverage cost per simulated second."""
@@ -21,7 +21,7 @@ MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
 
 @dataclass(frozen=True, eq=False)
 class CostHistory(Drawable):
-    """The coverage cost of equation (22) along a run, at K of its moments.
+    """The coverage cost of equation (22) over a run, at K sampled time steps.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class CostHistory(Drawable):
     def __repr__(self) -> str:
         first = float(self.mean_distance[0])
         last = float(self.mean_distance[-1])
-        moments = format_count(len(self.time), "moment")
-        return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
+        samples = format_count(len(self.time), "sample")
+        return f"<CostHistory {samples}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
 
 
 def compute_cost_history(
@@ -55,9 +55,10 @@ def compute_cost_history(
     rate: float = DEFAULT_RATE_HZ,
     on_sample: Callable[[], None] | None = None,
 ) -> CostHistory:
-    """Compute the coverage cost along a run.
+    """Compute the coverage cost over a run.
 
-    The cost at each moment counts only the working robots, with moving obstacles where they are at that time.
+    The cost at each time step counts only the working robots, with moving obstacles where they are at that
+    time.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def compute_cost_history(
     cost : CoverageCost
         Cost of the record's environment.
     rate : float, Hz
-        Samples per simulated second, see `select_sampled_moments`.
+        Samples per simulated second, see `select_sampled_steps`.
     on_sample : callable or None
         Called after each sample, to report progress.
 
@@ -82,7 +83,7 @@ def compute_cost_history(
     See Also
     --------
     CoverageCost : The coverage cost of one set of positions.
-    compute_run_metrics : Other metrics along a run.
+    compute_run_metrics : Other metrics over a run.
     summarize : The results of a run.
 
     Examples
@@ -96,18 +97,18 @@ def compute_cost_history(
     """
     require_type("record", record, Record, 'a Record, as in Record.load("run")')
     require_type("cost", cost, CoverageCost, "a CoverageCost")
-    moments = select_sampled_moments(record, rate)
-    sample_count = len(moments)
+    steps = select_sampled_steps(record, rate)
+    sample_count = len(steps)
     mean_distance = np.empty(sample_count)
     cost_values = np.empty(sample_count)
     uncovered_area = np.empty(sample_count)
     has_mixed_speeds = record.team.has_mixed_speeds
     mean_time = np.full(sample_count, np.nan)
     cost_at_time = TimeVaryingCost(cost)
-    for sample, moment in enumerate(moments):
-        time = float(record.time[moment])
-        positions = record.positions[moment]
-        working = None if record.conditions is None else record.working[moment]
+    for sample, step in enumerate(steps):
+        time = float(record.time[step])
+        positions = record.positions[step]
+        working = None if record.conditions is None else record.working[step]
         summary = cost_at_time.compute_summary(time, positions, working)
         mean_distance[sample] = summary.mean_distance
         cost_values[sample] = summary.value
@@ -119,7 +120,7 @@ def compute_cost_history(
         if on_sample is not None:
             on_sample()
     return CostHistory(
-        time=record.time[moments],
+        time=record.time[steps],
         mean_distance=mean_distance,
         cost=cost_values,
         uncovered_area=uncovered_area,
@@ -127,8 +128,8 @@ def compute_cost_history(
     )
 
 
-def select_sampled_moments(record: Record, rate: float) -> list[int]:
-    """Select the moments nearest to multiples of 1/rate, and the last moment.
+def select_sampled_steps(record: Record, rate: float) -> list[int]:
+    """Select the time steps nearest to multiples of 1/rate, and the last time step.
 
     Parameters
     ----------
@@ -139,15 +140,15 @@ def select_sampled_moments(record: Record, rate: float) -> list[int]:
     Returns
     -------
     list of int
-        Indices of the moments, ascending.
+        Indices of the time steps, ascending.
     """
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
-    return [int(moment) for moment in select_nearest_moments(record.time, rate)]
+    return [int(step) for step in select_nearest_steps(record.time, rate)]
 
 
 def compute_mean_over_run(time: Array, values: Array) -> float:
-    """Compute the mean over time of values sampled along a run, by the trapezoidal rule.
+    """Compute the mean over time of values sampled over a run, by the trapezoidal rule.
 
     Parameters
     ----------

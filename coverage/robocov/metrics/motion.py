@@ -1,4 +1,4 @@
-"""Motion of a team along a run: path lengths and stuck robots."""
+"""Motion of a team over a run: path lengths and stuck robots."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ class Results:
         return Record.load(self._find_run_folder(run))
 
     def history(self, run: str | int | Mapping[str, Any]) -> CostHistory:
-        """Read the coverage cost along a run.
+        """Read the coverage cost over a run.
 
         Parameters
         ----------

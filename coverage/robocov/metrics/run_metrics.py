@@ -14,7 +14,7 @@ from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.connectivity import measure_connectivity
 from robocov.metrics.cost_history import CostHistory
 from robocov.metrics.visible_area import compute_covered_areas
-from robocov.record import Record, select_nearest_moments
+from robocov.record import Record, select_nearest_steps
 
 DEFAULT_RATE_HZ = 2.0
 """Moments per simulated second at which areas and graphs are measured."""
@@ -39,7 +39,7 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only working robots count.
+    """Metrics over a run, at K sampled time steps. Only working robots count.
 
     Attributes
     ----------
@@ -63,9 +63,9 @@ class RunMetrics:
     algebraic_connectivity : (K,) array
         Second smallest eigenvalue of the Laplacian of this graph; 0 for several components.
     wall_clearance : (K,) array, m
-        Smallest gap between a robot's rim and a wall since the previous moment; inf if there is none.
+        Smallest gap between a robot's rim and a wall since the previous sample; inf if there is none.
     robot_clearance : (K,) array, m
-        Smallest gap between the rims of two robots since the previous moment; inf if there is none.
+        Smallest gap between the rims of two robots since the previous sample; inf if there is none.
     free_area : float, m²
         Free area of the map.
 
@@ -95,10 +95,10 @@ class RunMetrics:
     free_area: float
 
     def __repr__(self) -> str:
-        moments = format_count(len(self.time), "moment")
+        samples = format_count(len(self.time), "sample")
         sensed_fraction = self.sensed_area[-1] / self.free_area
         return (
-            f"<RunMetrics {moments}, {self.time[-1]:.1f} s, "
+            f"<RunMetrics {samples}, {self.time[-1]:.1f} s, "
             f"{sensed_fraction:.0%} of the free area sensed at the end>"
         )
 
@@ -130,7 +130,7 @@ class RunMetrics:
 
 
 class _Integrals(NamedTuple):
-    """Integrals from the start of a run to each moment, (T,) each, as the attributes of `RunMetrics`."""
+    """Integrals from the start of a run to each time step, (T,) each, as the attributes of `RunMetrics`."""
 
     work: Array
     effort: Array
@@ -147,10 +147,10 @@ def compute_run_metrics(
     record : Record
         The run.
     rate : float, Hz
-        Moments per simulated second at which the metrics are evaluated. The last moment is always included.
-        Energy and path lengths are integrated over all moments of the record.
+        Samples per simulated second. The last time step is always sampled. Energy and path lengths are
+        integrated over all time steps of the record.
     on_sample : callable or None
-        Called after each moment, to report progress.
+        Called after each sample, to report progress.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def compute_run_metrics(
 
     See Also
     --------
-    compute_cost_history : The coverage cost along a run.
+    compute_cost_history : The coverage cost over a run.
     summarize : The results of a run.
 
     Examples
@@ -176,29 +176,29 @@ def compute_run_metrics(
     """
     if not 0.0 <= rate < np.inf:
         raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
-    moments = select_nearest_moments(record.time, rate)
+    steps = select_nearest_steps(record.time, rate)
     areas = []
     graphs = []
-    for moment in moments.tolist():
-        robots = np.flatnonzero(record.working[moment])
-        positions = record.positions[moment, robots]
-        free = record.environment.at(float(record.time[moment])).free
+    for step in steps.tolist():
+        robots = np.flatnonzero(record.working[step])
+        positions = record.positions[step, robots]
+        free = record.environment.at(float(record.time[step])).free
         areas.append(compute_covered_areas(free, positions, record.team.sensing_range[robots]))
         graphs.append(measure_connectivity(positions, record.team.communication_range[robots]))
         if on_sample is not None:
             on_sample()
     integrals = _integrate(record)
-    interval_starts = np.concatenate([[0], moments[:-1] + 1])
+    interval_starts = np.concatenate([[0], steps[:-1] + 1])
     wall_gaps = compute_clearances(record).min(axis=1)
     robot_gaps = measure_robot_gaps(record).min_gaps
     return RunMetrics(
-        time=record.time[moments],
+        time=record.time[steps],
         sensed_area=np.array([area.sensed for area in areas]),
         range_area=np.array([area.within_range for area in areas]),
         visible_area=np.array([area.visible for area in areas]),
-        work=integrals.work[moments],
-        effort=integrals.effort[moments],
-        path_length=integrals.path_length[moments],
+        work=integrals.work[steps],
+        effort=integrals.effort[steps],
+        path_length=integrals.path_length[steps],
         components=np.array([graph.components for graph in graphs], dtype=np.intp),
         algebraic_connectivity=np.array([graph.algebraic_connectivity for graph in graphs]),
         wall_clearance=np.minimum.reduceat(wall_gaps, interval_starts),
@@ -233,7 +233,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
     ----------
     record : Record
     history : CostHistory
-        Coverage cost along the run.
+        Coverage cost over the run.
 
     Returns
     -------
@@ -247,19 +247,19 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
 
 
 def _integrate(record: Record) -> _Integrals:
-    """Return work, effort and mean path length from the start of a run to each moment.
+    """Integrate work, effort and mean path length from the start of a run to each time step.
 
-    Forces are constant between moments. Power is integrated by the trapezoidal rule.
+    Forces are constant during a step. Power is integrated by the trapezoidal rule.
     """
     forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     squared_force = (forces**2).sum(axis=(1, 2))
-    step = np.diff(record.time)
+    step_durations = np.diff(record.time)
     distances = compute_point_distances(record.positions[1:], record.positions[:-1])
     traveled = np.where(record.traveled, distances, 0.0).mean(axis=1)
     return _Integrals(
-        work=_accumulate(0.5 * (power[1:] + power[:-1]) * step),
-        effort=_accumulate(squared_force[:-1] * step),
+        work=_accumulate(0.5 * (power[1:] + power[:-1]) * step_durations),
+        effort=_accumulate(squared_force[:-1] * step_durations),
         path_length=_accumulate(traveled),
     )
 

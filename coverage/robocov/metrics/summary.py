@@ -23,7 +23,7 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     record : Record
         The run.
     history : CostHistory
-        The coverage cost along the run.
+        The coverage cost over the run.
 
     Returns
     -------
@@ -32,8 +32,8 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
 
     See Also
     --------
-    compute_cost_history : The coverage cost along a run.
-    compute_run_metrics : Areas, energy, path lengths and clearances along a run.
+    compute_cost_history : The coverage cost over a run.
+    compute_run_metrics : Areas, energy, path lengths and clearances over a run.
 
     Examples
     --------

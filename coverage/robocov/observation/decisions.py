@@ -136,7 +136,7 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
     goals = None if decision.goals is None else decision.goals.copy()
     messages = check_messages(decision.messages, len(decision.forces), f"{where} messages")
     if messages:
-        messages = [[_copy_message(message) for message in own] for own in messages]
+        messages = [[_copy_message(message) for message in robot_messages] for robot_messages in messages]
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms, messages=messages)
 
 

@@ -72,7 +72,7 @@ class ReceivedMessage(NamedTuple):
     payload: Any
 
 
-def check_messages(messages: Any, count: int, name: str) -> Sequence[Sequence[Message]]:
+def check_messages(messages: Any, count: int, label: str) -> Sequence[Sequence[Message]]:
     """Check the messages of a decision.
 
     Parameters
@@ -80,8 +80,8 @@ def check_messages(messages: Any, count: int, name: str) -> Sequence[Sequence[Me
     messages : object
     count : int
         Number of robots.
-    name : str
-        Name of the messages in error messages.
+    label : str
+        Start of an error, such as "controller 'x' returned messages".
 
     Returns
     -------
@@ -94,8 +94,14 @@ def check_messages(messages: Any, count: int, name: str) -> Sequence[Sequence[Me
         If they are not a sequence of messages for each robot.
     """
     if not isinstance(messages, Sequence) or len(messages) not in (0, count):
-        raise ParameterError(f"{name} {quote(messages)}, expected a list of messages for each robot")
-    for robot, own in enumerate(messages):
-        if not isinstance(own, Sequence) or not all(isinstance(message, Message) for message in own):
-            raise ParameterError(f"{name} {quote(own)} for robot {robot + 1}, expected a list of Message")
+        raise ParameterError(f"{label} {quote(messages)}, expected a list of messages for each robot")
+    for robot, robot_messages in enumerate(messages):
+        if not _is_message_list(robot_messages):
+            raise ParameterError(
+                f"{label} {quote(robot_messages)} for robot {robot + 1}, expected a list of Message"
+            )
     return messages
+
+
+def _is_message_list(value: object) -> bool:
+    return isinstance(value, Sequence) and all(isinstance(item, Message) for item in value)

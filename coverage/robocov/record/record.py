@@ -29,7 +29,7 @@ from robocov.optional_imports import import_optional
 from robocov.record.package_versions import list_versions
 from robocov.record.record_arrays import ARRAYS, COLUMNS, STEERING, read_record_arrays
 from robocov.record.run_document import JoinEvent, RunDocument
-from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_moments
+from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_steps
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
@@ -41,7 +41,7 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True, eq=False)
 class Record(Drawable):
-    """A run: the state, forces and goals of all robots at each of its T moments.
+    """A run: the state, forces and goals of all robots at each of its T time steps.
 
     Attributes
     ----------
@@ -58,9 +58,9 @@ class Record(Drawable):
     seed : int or None
         Seed from which they were sampled.
     dt : float, s
-        Control period; also the time between moments, unless the record was thinned.
+        Control period; also the time between time steps, unless the record was thinned.
     time : (T,) s
-        Simulation time of each moment.
+        Simulation time of each time step.
     positions, velocities : (T, n, 2) m, m/s
     forces : (T, n, 2) N
         The controller's force, before any limit and without viscosity.
@@ -80,8 +80,8 @@ class Record(Drawable):
     See Also
     --------
     run : Simulate a run and return its record.
-    compute_cost_history : The coverage cost along a run.
-    compute_run_metrics : Areas, energy, path lengths and clearances along a run.
+    compute_cost_history : The coverage cost over a run.
+    compute_run_metrics : Areas, energy, path lengths and clearances over a run.
     summarize : The results of a run.
 
     Examples
@@ -136,16 +136,16 @@ class Record(Drawable):
     def traveled(self) -> BoolArray:
         """Mask of the displacements that belong to a path, (T - 1, n) bool; read-only.
 
-        A robot does not travel between two moments if it has not joined yet, or if the user moved it to
+        A robot does not travel between two time steps if it has not joined yet, or if the user moved it to
         another position in between.
         """
         mask = self.present[:-1].copy()
         row_of_number = {number: row for row, number in enumerate(self.robot_numbers)}
         for placement in self.session.get("placed", ()):
-            moment = int(np.searchsorted(self.time, placement["time_s"] - TIME_ROUNDING_S))
+            step = int(np.searchsorted(self.time, placement["time_s"] - TIME_ROUNDING_S))
             rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
-            if 0 < moment < len(self.time):
-                mask[moment - 1, rows] = False
+            if 0 < step < len(self.time):
+                mask[step - 1, rows] = False
         return _protect(mask)
 
     @property
@@ -165,7 +165,7 @@ class Record(Drawable):
         return self.gains.get("cells") == "time" and self.team.has_mixed_speeds
 
     def __len__(self) -> int:
-        """Return the number of moments."""
+        """Return the number of time steps."""
         return len(self.time)
 
     def __repr__(self) -> str:
@@ -173,12 +173,12 @@ class Record(Drawable):
         return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
 
     def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
-        """Compute the cells of the working robots at a moment.
+        """Compute the cells of the working robots at a time step.
 
         Parameters
         ----------
         k : int
-            Index of the moment; by default the last one.
+            Index of the time step; by default the last one.
 
         Returns
         -------
@@ -195,12 +195,12 @@ class Record(Drawable):
         return partition(positions, region, density=density)
 
     def snapshot(self, k: int) -> Snapshot:
-        """Return the state and the decision at a moment, without the force terms, which are not recorded.
+        """Return the state and the decision at a time step, without the force terms, which are not recorded.
 
         Parameters
         ----------
         k : int
-            Index of the moment.
+            Index of the time step.
 
         Returns
         -------
@@ -227,7 +227,7 @@ class Record(Drawable):
         return Snapshot(observations, decision, working=working)
 
     def at(self, time: float) -> Snapshot:
-        """Return the moment nearest to a time.
+        """Return the state and the decision at the time step nearest to a time.
 
         Parameters
         ----------
@@ -266,16 +266,16 @@ class Record(Drawable):
         """
         if not time >= self.time[0] - TIME_ROUNDING_S:
             raise ParameterError(f"time: expected a number of at least {self.time[0]:g} s, got {quote(time)}")
-        moment_count = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
-        return self._select_moments(slice(moment_count))
+        step_count = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
+        return self._select_steps(slice(step_count))
 
     def thin(self, rate: float) -> Record:
-        """Return the record with fewer moments.
+        """Return the record with fewer time steps.
 
         Parameters
         ----------
         rate : float, Hz
-            Moments per simulated second, see `select_nearest_moments`; 0 keeps only the first and the last.
+            Time steps per simulated second, see `select_nearest_steps`; 0 keeps only the first and the last.
 
         Returns
         -------
@@ -288,15 +288,15 @@ class Record(Drawable):
         """
         if not 0.0 <= rate < np.inf:
             raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
-        return self._select_moments(select_nearest_moments(self.time, rate))
+        return self._select_steps(select_nearest_steps(self.time, rate))
 
-    def _select_moments(self, moments: slice | IntArray) -> Record:
-        """Return a record of some of the moments, with copies of the arrays."""
-        arrays = {name: getattr(self, name)[moments].copy() for name in self.arrays}
+    def _select_steps(self, steps: slice | IntArray) -> Record:
+        """Return a record of some of the time steps, with copies of the arrays."""
+        arrays = {name: getattr(self, name)[steps].copy() for name in self.arrays}
         return replace(self, **arrays)
 
     def to_pandas(self) -> Any:
-        """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
+        """Return the run as a tidy data frame, one row for each time step and robot, by time, then robot.
 
         Requires ``robocov[pandas]``.
 
@@ -308,10 +308,10 @@ class Record(Drawable):
             turning_rate_rad_s.
         """
         pandas = import_optional("pandas", "pandas")
-        moment_count, robot_count = self.positions.shape[:2]
+        step_count, robot_count = self.positions.shape[:2]
         columns: dict[str, Array | IntArray] = {
             "time_s": np.repeat(self.time, robot_count),
-            "robot": np.tile(np.arange(robot_count), moment_count),
+            "robot": np.tile(np.arange(robot_count), step_count),
         }
         for array in self.arrays:
             if array == "time":

@@ -80,8 +80,8 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
 def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robot_count: int) -> None:
     is_time = name == "time"
     shape = time_shape if is_time else (*time_shape, robot_count, 2)
-    has_moments = len(time_shape) == 1 and time_shape != (0,)
-    if array.dtype != np.float64 or array.shape != shape or not has_moments:
+    has_steps = len(time_shape) == 1 and time_shape != (0,)
+    if array.dtype != np.float64 or array.shape != shape or not has_steps:
         expected = "(T,)" if is_time else str(shape)
         raise InputError(
             f"{path}: {name}: expected shape {expected} of float64, got {array.shape} of {array.dtype}"

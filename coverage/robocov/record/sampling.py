@@ -1,4 +1,4 @@
-"""Selection of moments of a record at a rate."""
+"""Selection of time steps of a record at a rate."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ _TIE_DECIMALS = 6
 """Distances are compared to this number of decimals of a period; the rest is rounding error."""
 
 
-def select_nearest_moments(time: Array, rate: float) -> IntArray:
-    """Select the moments nearest to multiples of 1/rate, and the first and last moments.
+def select_nearest_steps(time: Array, rate: float) -> IntArray:
+    """Select the time steps nearest to multiples of 1/rate, and the first and last ones.
 
     Parameters
     ----------
     time : (T,) array, s
         Ascending.
     rate : float, Hz
-        0 selects only the first and the last moment.
+        0 selects only the first and the last time step.
 
     Returns
     -------
     (K,) int array
-        Indices of the moments, ascending. Of two moments that are equally near, the earlier one is selected.
+        Indices of the time steps, ascending. Of two that are equally near, the earlier one is selected.
 
     Examples
     --------
-    >>> select_nearest_moments(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]), rate=1.0)
+    >>> select_nearest_steps(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]), rate=1.0)
     array([0, 2, 5])
     """
     last = len(time) - 1

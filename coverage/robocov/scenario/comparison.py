@@ -40,7 +40,7 @@ class Comparison(Drawable):
     records : mapping of str to Record
         The runs, by the labels of the controllers.
     histories : mapping of str to CostHistory
-        The coverage cost along each run.
+        The coverage cost over each run.
 
     See Also
     --------

@@ -113,9 +113,9 @@ def trace_boundaries(
 ) -> Array:
     """Find the pieces of the boundaries of all cells.
 
-    The edges among equally fast robots already bound a convex polygon. The circles of Apollonius between
-    robots of different speeds cut parts off it. What remains of each edge and of each circle, on the cell's
-    side of all the others, is one or several pieces.
+    Without its faster and slower neighbors, a cell would be a convex polygon. Its edges are given. The
+    circles of Apollonius between robots of different speeds cut areas off this polygon. The sections of each
+    edge and of each circle that are on the cell's side of all the others become one or several pieces.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ def trace_boundaries(
     pairs : (m, 6) array
         Pairs of a robot and a neighbor, sorted by robot. For the columns, see the constants `PAIR_...`.
     edges : (e, 6) array
-        Edges of the cells of equally fast robots, sorted by cell. For the columns, see the constants
-        `EDGE_...` of `robocov.voronoi.clipping`.
+        Edges of each cell as bounded by the region and by robots of the same speed only, sorted by cell. For
+        the columns, see the constants `EDGE_...` of `robocov.voronoi.clipping`.
     is_straight : (n,) bool array
         Overwritten: whether a cell is bounded by these edges alone.
 
@@ -155,7 +155,7 @@ def trace_boundaries(
         line_count = len(own_edges)
         curves = np.empty((line_count + len(own_pairs), _CURVE_COLUMNS))
         curve_count = _write_circles(curves, own_pairs, own_edges)
-        # Without circles, the cell is the one among robots of equal speeds.
+        # Without circles, the cell is the polygon that the edges bound.
         is_straight[i] = curve_count == line_count
         if is_straight[i]:
             pieces = _make_room(pieces, piece_count, line_count)
@@ -318,14 +318,15 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 @kernel
 def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
-    """For each pair of curves, find the section of the first one on the cell's side of the second one.
+    """Find where each curve enters and leaves the cell's side of each other curve.
 
-    A point of a curve can bound the cell only where it is on the cell's side of all other curves. Entry
-    [first, second] of `crossings`, (k, k, 2), receives the values of the parameter t of the first curve at
-    which it enters and leaves the cell's side of the second one, or nan if the two do not intersect. A curve
-    that is nowhere on the cell's side of another one gets an empty interval of t. The first `line_count`
-    curves are the edges of the cell among equally fast robots, a convex polygon. They do not shorten each
-    other, and are not compared.
+    Only the points of a curve that are on the cell's side of all other curves can bound the cell. Entry
+    [i, j] of `crossings`, (k, k, 2), receives two values of the parameter t of curve i: where it enters the
+    cell's side of curve j, and where it leaves it. They are nan if the curves do not intersect. A curve that
+    is nowhere on the cell's side of another one bounds nothing, and gets an empty interval of t.
+
+    The first `line_count` curves are the edges of one convex polygon. They meet only at their end points, so
+    that two of them are not compared.
     """
     count = len(curves)
     for first in range(count):
@@ -334,7 +335,8 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
         for second in range(first + 1, count):
             enter = np.nan
             leave = np.nan
-            if second >= line_count:
+            is_edge_pair = second < line_count
+            if not is_edge_pair:
                 intersection = _intersect(curves[first], curves[second])
                 enter = intersection.enter
                 leave = intersection.leave
@@ -344,12 +346,12 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
                     _make_empty(curves, second)
             crossings[first, second, _ENTER] = enter
             crossings[first, second, _LEAVE] = leave
-            # Both curves have the cell on their left. Therefore, where the first curve leaves the cell's side
-            # of the second one, the second one enters that of the first, and vice versa.
-            x, y = _evaluate(curves[first], leave)
-            crossings[second, first, _ENTER] = _find_parameter(curves[second], x, y)
-            x, y = _evaluate(curves[first], enter)
-            crossings[second, first, _LEAVE] = _find_parameter(curves[second], x, y)
+            # The second curve crosses the first one at the same two points, in the opposite sense: both have
+            # the cell on their left, so that one enters where the other one leaves.
+            leave_x, leave_y = _evaluate(curves[first], leave)
+            enter_x, enter_y = _evaluate(curves[first], enter)
+            crossings[second, first, _ENTER] = _find_parameter(curves[second], leave_x, leave_y)
+            crossings[second, first, _LEAVE] = _find_parameter(curves[second], enter_x, enter_y)
 
 
 @kernel

@@ -213,8 +213,8 @@ def _compute_weighted_cells(
 ) -> WeightedCells:
     """Compute cells of robots whose speeds are not all equal, for a density of 1.
 
-    The cells among equally fast robots have straight edges. The circles of Apollonius between robots of
-    different speeds then cut parts off.
+    The borders between robots of the same speed are straight, and bound a polygon around each robot. The
+    circles of Apollonius between robots of different speeds then cut areas off these polygons.
     """
     robot, neighbor = neighbors.list_pairs()
     neighbor_positions = points[neighbor] if reported_positions is None else np.asarray(reported_positions)

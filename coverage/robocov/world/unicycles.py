@@ -185,16 +185,16 @@ def compute_drive_command(
             max_turning_rate=wheels.max_turning_rate[i],
         )
 
-        # The change of velocity of a point robot, along the heading and across it.
+        # The change of velocity of a point robot, along the heading and to the left of it.
         loss = response.velocity_loss[i]
         gain = response.velocity_per_force[i]
         dx = gain * forces[i, 0] - loss * motion.speed * hx
         dy = gain * forces[i, 1] - loss * motion.speed * hy
         scale = compute_clip_factor(dx, dy, limits.max_change)
-        along = (dx * hx + dy * hy) * scale
-        across = (dy * hx - dx * hy) * scale
+        forward_change = (dx * hx + dy * hy) * scale
+        sideways_change = (dy * hx - dx * hy) * scale
 
-        target = _choose_motion(motion, along, across, limits, dt)
+        target = _choose_motion(motion, forward_change, sideways_change, limits, dt)
         motion = _approach_motion(motion, target, limits)
         new_steering[i, 1] = motion.turning_rate
         heading += new_steering[i, 1] * dt
@@ -223,48 +223,70 @@ def _wrap_angle(angle: float) -> float:
 
 
 @kernel
-def _choose_motion(motion: _Motion, along: float, across: float, limits: _WheelLimits, dt: float) -> _Motion:
-    """Return the target motion, given a point robot's velocity change along and across the heading, m/s."""
-    # The turning rate toward the velocity that the point would have after the response time.
-    future_along = motion.speed + along * (RESPONSE_TIME_S / dt)
-    future_across = across * (RESPONSE_TIME_S / dt)
-    error = math.atan2(future_across, future_along)
-    undamped_speed = _DAMPING_FRACTION * limits.max_change * (RESPONSE_TIME_S / dt)
-    damping = min(1.0, math.hypot(future_along, future_across) / undamped_speed)
-    rate = min(
+def _choose_motion(
+    motion: _Motion, forward_change: float, sideways_change: float, limits: _WheelLimits, dt: float
+) -> _Motion:
+    """Choose the speed and the turning rate that the wheels should approach.
+
+    A point robot would change its velocity in this substep by `forward_change` along the heading and by
+    `sideways_change` to the left of it, m/s. The unicycle turns toward the velocity that the point would have
+    after the response time. Turning at a speed also changes the velocity sideways. If that change is less
+    than the one of the point, the unicycle brakes by the difference.
+    """
+    response_substeps = RESPONSE_TIME_S / dt
+    future_forward = motion.speed + forward_change * response_substeps
+    future_sideways = sideways_change * response_substeps
+    angle_error = math.atan2(future_sideways, future_forward)
+    # Turning is damped if the point would be slower than this after the response time.
+    damping_speed = _DAMPING_FRACTION * limits.max_change * response_substeps
+    damping = min(1.0, math.hypot(future_forward, future_sideways) / damping_speed)
+    turning_rate = _choose_turning_rate(angle_error, damping, limits, dt)
+
+    turning_rate_to_target = max(motion.turning_rate * math.copysign(1.0, angle_error), 0.0)
+    change_by_turning = motion.speed * turning_rate_to_target * dt
+    braking = max(abs(sideways_change) - change_by_turning, 0.0)
+    max_forward_speed = max(limits.max_speed - abs(turning_rate) * limits.half_track, 0.0)
+    speed = min(max(motion.speed + forward_change - braking, 0.0), max_forward_speed)
+    return _Motion(speed, turning_rate)
+
+
+@kernel
+def _choose_turning_rate(angle_error: float, damping: float, limits: _WheelLimits, dt: float) -> float:
+    """Choose the rate of a turn by an angle, rad, within the limits and such that it can stop at its end."""
+    turning_rate = min(
         limits.max_turning_rate,
         limits.max_speed / limits.half_track,
-        abs(error) / RESPONSE_TIME_S * damping,
+        abs(angle_error) / RESPONSE_TIME_S * damping,
     )
-    stopping_rate = math.sqrt(2.0 * limits.max_change / (limits.half_track * dt) * abs(error))
-    rate = math.copysign(min(rate, stopping_rate), error)
-
-    # The speed. The acceleration across the heading that turning does not provide is replaced by braking.
-    change_by_turning = motion.speed * max(motion.turning_rate * math.copysign(1.0, error), 0.0) * dt
-    missing = max(abs(across) - change_by_turning, 0.0)
-    max_forward_speed = max(limits.max_speed - abs(rate) * limits.half_track, 0.0)
-    return _Motion(min(max(motion.speed + along - missing, 0.0), max_forward_speed), rate)
+    # With the wheels' deceleration, this rate decreases to 0 within the angle.
+    stopping_rate = math.sqrt(2.0 * limits.max_change / (limits.half_track * dt) * abs(angle_error))
+    return math.copysign(min(turning_rate, stopping_rate), angle_error)
 
 
 @kernel
 def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> _Motion:
     """Return the motion after a substep in which the wheels approach the target within their limits.
 
-    Braking comes first, then the turn, then speeding up.
+    The wheels run at the speed of the robot's center plus and minus its turning speed. The changes of these
+    two speeds therefore share the maximum change of a wheel's speed: braking takes its share first, then the
+    turn, then speeding up. The two speeds share the maximum speed of a wheel in the same way.
     """
     speed_change = clip_magnitude(target.speed - motion.speed, limits.max_change)
-    # Turning speeds are those of the right wheel relative to the center of the robot, m/s.
+    # The turning speed is that of the right wheel relative to the center of the robot, m/s.
     turning_speed = motion.turning_rate * limits.half_track
     target_turning_speed = target.turning_rate * limits.half_track
-    max_turn_change = limits.max_change - max(-speed_change, 0.0)
-    new_turning_speed = turning_speed + clip_magnitude(target_turning_speed - turning_speed, max_turn_change)
+    braking = max(-speed_change, 0.0)
+    max_turning_change = limits.max_change - braking
+    turning_change = clip_magnitude(target_turning_speed - turning_speed, max_turning_change)
+    new_turning_speed = turning_speed + turning_change
     if speed_change < 0.0:
         max_turning_speed = max(limits.max_speed - motion.speed - speed_change, 0.0)
         new_turning_speed = clip_magnitude(new_turning_speed, max_turning_speed)
     else:
-        change_left = limits.max_change - abs(new_turning_speed - turning_speed)
-        speed_left = limits.max_speed - abs(new_turning_speed) - motion.speed
-        speed_change = max(min(speed_change, change_left, speed_left), 0.0)
+        # The turn has taken its share; speeding up gets the remainder.
+        max_increase_by_acceleration = limits.max_change - abs(new_turning_speed - turning_speed)
+        max_increase_by_speed = limits.max_speed - abs(new_turning_speed) - motion.speed
+        speed_change = max(min(speed_change, max_increase_by_acceleration, max_increase_by_speed), 0.0)
     return _Motion(motion.speed + speed_change, new_turning_speed / limits.half_track)
 
 

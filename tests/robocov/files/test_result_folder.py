@@ -136,7 +136,7 @@ def test_folders_without_a_result_are_rejected(tmp_path: Path, file: str) -> Non
     (tmp_path / file).write_text("{}")
     save_result(tmp_path / "project" / "run", OLD)
     for folder in (tmp_path, tmp_path / "project"):
-        with pytest.raises(InputError, match="not a result of robocov, so --overwrite leaves it alone"):
+        with pytest.raises(InputError, match="not a robocov result, so --overwrite does not replace it"):
             save_result(folder, NEW)
     assert (tmp_path / file).read_text() == "{}"
     assert read_contents(tmp_path / "project" / "run") == OLD

@@ -1,4 +1,4 @@
-"""Settling, path lengths, clearance, contacts, stuck robots and the coverage cost along runs."""
+"""Settling, path lengths, clearance, contacts, stuck robots and the coverage cost over runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robocov.metrics import (
     count_contacts,
     count_stuck_robots,
     find_settling_time,
-    select_sampled_moments,
+    select_sampled_steps,
     summarize,
 )
 from robocov.metrics.clearance import measure_robot_gaps
@@ -184,7 +184,7 @@ def test_metrics_use_the_map_of_each_time() -> None:
     wall = PolygonObstacle(((3.0, 0.0), (3.5, 0.0), (3.5, 4.0), (3.0, 4.0)), path=path)
     hall = Environment("hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), (wall,))
     record = Simulation(hall, Lloyd(), [[1.0, 2.0]], dt=0.1).run(1.0)
-    assert select_sampled_moments(record, 10.0) == [0, 10]
+    assert select_sampled_steps(record, 10.0) == [0, 10]
     assert compute_run_metrics(record, 10.0).visible_area[[0, -1]] == pytest.approx([12.0, 20.0])
 
 
@@ -248,7 +248,7 @@ def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None
     np.testing.assert_allclose(history.time, np.arange(121) / 10, atol=1e-9)
     assert history.mean_distance[-1] == cost(record.positions[-1]).mean_distance
     shorter = replace(record, time=record.time[:-7], positions=record.positions[:-7])
-    assert select_sampled_moments(shorter, 10.0)[-1] == len(shorter) - 1
+    assert select_sampled_steps(shorter, 10.0)[-1] == len(shorter) - 1
 
 
 def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
@@ -282,4 +282,4 @@ def test_rapf_touches_nothing(cluttered: Environment) -> None:
 def test_histories_have_a_short_repr(record: Record) -> None:
     history = compute_cost_history(record, CoverageCost(record.environment, 16), 1.0)
     first, last = history.mean_distance[[0, -1]]
-    assert repr(history) == f"<CostHistory 13 moments, 12.0 s, mean distance {first:.3f} to {last:.3f} m>"
+    assert repr(history) == f"<CostHistory 13 samples, 12.0 s, mean distance {first:.3f} to {last:.3f} m>"

@@ -16,7 +16,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json
-from robocov.metrics import select_sampled_moments
+from robocov.metrics import select_sampled_steps
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.simulation import Simulation
@@ -435,8 +435,8 @@ class TestSamples:
         assert loaded.positions.tobytes() == thin.positions.tobytes()
         # Costs are computed at the same times as those of the complete record.
         for rate in (1.0, 2.5, 5.0):
-            times = record.time[select_sampled_moments(record, rate)]
-            loaded_times = loaded.time[select_sampled_moments(loaded, rate)]
+            times = record.time[select_sampled_steps(record, rate)]
+            loaded_times = loaded.time[select_sampled_steps(loaded, rate)]
             assert loaded_times.tolist() == times.tolist()
 
     @pytest.mark.parametrize("rate", [-1.0, np.inf, np.nan])

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.record import select_nearest_moments
+from robocov.record import select_nearest_steps
 
 
 @given(st.integers(1, 300), st.floats(1e-3, 0.5), st.floats(0.0, 60.0), st.sampled_from([0.0, 12.5]))
 def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
     """Each multiple is asked for its nearest moment, not each moment for its nearest multiple."""
     time = begin + np.arange(count) * dt
-    kept = select_nearest_moments(time, rate)
+    kept = select_nearest_steps(time, rate)
     assert kept[0] == 0 and kept[-1] == count - 1
     assert (np.diff(kept) > 0).all()
     if dt * rate >= 1.0:
@@ -28,7 +28,7 @@ def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
 
 def test_of_two_as_near_the_earlier_stays() -> None:
     time = np.arange(26) * 0.04  # 0.1 s lies between 0.08 and 0.12 s
-    assert select_nearest_moments(time, 10.0).tolist() == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25]
+    assert select_nearest_steps(time, 10.0).tolist() == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25]
     # however the sums of steps are rounded
     long = np.arange(199) * (1 / 30)
-    assert select_nearest_moments(long, 20.0).tolist() == [3 * k // 2 for k in range(133)]
+    assert select_nearest_steps(long, 20.0).tolist() == [3 * k // 2 for k in range(133)]

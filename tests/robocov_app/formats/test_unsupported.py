@@ -52,7 +52,7 @@ def build_npy() -> bytes:
     [
         ("a.json", b"", "empty"),
         ("a.json", json.dumps(MAP, indent=1).encode(), "a map of robocov already: use it directly"),
-        ("run.json", b'{"format": "robocov-run", "version": 1}', "a result of robocov: use robocov replay"),
+        ("run.json", b'{"format": "robocov-run", "version": 1}', "a robocov result: use robocov replay"),
         ("a.json", b'{"format": "robocov-study"}', "a file of robocov, but not a map: "),
         ("a b.shp", struct.pack(">7i", 9994, *[0] * 6), "a shapefile, .*: ogr2ogr .* 'a b.shp'$"),
         ("a.dbf", b"\x03\x5f\x07\x1a", "a part of a shapefile, .* ogr2ogr .* out.geojson a.shp$"),
