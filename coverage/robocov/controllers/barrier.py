@@ -26,7 +26,7 @@ _ROUNDING_M = 1e-3
 _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances between robots in divisions."""
 _MIN_PASSING_CLEARANCE_M = 1e-3
-"""Margin added to the safe gap in the lower limit of the distance to a passing robot."""
+"""Margin added to the safe gap in the lower limit of the distance to a robot that moves past sideways."""
 _MIN_NORM = 1e-300
 """Lower limit of norms in divisions."""
 
@@ -205,21 +205,25 @@ class Barrier(BaseController):
         return HalfPlanes(normals=-normal, limits=np.where(np.isnan(speed_away), np.inf, limit))
 
     def _limit_approach(self, gap: Array, speed_away: Array, alpha: Array) -> Array:
-        """Return the maximum acceleration toward each other: gamma h³ plus the derivative of the root in h.
+        """Return the maximum acceleration of two robots, or of a robot and an obstacle, toward each other.
+
+        The barrier function is h = sqrt(2 α (d - D_s)) + v, for the distance d, the safe distance D_s and the
+        speed v at which the distance grows. The limit γ h³ + α v / sqrt(2 α (d - D_s)) keeps h from becoming
+        negative. For d < D_s, the root is continued by its negative mirror image; it is rounded near D_s.
 
         Parameters
         ----------
         gap : array, m
-            Distance minus D_s.
+            d - D_s.
         speed_away : array, m/s
-            Speed at which the distance grows.
+            v.
         alpha : array, m/s²
-            Sum of the braking limits of both.
+            α, sum of the braking limits of both robots; that of the robot alone at an obstacle.
 
         Returns
         -------
         array, m/s²
-            At least -alpha: if h >= 0, no harder braking is required; otherwise none is possible.
+            At least -α: harder braking is not required if h >= 0, and not possible otherwise.
         """
         rounded = np.sqrt(np.abs(gap) + _ROUNDING_M)
         root = np.sqrt(2.0 * alpha)

@@ -89,7 +89,11 @@ class Ascent:
     """Time at which the last boost began, s."""
 
     def update(self, position: Array, time: float, value: float, limits: BoostLimits) -> Ascent:
-        """Return the ascent after a scan.
+        """Update the state of the ascent, including its mode, after a scan.
+
+        In mode `GRADIENT`, a robot that has come to rest is at a local optimum, and leaves it. In mode
+        `BOOSTED`, it changes to `GRADIENT` when it has come to rest or the boost has lasted long enough. In
+        mode `RETURN`, it goes back along its trail to the previous optimum.
 
         Parameters
         ----------
@@ -98,12 +102,16 @@ class Ascent:
         value : float, m²
             Contribution of the robot to the objective at its position.
         limits : BoostLimits
+
+        Returns
+        -------
+        Ascent
         """
         ascent = self
         if math.dist(position, self.rest_position) > _REST_RADIUS_M:
             ascent = replace(ascent, rest_position=freeze(position), rest_start=time)
         if ascent.mode is Mode.RETURN:
-            return ascent._return(position)
+            return ascent._follow_trail(position)
         if ascent.trail and math.dist(position, ascent.trail[-1]) > _TRAIL_SPACING_M:
             ascent = replace(ascent, trail=(*ascent.trail, freeze(position)))
         is_settled = time - ascent.rest_start >= _SETTLE_TIME_S
@@ -115,15 +123,18 @@ class Ascent:
             return ascent._leave_optimum(position, time, value, limits.max_boosts)
         return ascent
 
-    def _return(self, position: Array) -> Ascent:
-        """Return the ascent of a robot on its trail, without the point that it has reached."""
+    def _follow_trail(self, position: Array) -> Ascent:
+        """Remove the last point of the trail when it is reached; follow the gradient when none remains."""
         trail = self.trail
         if math.dist(position, trail[-1]) < _TRAIL_SPACING_M:
             trail = trail[:-1]
         return replace(self, trail=trail, mode=Mode.RETURN if trail else Mode.GRADIENT)
 
     def _leave_optimum(self, position: Array, time: float, value: float, max_boosts: int) -> Ascent:
-        """Return the ascent of a robot at an optimum: it returns to a better one, is boosted, or stays."""
+        """Leave a local optimum by a boost, or return to the previous optimum if that was better.
+
+        A robot that has had its maximum number of boosts stays.
+        """
         if self.trail and value < self.best_value:
             return replace(self, mode=Mode.RETURN, boosts=max_boosts, rest_start=time)
         if self.boosts >= max_boosts:
@@ -336,9 +347,10 @@ class Boosting(BaseController):
     ) -> _ViewSamples:
         """Sample the views of all robots for numerical integration.
 
-        A view consists of one narrow sector around each ray, which ends at a wall or at the sensing range.
-        Each ray is sampled at k points with equal spacing. A sample represents the part of the sector around
-        it, and the area of that part is the spacing times the width of the sector at the sample.
+        A view consists of narrow sectors, one around each ray. A ray ends at a wall or at the sensing range,
+        and is sampled at k equally spaced points. Each sample represents a piece of the sector, as long as
+        the spacing of the samples and as wide as the sector is there. `reach` contains the maximum length of
+        each robot's rays, (n,) m, and `pairs` the neighbors that may detect points of its view.
         """
         sector_angle = 2.0 * np.pi / len(directions)
         # The axes of an array of samples are robot, ray and sample; points have one more, for x and y.
@@ -385,7 +397,7 @@ class Boosting(BaseController):
 def compute_undetected(
     depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array, decay: float
 ) -> Array:
-    """Compute the probability that no neighbor detects the points of each robot's view.
+    """Compute the probability that no neighbor detects a point, for sampled points in each robot's view.
 
     Parameters
     ----------
@@ -396,10 +408,10 @@ def compute_undetected(
     directions : (rays, 2) array
         Unit vectors along the rays.
     pairs : NearNeighbors
-        The neighbors that may see points of the view: within their own reach, unless a wall that the robot
-        sees blocks the line of sight from the neighbor to the point.
+        Pairs of a robot and a neighbor. The neighbor detects points within its own reach, unless a wall in
+        the robot's view blocks the line of sight from the neighbor to the point.
     reach : (n,) array, m
-        Maximum distance of each robot's view.
+        Distance up to which each robot detects points.
     decay : float, 1/m
         λ in the probability exp(-λ d) of detecting a point at distance d.
 
@@ -408,20 +420,21 @@ def compute_undetected(
     (n, rays, k) array
     """
     undetected = np.ones(depths.shape)
-    for m in range(len(pairs.robot)):
-        i = pairs.robot[m]
-        neighbor_x = -pairs.offset[m, 0]
-        neighbor_y = -pairs.offset[m, 1]
-        neighbor_reach = reach[pairs.neighbor[m]]
-        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[i]):
+    for pair in range(len(pairs.robot)):
+        robot = pairs.robot[pair]
+        # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
+        neighbor_x = -pairs.offset[pair, 0]
+        neighbor_y = -pairs.offset[pair, 1]
+        neighbor_reach = reach[pairs.neighbor[pair]]
+        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
-        for r in range(len(directions)):
-            for c in range(depths.shape[2]):
-                x = depths[i, r, c] * directions[r, 0]
-                y = depths[i, r, c] * directions[r, 1]
+        for ray in range(len(directions)):
+            for k in range(depths.shape[2]):
+                x = depths[robot, ray, k] * directions[ray, 0]
+                y = depths[robot, ray, k] * directions[ray, 1]
                 dx = neighbor_x - x
                 dy = neighbor_y - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, wall_distances[i]):
-                    undetected[i, r, c] *= 1.0 - math.exp(-decay * distance)
+                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, wall_distances[robot]):
+                    undetected[robot, ray, k] *= 1.0 - math.exp(-decay * distance)
     return undetected

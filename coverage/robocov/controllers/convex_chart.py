@@ -237,7 +237,7 @@ def _find_indices(points: Array, selected: Array) -> IntArray:
 
 
 def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
-    """Return the images of the vertices, (v, 2) m, by the stiffness of each triangle, (t,).
+    """Return the images of the vertices, (v, 2) m, given the stiffness of each triangle, (t,).
 
     Each vertex that is not fixed is the weighted mean of its neighbors. The weight of an edge is, by
     Floater's mean value coordinates, (tan(α/2) + tan(β/2)) / length with the two adjacent angles, each
@@ -259,26 +259,33 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
 
 
 def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
-    """Return the (v, v) weights of neighbors in the mean."""
+    """Build the (v, v) matrix of mean value weights; entry (i, j) is the weight of vertex j in the mean at i.
+
+    At each of its corners, a triangle with the angle α there adds its stiffness times tan(α/2) / length to
+    the weights of the two edges from that corner. For edge vectors u and v from the corner,
+
+        tan(α/2) = |u × v| / (|u| |v| + u · v)
+    """
     rows = []
     columns = []
     weights = []
     for k in range(3):
         vertex = mesh.triangles[:, k]
-        left = mesh.triangles[:, (k + 1) % 3]
-        right = mesh.triangles[:, (k + 2) % 3]
-        u = mesh.points[left] - mesh.points[vertex]
-        v = mesh.points[right] - mesh.points[vertex]
+        next_vertex = mesh.triangles[:, (k + 1) % 3]
+        previous_vertex = mesh.triangles[:, (k + 2) % 3]
+        u = mesh.points[next_vertex] - mesh.points[vertex]
+        v = mesh.points[previous_vertex] - mesh.points[vertex]
         u_length = np.hypot(*u.T)
         v_length = np.hypot(*v.T)
         cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
         tangent_of_half_angle = cross / (u_length * v_length + (u * v).sum(axis=1))
         rows += [vertex, vertex]
-        columns += [left, right]
+        columns += [next_vertex, previous_vertex]
         weights += [
             stiffness * tangent_of_half_angle / u_length,
             stiffness * tangent_of_half_angle / v_length,
         ]
+    # Entries with the same indices are added up: each inner edge has one from either triangle.
     indices = (np.concatenate(rows), np.concatenate(columns))
     size = len(mesh.points)
     return csr_array((np.concatenate(weights), indices), shape=(size, size))
@@ -286,17 +293,21 @@ def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
 
 @kernel
 def _solve_banded_system(band: Array, right_side: Array) -> Array:
-    """Solve a diagonally dominant system with 2 b + 1 diagonals, in place.
+    """Solve a banded linear system in place by Gaussian elimination, and return the solution.
+
+    The matrix is diagonally dominant, so that no pivoting is needed.
 
     Parameters
     ----------
     band : (v, 2 b + 1) array
-        Element (i, j) of the matrix is at (i, j - i + b). It is overwritten.
+        The diagonal of the matrix, and b diagonals on either side: element (i, j) of the matrix is stored in
+        row i and column j - i + b. Overwritten.
     right_side : (v, 2) array
-        It is overwritten by the solution.
+        Two right-hand sides. Overwritten by the solutions.
     """
     size = len(band)
     b = band.shape[1] // 2
+    # Eliminate the elements below the diagonal.
     for k in range(size):
         end = min(size, k + b + 1)
         for row in range(k + 1, end):
@@ -305,6 +316,7 @@ def _solve_banded_system(band: Array, right_side: Array) -> Array:
                 right_side[row] -= factor * right_side[k]
                 for column in range(k, end):
                     band[row, column - row + b] -= factor * band[k, column - k + b]
+    # Substitute back, from the last row to the first.
     for k in range(size - 1, -1, -1):
         for column in range(k + 1, min(size, k + b + 1)):
             right_side[k] -= band[k, column - k + b] * right_side[column]

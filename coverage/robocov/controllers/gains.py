@@ -197,7 +197,7 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     default : str
         One of the choices.
     choices : sequence of str
-        All values that are allowed.
+        The allowed values.
     meaning : str
         Description on one line.
 
@@ -209,7 +209,7 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     Raises
     ------
     ValueError
-        If the default is none of the choices.
+        If the default is not one of the choices.
 
     See Also
     --------
@@ -221,10 +221,10 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     >>> import robocov as rc
     >>> from robocov.controllers import get_gains
     >>> @dataclass(frozen=True)
-    ... class Passing:
-    ...     side: str = rc.choice("left", ("left", "right"), "where to pass")
-    >>> get_gains(Passing)["side"].choices
-    ('left', 'right')
+    ... class Patrol:
+    ...     direction: str = rc.choice("clockwise", ("clockwise", "counter-clockwise"), "direction of travel")
+    >>> get_gains(Patrol)["direction"].choices
+    ('clockwise', 'counter-clockwise')
     """
     if default not in choices:
         raise ValueError(f"default: expected one of {', '.join(choices)}, got {default!r}")
@@ -257,7 +257,11 @@ def get_gains(controller: Any) -> dict[str, Gain | Option]:
 
 
 def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
-    """Return the gain that a dataclass field declares; None if it does not declare any."""
+    """Return the gain that a dataclass field declares; None if it is not a gain.
+
+    A field declares a gain by `gain` or `choice`, or by a plain number as its default. A plain number has no
+    unit and no description.
+    """
     declared = dataclass_field.metadata.get(_METADATA_KEY)
     default = None if dataclass_field.default is MISSING else dataclass_field.default
     if declared is None:

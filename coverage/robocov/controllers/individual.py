@@ -199,10 +199,12 @@ class IndividualControllerAdapter:
     def begin(self, region: Region, team: Team) -> IndividualMemories:
         """Return the memories of the robots before their first decision.
 
+        They come from the method `begin` of the individual controller, if it has one, and are None otherwise.
+
         Parameters
         ----------
         region : Region
-            The known outer boundary.
+            The known outer boundary; not used, since individual controllers do not receive it.
         team : Team
 
         Returns
@@ -212,7 +214,7 @@ class IndividualControllerAdapter:
         begin = getattr(self.controller, "begin", None)
         if begin is None:
             return IndividualMemories([None] * len(team))
-        return IndividualMemories([begin(number, team) for number in range(len(team))])
+        return IndividualMemories([begin(robot, team) for robot in range(len(team))])
 
     def decide(
         self,

@@ -124,10 +124,10 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
     positions, fix_counts, variance = _filter_own_positions(seen, previous, team)
-    robot, other = seen.neighbors.list_pairs()
+    robot, neighbor = seen.neighbors.list_pairs()
     messages = _Messages(
         receiver=robot,
-        sender=other,
+        sender=neighbor,
         positions=seen.reported_positions,
         sent_times=seen.time - seen.report_ages,
     )
@@ -146,11 +146,13 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         variance=variance,
         tracks=tracks,
     )
-    ages = np.clip(seen.time - tracks.sent_times[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
-    neighbors = tracks.positions[robot, other] + ages[:, None] * tracks.velocities[robot, other]
+    ages = np.clip(seen.time - tracks.sent_times[robot, neighbor], 0.0, _MAX_EXTRAPOLATION_S)
+    neighbor_positions = (
+        tracks.positions[robot, neighbor] + ages[:, None] * tracks.velocities[robot, neighbor]
+    )
     obstacle_points = seen.obstacle_points - seen.positions + positions
     estimated = replace(
-        seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbors
+        seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbor_positions
     )
     return estimated, estimates
 
@@ -177,20 +179,27 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
 
 
 def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observations:
-    """Return the observations with neighbors as close as they may be, to avoid collisions.
+    """Return the observations with each neighbor moved closer by the uncertainty of its position.
+
+    Controllers that avoid collisions use them, to keep clear of a neighbor wherever it may be. The
+    uncertainty grows with the localization noise and with the age of the neighbor's message.
 
     Parameters
     ----------
     seen : Observations
-        As `estimate_positions` returns them.
+        Observations returned by `estimate_positions`.
     estimates : Estimates
-        The estimates that it returned with them.
+        Estimates returned by the same call.
+
+    Returns
+    -------
+    Observations
     """
     assert seen.reported_positions is not None
-    robot, other = seen.neighbors.list_pairs()
+    robot, neighbor = seen.neighbors.list_pairs()
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
-    ages = np.clip(seen.time - estimates.tracks.sent_times[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
+    ages = np.clip(seen.time - estimates.tracks.sent_times[robot, neighbor], 0.0, _MAX_EXTRAPOLATION_S)
     uncertainty = _UNCERTAINTY_SIGMAS * np.sqrt(estimates.variance[robot]) + _UNCERTAINTY_SPEED * ages
     uncertainty = np.minimum(uncertainty, _MAX_UNCERTAINTY_FRACTION * distance)
     factor = 1.0 - uncertainty / np.maximum(distance, _MIN_DISTANCE_M)

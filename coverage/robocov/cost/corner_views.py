@@ -166,10 +166,11 @@ def _add_views(
 def _find_visible_sites(
     walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: Array
 ) -> int:
-    """Return the bit mask of the sites of a tile that a corner sees and where a path to them can bend there.
+    """Find the sites of a tile that the last segment of a shortest path around a corner can lead to.
 
-    Bit s of the mask belongs to slot s of the tile. The distances of the nearest and of the farthest of these
-    sites are written to `lengths`.
+    These are the sites that the corner sees in a direction in which a shortest path can bend around it.
+    Return them as a bit mask, with bit s for the site in slot s of the tile. The distances from the corner to
+    the nearest and to the farthest of them are written to `lengths`.
     """
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]

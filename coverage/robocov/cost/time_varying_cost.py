@@ -105,7 +105,7 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         is_working : (n,) bool array, optional
-            False for robots that have failed. By default, no robot has.
+            False for robots that have failed. By default, all robots work.
 
         Returns
         -------
@@ -120,21 +120,23 @@ class TimeVaryingCost:
     def __call__(
         self, time: float, positions: Array, is_working: BoolArray | None = None, speeds: Array | None = None
     ) -> CoverageResult | None:
-        """Compute the coverage cost at a given time.
+        """Compute the coverage cost of the available robots at a given time.
+
+        A robot is available if it works and is not covered by a moving obstacle.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
         is_working : (n,) bool array, optional
-            False for robots that have failed. By default, no robot has.
+            False for robots that have failed. By default, all robots work.
         speeds : (n,) array, m/s, optional
             See `CoverageCost`.
 
         Returns
         -------
         CoverageResult or None
-            The result for the available robots; None if there are none.
+            None if no robot is available.
         """
         is_available = self.find_available_robots(time, positions, is_working)
         if not is_available.any():
@@ -152,7 +154,7 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         is_working : (n,) bool array, optional
-            False for robots that have failed. By default, no robot has.
+            False for robots that have failed. By default, all robots work.
 
         Returns
         -------
@@ -176,7 +178,7 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         is_working : (n,) bool array, optional
-            False for robots that have failed. By default, no robot has.
+            False for robots that have failed. By default, all robots work.
 
         Returns
         -------

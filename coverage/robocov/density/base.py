@@ -124,7 +124,7 @@ class Density(ABC):
 
 
 def require_weight(name: str, value: float, *, above_zero: bool = False) -> None:
-    """Raise an error unless a weight is in range.
+    """Raise an error unless a weight is between 0 and `MAX_WEIGHT`.
 
     Parameters
     ----------

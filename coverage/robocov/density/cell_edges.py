@@ -91,11 +91,12 @@ class CellEdges:
         first_cell = self.cell[is_shared]
         second_cell = self.other_cell[is_shared]
         cell_count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
-        # Each pair is encoded as one number, because sorting pairs takes several times as long.
+        # Each pair is encoded as one number, because sorting rows of an array takes several times as long. An
+        # edge is listed by both of its cells; `np.unique` keeps each pair once.
         low = np.minimum(first_cell, second_cell)
         high = np.maximum(first_cell, second_cell)
-        numbers = np.unique(low * cell_count + high)
-        return np.column_stack(np.divmod(numbers, cell_count)).astype(np.intp, copy=False)
+        codes = np.unique(low * cell_count + high)
+        return np.column_stack(np.divmod(codes, cell_count)).astype(np.intp, copy=False)
 
     def _has_length(self) -> BoolArray:
         """Return whether each edge is longer than the rounding error of its coordinates, (s,)."""

@@ -292,13 +292,13 @@ def draw_random_field(request: Request, rng: np.random.Generator) -> tuple[Array
 
 
 def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
-    """Extract the area where a field on a mesh is below 0.
+    """Extract the area in which a scalar field, given at the points of a mesh, is negative.
 
     Parameters
     ----------
     points : (rows, columns, 2) array, m
     values : (rows, columns) array
-        Values on the edge of the mesh are raised to at least 1.
+        Values of the field. On the border of the mesh, they are raised to at least 1.
 
     Returns
     -------
@@ -309,7 +309,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     Each square of the mesh is divided into two triangles, in which the contour is a line ("marching
     triangles"). In a triangle, unlike in a square, the contour is never ambiguous.
     """
-    # On the edge of the mesh, all values are positive, so that contours are closed.
+    # No contour reaches the border of the mesh if all values there are positive, so that contours are closed.
     raised_values = np.maximum(values, 1.0)
     raised_values[1:-1, 1:-1] = values[1:-1, 1:-1]
     values = raised_values
@@ -323,7 +323,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
             fractions = np.where(is_crossing, start_values / (start_values - end_values), np.nan)
         return np.asarray(points[start] + (points[end] - points[start]) * fractions[..., None])
 
-    # The edges from each point to the right, upwards, and to the point above the right one.
+    # Edges of the mesh run from each point to the right, up, and diagonally up to the right.
     horizontal = find_crossings(np.s_[:, :-1], np.s_[:, 1:])
     vertical = find_crossings(np.s_[:-1, :], np.s_[1:, :])
     diagonal = find_crossings(np.s_[:-1, :-1], np.s_[1:, 1:])

@@ -306,15 +306,15 @@ def _shrink_corner_disc(
 def _choose_center_disc(
     environment: Environment, request: Request, corner_disc: DiscStart
 ) -> DiscStart | None:
-    """Return a disc near the middle with as much clearance as possible; None if nothing is free there.
+    """Choose a start disc near the middle of the map, with as much clearance as possible.
 
-    Its center is the free point with the best score, from a grid of points around the middle. The score is
-    the distance from the nearest wall, as far as the disc can make use of it, minus a fraction of the
-    distance from the middle.
+    Its center is the point with the best score in a grid of points around the middle. The score of a point is
+    its distance from the nearest wall, at most the maximum radius of the disc, minus a fraction of its
+    distance from the middle. Return None if no point of the grid is free.
     """
     max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
-    steps = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
-    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    axis_offsets = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
+    offsets = np.stack(np.meshgrid(axis_offsets, axis_offsets), axis=-1).reshape(-1, 2)
     points = request.round_points(offsets + request.size / 2.0)
     is_free = shapely.contains_xy(environment.free, points[:, 0], points[:, 1])
     if not is_free.any():
@@ -327,7 +327,7 @@ def _choose_center_disc(
     scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
     # Scores are rounded, so that rounding errors do not decide between equally good points.
     best = int(np.round(scores, _SCORE_DIGITS).argmax())
-    # Where there is little clearance, the disc extends into obstacles. Robots start in the free part of it.
+    # If there is little clearance, the disc overlaps obstacles, and robots start in its free area.
     radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)
     center = (float(points[best, 0]), float(points[best, 1]))
     return DiscStart(center, request.round_down(min(radius, max_radius)))

@@ -92,10 +92,13 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 
 def _choose_grid_shape(request: Request) -> GridShape:
-    """Return numbers of columns and rows for about as many nearly square cells as requested."""
+    """Choose the numbers of columns and rows of a grid of about the requested number of cells.
+
+    Grids of nearly square cells are preferred.
+    """
 
     def compute_mismatch(shape: GridShape) -> float:
-        """Return the deviation of a grid from the requested number of cells and from square cells."""
+        """Return a measure of how far a grid is from the requested number of cells, and from square cells."""
         columns, rows = shape
         elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
         return abs(math.log(columns * rows / request.count)) + _ELONGATION_WEIGHT * elongation

@@ -19,7 +19,7 @@ _MAX_AREA_RATIO = 1.5
 _MAX_FILLED_FRACTION = 0.7
 """Largest fraction of the map that obstacles fill, together with half of the gap around each of them."""
 _MAX_MOVES = 12
-"""Number of obstacles that are moved to make room for others, before the layout is abandoned."""
+"""Number of obstacles that are moved to make space for others, before the layout is abandoned."""
 _MAX_OUTLINES = 8
 """Number of outlines that are tried for one obstacle."""
 _POSITIONS_PER_OUTLINE = 128
@@ -55,7 +55,7 @@ def scatter_polygons(
     ----------
     request : Request
     corner_disc : DiscStart
-        Disc that stays free.
+        Disc at which robots start; no obstacle overlaps it.
     rng : numpy.random.Generator
 
     Returns
@@ -72,22 +72,22 @@ def scatter_polygons(
     shapely.prepare(start_disc)
     names = list(SHAPE_PROBABILITIES)
     shapes = rng.choice(names, size=request.count, p=list(SHAPE_PROBABILITIES.values()))
-    waiting = deque(zip(shapes.tolist(), areas.tolist(), strict=True))
+    queue = deque(zip(shapes.tolist(), areas.tolist(), strict=True))
     placed: list[tuple[str, float]] = []
     outlines: list[shapely.Polygon] = []
-    moves = 0
-    while waiting:
-        shape, area = waiting[0]
+    move_count = 0
+    while queue:
+        shape, area = queue[0]
         outline = _place_shape(request, shape, area, np.array(outlines, dtype=object), start_disc, rng)
         if outline is not None:
             outlines.append(outline)
-            placed.append(waiting.popleft())
-        elif moves < _MAX_MOVES and placed:
-            # Remove a random obstacle to make room, and place it again right after the current one.
-            moves += 1
-            removed = int(rng.integers(len(placed)))
-            waiting.insert(1, placed.pop(removed))
-            outlines.pop(removed)
+            placed.append(queue.popleft())
+        elif move_count < _MAX_MOVES and placed:
+            # Remove a random obstacle to make space, and place it again right after the current one.
+            move_count += 1
+            index = int(rng.integers(len(placed)))
+            queue.insert(1, placed.pop(index))
+            outlines.pop(index)
         else:
             return None
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
@@ -179,7 +179,7 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
 
 
 def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
-    """Draw an L whose arms take up 0.3 to 0.5 of its width and of its height.
+    """Draw a random outline of an L of the given area, in a random direction.
 
     Parameters
     ----------
@@ -189,7 +189,9 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     Returns
     -------
     (6, 2) array, m
+        Vertices. The bounding box is centered at the origin.
     """
+    # All lengths are relative to the height until the outline is scaled.
     width = rng.uniform(*_L_WIDTHS)
     relative_arm_width, arm_height = rng.uniform(*_L_THICKNESSES, 2)
     arm_width = width * relative_arm_width
@@ -207,7 +209,7 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
 
 
 def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
-    """Draw a U whose opening has at least the given width; its arms may differ in length.
+    """Draw a random outline of a U of the given area, in a random direction. The arms may differ in length.
 
     Parameters
     ----------
@@ -219,8 +221,9 @@ def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array
     Returns
     -------
     (8, 2) array, m, or None
-        None if no U of this area has been found.
+        Vertices, around the center of the bounding box. None if all outlines drawn had too narrow an opening.
     """
+    # All lengths are relative to the height of the left arm until the outline is scaled.
     for _ in range(_MAX_REDRAWS):
         width = rng.uniform(*_U_WIDTHS)
         left_width, right_width = rng.uniform(*_U_ARM_WIDTHS, 2)

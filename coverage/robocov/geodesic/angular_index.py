@@ -436,9 +436,9 @@ def find_bin(bin_count: int, dx: float, dy: float) -> int:
 
 @kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether no wall hides a point from a source, however far away it is.
+    """Return whether a source sees a point, that is, no wall lies between them. The range is unlimited.
 
-    A source at a vertex sees only the directions that lead into free space.
+    A source at a vertex of the walls sees only points in directions that lead into free space.
 
     Parameters
     ----------
@@ -447,7 +447,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     source : int
         Row of the source in the index.
     x, y : float, grid steps
-        The point.
+        Coordinates of the point.
 
     Returns
     -------
@@ -457,8 +457,8 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     dy = y - index.positions[source, 1]
     squared_distance = dx * dx + dy * dy
     k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
-    # Within the clear distance of the bin, nothing is hidden; beyond its horizon, everything is. These two
-    # comparisons settle most cases.
+    # In this angular bin around the source, no point within the clear distance is hidden, and every point
+    # beyond the horizon is. These two comparisons decide most cases.
     if squared_distance <= index.squared_clear_distance[source, k]:
         return True
     if squared_distance > index.squared_horizon[source, k]:

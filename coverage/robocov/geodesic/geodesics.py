@@ -263,7 +263,7 @@ class Geodesics:
         return nearest
 
     def count_windings(self, grid_positions: Array) -> IntArray:
-        """Count how often the boundary of each component of the free space winds around points.
+        """Compute the winding numbers of the boundaries of the c components of the free space.
 
         Parameters
         ----------
@@ -272,7 +272,8 @@ class Geodesics:
         Returns
         -------
         (n, c) int array
-            1 inside a component, more on its boundary, 0 outside.
+            Number of times that the boundary of each component winds around each point: 0 outside the
+            component, 1 inside, and more than 1 on the boundary.
         """
         windings = np.empty((len(grid_positions), len(self.free.geoms)), dtype=np.int64)
         count_windings(self.walls, np.ascontiguousarray(grid_positions), windings)
@@ -341,18 +342,18 @@ class Geodesics:
     def _compute_corner_distances(
         self, grid_positions: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
-        """Compute the distances of n grid points to the k corners.
+        """Compute the geodesic distances from n grid points to the k corners of the walls.
 
-        With `must_be_straight`, corners that a point does not see are infinitely far away. Return the index
-        of the walls around the points, the distances, (n, k), and the paths from the last point to the
-        corners.
+        With `must_be_straight`, the distance is infinite if the straight line from a point to a corner is
+        blocked. Return an angular index of the walls, with the points as its sources, the distances, (n, k)
+        in grid steps, and the paths from the last point to the corners.
         """
         corner_count = len(self.corners)
         distances = np.empty((len(grid_positions), corner_count))
         paths = CornerPaths.allocate(corner_count)
 
         def fill_index(index: AngularWallIndex) -> AngularWallIndex | None:
-            """Return the index, and write the distances; None if the index is too small."""
+            """Fill the index and write the distances; return None if the index has too little space."""
             has_space = _find_corner_distances(
                 self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )

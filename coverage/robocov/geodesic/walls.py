@@ -371,7 +371,7 @@ def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
 
 @kernel
 def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
-    """Count how often the boundary of each component winds around points.
+    """Count how often the boundary of each component of the free space winds around points.
 
     The winding number is the number of walls to the right of a point that run up, minus those that run down.
     A search in the box tree visits only walls at the height of the point that are not entirely to its left.

@@ -231,9 +231,12 @@ class _ProfitBounds(NamedTuple):
 def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
     """Alternate between searching for prices and proving bounds; return the best proof.
 
-    A search maximizes a smoothed dual over a table of candidate positions. A proof finds positions of a
-    higher profit than any in the table. They are added to it, and the next search is smoothed half as much.
-    Without smoothing, the dual would have no gradient where two positions are equally profitable.
+    A search maximizes the dual over a table of candidate positions. The dual is smoothed, because it has no
+    gradient where two positions are equally profitable. A proof bounds the dual over all positions, and finds
+    positions with a higher profit than any in the table. These are added to the table, and the smoothing is
+    halved for the next round.
+
+    `precision` is the relative gap between the bound and the cost of the placement at which the search ends.
     """
     prices = dual.initial_prices
     for smoothing in _ROUGH_SMOOTHINGS:

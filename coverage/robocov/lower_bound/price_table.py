@@ -57,7 +57,10 @@ class PriceTable(NamedTuple):
         )
 
     def compute_profits(self, prices: Array, weights: Array) -> Array:
-        """Compute the profits of a robot at each position.
+        """Compute the profit of a robot at each position of the table.
+
+        A site pays its price for a robot, less the distance to the robot, if the difference is positive. The
+        profit is the sum of these payments, each times the weight of the site.
 
         Parameters
         ----------

@@ -84,7 +84,10 @@ class DiscoveredMap:
         return np.asarray((self.state >= PRESUMED_WALL) | self.raster.is_outside)
 
     def add_scan(self, position: Array, distances: Array, is_hit: BoolArray) -> DiscoveredMap:
-        """Add one scan.
+        """Return the map updated by one scan of a range sensor.
+
+        Cells that rays pass through become free, cells in which they hit an obstacle become walls, and cells
+        between hits on the same surface become presumed walls.
 
         Parameters
         ----------
@@ -101,7 +104,7 @@ class DiscoveredMap:
             This map itself if the scan adds nothing to it.
         """
         state = self.state.copy()
-        # Nothing beyond the region matters.
+        # No ray inside the region is longer than its diameter, and the map does not extend beyond it.
         lengths = np.minimum(distances, self.raster.region.diameter)
         directions = compute_ray_directions(len(distances))
         grid = self.raster.grid
@@ -112,7 +115,7 @@ class DiscoveredMap:
         return self._replace_state(state)
 
     def add_robots(self, positions: Array, radius: float) -> DiscoveredMap:
-        """Mark the cells where robots are as free, since robots fit there. Walls remain.
+        """Return the map with the cells that robots cover marked as free. Cells that are walls stay walls.
 
         Parameters
         ----------

@@ -142,13 +142,15 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
 @kernel
 def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
-    """Compute the lengths of all moves from all nodes, m; infinite without an edge.
+    """Compute the length of each move from each node, m; infinite for moves that are not possible.
 
     A move leads from a node to a neighbor up to `_MAX_MOVE` rows and columns away. The result has the shape
-    (m, _MOVES_PER_AXIS, _MOVES_PER_AXIS). Its entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the
-    move by that many rows and columns. There is an edge if no cell on the line between both nodes is tight,
-    that is, too close to a wall. A move through unknown cells counts as longer. `moves` contains only half of
-    the moves; the others are their opposites.
+    (m, _MOVES_PER_AXIS, _MOVES_PER_AXIS): entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the move
+    from this node by `up` rows and `right` columns.
+
+    A move is possible if no cell on the straight line is tight, that is, too close to a wall. Moves through
+    unknown cells count as up to `_UNKNOWN_DETOUR` longer. `moves` contains only one of each two opposite
+    moves, so that each line is examined once, for both directions.
     """
     lengths = np.full((rows * columns, _MOVES_PER_AXIS, _MOVES_PER_AXIS), np.inf)
     for move in range(len(moves.lengths)):
@@ -165,8 +167,8 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 neighbor = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / crossed_count * unknown_count)
-                # A node without clearance lies in a tight cell. It can be reached from one with clearance,
-                # but not the other way around.
+                # A node without clearance lies in a tight cell and is a dead end: the only moves are to it,
+                # from nodes with clearance.
                 has_clearance = cells.has_clearance[node]
                 neighbor_has_clearance = cells.has_clearance[neighbor]
                 if is_passable or (is_without_wall and has_clearance and not neighbor_has_clearance):
@@ -201,7 +203,7 @@ def _compress_edges(lengths: Array, columns: int) -> Edges:
     """Collect the edges of all nodes in compressed sparse rows.
 
     The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths` is the length in meters of the move by
-    that many rows and columns; see `_compute_move_lengths`. Moves of infinite length are no edges.
+    `up` rows and `right` columns; see `_compute_move_lengths`. A move of infinite length is not possible.
     """
     count = 0
     edge_lengths = np.empty(lengths.size)
@@ -228,26 +230,28 @@ def compute_distances(
     Parameters
     ----------
     edges : Edges
+        Directed edges between m nodes.
     shortest_edge : float, m
         Lower bound on the lengths of the edges.
     sources : (k,) int array
+        Nodes at which paths start.
     offsets : (k,) array, m
-        Initial distances of the sources.
+        Distances that paths from each source start with.
     limit : float, m
-        Nodes farther away are not reached.
+        Longest path that is followed.
 
     Returns
     -------
     (m,) array, m
-        Infinite for nodes that are not reached.
+        Infinite for nodes that no path within the limit reaches.
 
     Notes
     -----
-    This is Dijkstra's algorithm, except that several nodes are settled together: the nearest one, and all
-    that are farther away by less than the shortest edge. No path via one of them can shorten the path to
-    another.
+    This is Dijkstra's algorithm, except that it settles several nodes in each iteration: the nearest node of
+    the front, and all nodes whose distance exceeds that of the nearest by less than the shortest edge. A
+    path from one of these nodes to another would be longer than the path already known.
     """
-    # The front contains the nodes that a path has reached and from which others may be reached.
+    # The front contains the nodes that a path has reached, but that are not settled yet.
     node_count = len(edges.first_edge) - 1
     distance = np.full(node_count, np.inf)
     front = np.empty(node_count, dtype=np.intp)
@@ -262,6 +266,7 @@ def compute_distances(
             front_size += 1
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
+        # Find the distance of the nearest node of the front.
         nearest = np.inf
         for k in range(front_size):
             nearest = min(nearest, distance[front[k]])

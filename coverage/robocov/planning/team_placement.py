@@ -146,16 +146,17 @@ def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> In
 def _improve_sources(
     weighted_distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
 ) -> IntArray:
-    """Return goals of a lower cost for the robots of the plan, as indices of sources, (k,).
+    """Return goals with a lower coverage cost for the k robots of a plan, as indices of sources, (k,).
 
-    Sources are the nodes that may become goals, and `chosen` contains the current one of each robot. Entry
-    (q, s) of `weighted_distances` is the weighted distance from target q to source s. Robots outside the plan
-    do not move, but targets near them need no other robot. They are therefore treated as one more source, in
-    the last column, at the distance of the nearest of these robots. It is always chosen, like the goals of
-    fixed robots.
+    Sources are the nodes that may become goals. `chosen` contains the source that is currently the goal of
+    each robot. Entry (q, s) of `weighted_distances` is the weighted distance from target q to source s.
+
+    Robots outside the plan stay where they are, but cover the targets close to them. The last column stands
+    for all of these robots together: it contains the weighted distance to the nearest one. This column is
+    always chosen, just as the goals of fixed robots are.
     """
-    # Sort the robots in an order that does not depend on which of them plans, so that all robots choose the
-    # same of two equally good plans.
+    # Sort the robots in an order that is the same on whichever robot makes the plan. If two plans are equally
+    # good, all robots then choose the same one.
     order = np.lexsort(team.previous_goals.T)
     outside_source = weighted_distances.shape[1] - 1
     improved_sources = improve_sources(
@@ -193,26 +194,28 @@ def _move_first_source(
 def _assign_goals(
     source_positions: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
 ) -> Array:
-    """Assign the chosen sources to robots as goals, so that the sum of squared path lengths is minimal.
+    """Assign the chosen nodes to robots as goals, so that the sum of squared path lengths is minimal.
 
     Parameters
     ----------
     source_positions : (c, 2) array, m
+        Positions of the nodes that may become goals (the sources).
     distances : (c, k) array, m
         Distances from all sources to the chosen ones.
     chosen : (k,) int array
-        The chosen sources. Those of fixed robots stay theirs.
+        Index of the source chosen for each robot. Fixed robots keep their previous goals; the other robots
+        may exchange theirs.
     team : TeamSituation
     min_saving : float
-        Fraction of the sum that an exchange of goals must save.
+        Fraction of the sum that an exchange of goals must save; otherwise, no goals are exchanged.
 
     Returns
     -------
     (k, 2) array, m
         The goal of each robot.
     """
-    # Rows of `squared_lengths` are the mobile robots, and columns the goals, in the order in which these
-    # robots have them now.
+    # Row i of `squared_lengths` belongs to mobile robot i, and column j to the goal now chosen for mobile
+    # robot j.
     mobile = np.flatnonzero(~team.is_fixed)
     starts = [_find_nearest(source_positions, team.positions[robot]) for robot in mobile]
     squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, _MAX_SQUARED_LENGTH_M2)

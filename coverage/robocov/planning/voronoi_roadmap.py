@@ -205,9 +205,11 @@ def _fill_group(
     queue: IntArray,
     step_counts: IntArray,
 ) -> None:
-    """Add all cells within `max_steps` of the first cell in the queue to its group.
+    """Add the cells of the graph within `max_steps` steps of a first cell to the group of that cell.
 
-    The queue contains indices of the flattened array, each with its number of steps from the first cell.
+    This is a breadth-first search. `group` contains the group of each cell, or `NO_VERTEX`. `queue` contains
+    flat indices of cells, and at the start only that of the first cell; entry k of `step_counts` is the
+    number of steps from the first cell to ``queue[k]``. All three are changed in place.
     """
     rows, columns = is_in_graph.shape
     head = 0

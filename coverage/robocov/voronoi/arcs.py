@@ -115,7 +115,8 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
     polar moment is about the middle of the chord. Let x be the half angle, s its sine and c its cosine. The
     usual formulas, such as (x - s c) / (4 s²) for the area, subtract almost equal numbers if x is small. They
     are therefore rewritten in terms of h = (x - s c - 2/3 s³) / s⁵, which tends to 1/5 as x tends to 0: the
-    area, for example, is s (2/3 + s² h) / 4.
+    area, for example, is s (2/3 + s² h) / 4. If x is small, h is evaluated by a power series in s², whose
+    coefficients are in `series`, that of the highest power first.
     """
     s = np.sin(half_angle)
     c = np.cos(half_angle)
@@ -123,7 +124,7 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
     if squared_sine > _MAX_SERIES_SQUARED_SINE:
         h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / squared_sine
     else:
-        # Evaluate the power series of h in s² by Horner's method.
+        # Horner's method.
         h = 0.0
         for coefficient in series:
             h = h * squared_sine + coefficient

@@ -161,18 +161,19 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
     """Triangulate from scratch by inserting one point after another; return whether it succeeded.
 
     Each point splits the triangle that contains it into three. Edges that are then no longer Delaunay are
-    flipped. Triangles are given by their first half-edges.
+    flipped. The last three points are the sentinels, the corners of a triangle around all other points.
+    Triangles are represented by their first half-edges, and `stack` is working memory.
     """
     n = len(points) - 3
-    # At first there is one triangle, whose corners are the sentinels.
+    # Start with a single triangle, that of the sentinels.
     for k in range(3):
         mesh[CORNER, k] = n + k
         mesh[TWIN, k] = NO_TWIN
     flip_count = 0
     triangle = 0
     for i in range(n):
-        # Each of the previous points has added two triangles. The search starts at the triangle of the
-        # previous point.
+        # Each previous point has added two triangles. The search starts at the triangle in which the
+        # previous point was.
         triangle_count = 2 * i + 1
         triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, triangle_count)
         if triangle == _FAILED:
@@ -191,16 +192,17 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
 
 @kernel
 def _split_triangle(mesh: Mesh, first: int, second: int, third: int, i: int) -> None:
-    """Split a triangle by a point i into three triangles, given by their first half-edges.
+    """Split triangle a b c at a point i inside it into the triangles a b i, b c i and c a i.
 
-    The corners a, b and c of the triangle become a b i, which takes its place, b c i and c a i.
+    `first` is the first half-edge of a b c, and of a b i, which replaces it. `second` and `third` are the
+    first half-edges of the two new triangles, b c i and c a i.
     """
     a = mesh[CORNER, first]
     b = mesh[CORNER, first + 1]
     c = mesh[CORNER, first + 2]
     _write_triangle(mesh, second, b, c, i)
     _write_triangle(mesh, third, c, a, i)
-    # The outer edges keep their neighbors, and the inner edges are new.
+    # Each side of a b c keeps its twin. Then the three edges that end at i become twins of each other.
     _link(mesh, second, mesh[TWIN, first + 1])
     _link(mesh, third, mesh[TWIN, first + 2])
     mesh[CORNER, first + 2] = i

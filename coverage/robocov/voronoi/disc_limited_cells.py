@@ -1,4 +1,4 @@
-"""Parts of cells within a distance of their generators, as robots of limited range know them."""
+"""Cells limited to discs around their generators, as robots of limited range know them."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ _CHORDS_PER_ARC = 64
 """Number of chords that replace one arc of a disc, which spans at most half a turn."""
 
 _MIN_AREA = 1e-14
-"""Area, relative to the square of the radius, below which a part is empty up to rounding."""
+"""Area below which a limited cell is empty up to rounding, as a fraction of the squared radius."""
 
 _MIN_SQUARED_LENGTH = 1e-300
 """Smallest squared length used as a divisor, which prevents division by zero, m²."""
@@ -38,19 +38,19 @@ class _CutEdges(NamedTuple):
 
 
 def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array, Array]:
-    """Compute area and centroid of the part of each cell within a distance of its generator.
+    """Compute the area and centroid of each cell limited to a disc around its generator.
 
     Parameters
     ----------
     edges : CellEdges
     radii : (n,) array, m
-        Positive; infinite for no limit.
+        Radii of the discs. Positive; infinite for no limit.
 
     Returns
     -------
     area : (n,) array, m²
     centroid : (n, 2) array, m
-        **Relative to the generator**; zero if the part is empty.
+        **Relative to the generator**; zero if the area is.
 
     Notes
     -----
@@ -60,22 +60,12 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     """
     cell_count = len(radii)
     # A disc that contains the whole cell cuts nothing, however large it is. Infinite radii are therefore
-    # replaced by finite ones.
+    # replaced by finite ones, which exceed the distance of the farthest vertex.
     reach = np.zeros(cell_count)
     np.maximum.at(reach, edges.cell, compute_lengths(edges.start))
     radius = np.minimum(radii, 2.0 * reach + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
-    # First the triangles between the generators and the parts of the edges in the discs, then the sectors.
-    # Twice the area of a sector is r² times its angle, and twice its first moment 2/3 r³ (sin, -cos) between
-    # its ends.
-    cross = cut.inner_start[:, 0] * cut.inner_end[:, 1] - cut.inner_start[:, 1] * cut.inner_end[:, 0]
-    doubled_area = cross.copy()
-    doubled_moment = cross[:, None] * (cut.inner_start + cut.inner_end) / 3.0
-    for angle, turn in (cut.arc_before, cut.arc_after):
-        doubled_area += radius * radius * turn
-        factor = 2.0 / 3.0 * radius**3
-        doubled_moment[:, 0] += factor * (np.sin(angle + turn) - np.sin(angle))
-        doubled_moment[:, 1] += factor * (np.cos(angle) - np.cos(angle + turn))
+    doubled_area, doubled_moment = _compute_doubled_moments(cut, radius)
     area = 0.5 * np.bincount(edges.cell, doubled_area, minlength=cell_count)
     moment_x = np.bincount(edges.cell, doubled_moment[:, 0], minlength=cell_count)
     moment_y = np.bincount(edges.cell, doubled_moment[:, 1], minlength=cell_count)
@@ -85,17 +75,36 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     return np.where(is_filled, area, 0.0), np.where(is_filled[:, None], centroid, 0.0)
 
 
-def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
-    """Build polygons of the parts of cells within a distance of their generators.
+def _compute_doubled_moments(cut: _CutEdges, radius: Array) -> tuple[Array, Array]:
+    """Return twice the area, (e,) m², and twice the first moment, (e, 2) m³, that each edge contributes.
 
-    Chords replace the arcs of the discs. A chord spans at most 1/128 of a turn, so that a whole disc loses
-    0.04 % of its area.
+    Twice the area of a sector from angle a to angle b is r² (b - a), and twice its first moment about the
+    center is 2/3 r³ (sin b - sin a, cos a - cos b).
+    """
+    # The triangles between the generators and the edges inside the discs.
+    cross = cut.inner_start[:, 0] * cut.inner_end[:, 1] - cut.inner_start[:, 1] * cut.inner_end[:, 0]
+    doubled_area = cross.copy()
+    doubled_moment = cross[:, None] * (cut.inner_start + cut.inner_end) / 3.0
+    # The sectors before and after them.
+    for angle, turn in (cut.arc_before, cut.arc_after):
+        doubled_area += radius * radius * turn
+        factor = 2.0 / 3.0 * radius**3
+        doubled_moment[:, 0] += factor * (np.sin(angle + turn) - np.sin(angle))
+        doubled_moment[:, 1] += factor * (np.cos(angle) - np.cos(angle + turn))
+    return doubled_area, doubled_moment
+
+
+def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
+    """Build polygons of cells limited to discs around their generators.
+
+    Chords replace the arcs of the discs. A chord spans at most 1/128 of a turn, so that the polygon of a
+    whole disc has 0.04 % less area than the disc.
 
     Parameters
     ----------
     edges : CellEdges
     radii : (n,) array, m
-        Positive; infinite for no limit.
+        Radii of the discs. Positive; infinite for no limit.
 
     Returns
     -------

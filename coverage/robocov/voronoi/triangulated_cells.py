@@ -110,8 +110,9 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
 def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> bool:
     """Build the Delaunay triangulation of the robots and three sentinels; return whether it succeeded.
 
-    The sentinels are distant points whose triangle contains all robots and the whole region, which is given
-    by its sides. It fails if a robot is so far from the region that a sentinel could cut a cell.
+    The sentinels are distant points, which form a triangle around all robots and the region. `sides` are the
+    sides of the region. The triangulation fails if rounding makes its triangles inconsistent, or if a robot
+    is so far outside the region that the cell of a sentinel could reach into the region.
     """
     n = len(points)
     x, y, size = _compute_center_and_size(sides)
@@ -127,7 +128,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     stack = np.empty(mesh.shape[1], np.intp)
     if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
-    # Of the half-edges that begin at a point, any one will do: the last one remains.
+    # Store one half-edge that begins at each point; it does not matter which.
     for h in range(mesh.shape[1]):
         if is_half_edge(h):
             half_edges[mesh[CORNER, h]] = h

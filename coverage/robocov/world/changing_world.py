@@ -18,6 +18,9 @@ from robocov.world.obstacle_pieces import build_obstacles
 from robocov.world.unicycles import initialize_steering
 from robocov.world.world import World
 
+_TURNING_RATE = 1
+"""Column of the steering: turning rate, rad/s."""
+
 
 class ChangingWorld:
     """A world with a row for every robot that is ever part of the team.
@@ -132,7 +135,7 @@ class ChangingWorld:
             self.steering[rows] = self._world.steering
 
     def _change_team(self, time: float) -> None:
-        """Apply the failures and arrivals that are due by `time`."""
+        """Apply the failures and arrivals up to a time: stop robots that fail, and place robots that join."""
         working = self._conditions.find_working(time, len(self.team))
         failed = self._conditions.find_failed(time, len(self.team))
         if (working == self.working).all() and (failed == self._failed).all():
@@ -145,8 +148,8 @@ class ChangingWorld:
         self.working = working
         self.velocities[~working] = 0.0
         if self.steering is not None:
-            # The turning rate of robots that have failed is zero.
-            self.steering = self.steering * np.column_stack([np.ones(len(working)), working])
+            self.steering = self.steering.copy()
+            self.steering[:, _TURNING_RATE] *= working
         self._build_world()
 
     def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:

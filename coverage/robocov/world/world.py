@@ -318,9 +318,9 @@ class World:
         return slice(run * self._team_size, (run + 1) * self._team_size)
 
     def _get_spaces(self) -> list[tuple[slice, FreeSpace]]:
-        """Return the spaces in which robots move freely, and the rows of their robots.
+        """Return the spaces that move robots and detect contacts, each with the rows of its robots.
 
-        A space contains up to `MAX_TEAMS_PER_SPACE` runs.
+        They are built by the first call. Each space contains the teams of up to `MAX_TEAMS_PER_SPACE` runs.
         """
         if self._spaces is None:
             self._spaces = []
