@@ -35,8 +35,8 @@ _ARRIVAL_RADIUS_M = 0.05
 """Distance from a point at which a robot has arrived."""
 _MIN_BOUNDARY_LENGTH_M = 1.0
 """Minimum length of a boundary that is worth following."""
-_PATIENCE_DECAY = 0.9
-"""Factor by which the maximum length of followed boundaries shrinks with each attempt to reach a goal."""
+_MAX_LENGTH_DECAY = 0.9
+"""Factor by which the maximum length of a followed boundary shrinks with each fixed goal."""
 _CONTACT_FRACTION = 0.95
 """A robot within the clearance of a point may approach it to this fraction of the current distance."""
 _MIN_LENGTH = 1e-300
@@ -60,8 +60,8 @@ class Mode(Enum):
     GOAL = "motion to the goal"
     BOUNDARY = "boundary following"
     LEAVING = "leaving the boundary"
-    RETURN = "return to the point of the boundary that is nearest to the goal"
-    PROJECTED = "arrival at that point"
+    RETURN = "return along the boundary to its point nearest to the goal"
+    BEST_POINT = "motion straight to that point, and rest there"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ class FollowedBoundary:
     """The path of a robot along the boundary that it follows. Immutable."""
 
     entry_point: Array
-    """(2,) m, point at which it began."""
+    """(2,) m, point at which it started."""
     last_position: Array
     """(2,) m, position of the robot at the last scan."""
     length: float
@@ -102,7 +102,7 @@ class FollowedBoundary:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BugState:
+class NavigationState:
     """Navigation state of one robot. Immutable."""
 
     mode: Mode
@@ -110,8 +110,8 @@ class BugState:
     """`COUNTERCLOCKWISE` or `CLOCKWISE`: it passes obstacles on its right, or on its left."""
     waypoint: Array
     """(2,) m, point that it heads for."""
-    is_passing: bool = False
-    """Whether it continues from the waypoint, and need not slow down there."""
+    passes_waypoint: bool = False
+    """Whether it moves on past the waypoint, and does not slow down there."""
     attempts: int = 0
     """Number of goals that it has fixed so far."""
     fixed_goal: FixedGoal | None = None
@@ -123,7 +123,7 @@ class BugState:
         """Return the fixed goal, or else the centroid, (2,) m."""
         return centroid if self.fixed_goal is None else self.fixed_goal.position
 
-    def release_goal(self, position: Array, centroid: Array, min_move: float) -> BugState:
+    def release_goal(self, position: Array, centroid: Array, min_move: float) -> NavigationState:
         """Return the state without the fixed goal if that is reached, or given up and out of date.
 
         Parameters
@@ -138,7 +138,7 @@ class BugState:
         if goal is None:
             return self
         is_done = math.dist(position, goal.position) < _ARRIVAL_RADIUS_M
-        if self.mode is Mode.PROJECTED:
+        if self.mode is Mode.BEST_POINT:
             if goal.resting_centroid is None:
                 if math.dist(position, self.waypoint) < _ARRIVAL_RADIUS_M:
                     return replace(self, fixed_goal=replace(goal, resting_centroid=freeze(centroid)))
@@ -146,14 +146,14 @@ class BugState:
                 is_done = True
         if not is_done:
             return self
-        return BugState(Mode.GOAL, self.turn, self.waypoint, attempts=self.attempts)
+        return NavigationState(Mode.GOAL, self.turn, self.waypoint, attempts=self.attempts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TangentBugMemory(Memory):
     """Memory of the robots, with their navigation states."""
 
-    bugs: tuple[BugState, ...] = ()
+    states: tuple[NavigationState, ...] = ()
     obstacle_squares: tuple[Squares, ...] = ()
     """The squares in which each robot has detected obstacle points."""
 
@@ -178,7 +178,7 @@ class TangentBug(BaseController):
     -----
     The implementation is based on the paper's abstract and on general knowledge, not on the full texts of the
     papers. The following choices are our own. A robot's centroid moves with the robot, and would draw it back
-    from each detour; therefore the goal is fixed from the time when the robot begins to follow a boundary
+    from each detour; therefore the goal is fixed from the time when the robot starts to follow a boundary
     until it is reached or given up. Because a boundary may be as long as the building, the robot follows it
     for at most `detour` times the distance to its goal, and then returns. It tries again after its centroid
     has moved by `moved`. Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots
@@ -210,22 +210,22 @@ class TangentBug(BaseController):
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         returns = update_returns(seen, memory.returns)
         obstacle_points = collect_obstacle_points(seen, returns)
-        bugs = memory.bugs or tuple(
-            BugState(Mode.GOAL, COUNTERCLOCKWISE, position) for position in seen.positions
+        states = memory.states or tuple(
+            NavigationState(Mode.GOAL, COUNTERCLOCKWISE, position) for position in seen.positions
         )
         obstacle_squares = memory.obstacle_squares or (frozenset(),) * len(team)
         # Robots navigate after each scan. Before the first one, they use the closest obstacle points instead.
-        if not memory.bugs or seen.scans is not None or returns is None:
+        if not memory.states or seen.scans is not None or returns is None:
             obstacle_squares = tuple(
                 _add_squares(squares, points)
                 for squares, points in zip(obstacle_squares, obstacle_points, strict=True)
             )
-            bugs = self._navigate(seen, team, bugs, cells.centroid, obstacle_points, obstacle_squares)
-        velocities = self._compute_velocities(seen, team, bugs, cells.centroid)
+            states = self._navigate(seen, team, states, cells.centroid, obstacle_points, obstacle_squares)
+        velocities = self._compute_velocities(seen, team, states, cells.centroid)
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
-        goals = [bug.get_goal(centroid) for bug, centroid in zip(bugs, cells.centroid, strict=True)]
+        goals = [state.get_goal(centroid) for state, centroid in zip(states, cells.centroid, strict=True)]
         return Decision(
             forces=forces,
             goals=np.array(goals),
@@ -235,7 +235,7 @@ class TangentBug(BaseController):
                 team=team,
                 returns=returns,
                 triangulation=cells.triangulation,
-                bugs=bugs,
+                states=states,
                 obstacle_squares=obstacle_squares,
             ),
         )
@@ -244,17 +244,17 @@ class TangentBug(BaseController):
         self,
         seen: Observations,
         team: Team,
-        bugs: tuple[BugState, ...],
+        states: tuple[NavigationState, ...],
         centroids: Array,
         obstacle_points: Array,
         obstacle_squares: tuple[Squares, ...],
-    ) -> tuple[BugState, ...]:
+    ) -> tuple[NavigationState, ...]:
         """Return the navigation states of all robots after a scan."""
         directions = compute_ray_directions(self.scanning.rays)
-        updated_bugs = []
-        for i, bug in enumerate(bugs):
+        updated_states = []
+        for i, state in enumerate(states):
             position = seen.positions[i]
-            bug = bug.release_goal(position, centroids[i], self.moved)
+            state = state.release_goal(position, centroids[i], self.moved)
             points = obstacle_points[i] - position
             clearance = float(team.radius[i]) + self.clearance
             reach = min(float(team.sensing_range[i]), seen.region.diameter)
@@ -269,24 +269,26 @@ class TangentBug(BaseController):
                 controller=self,
                 view=view,
                 position=position,
-                goal=bug.get_goal(centroids[i]) - position,
+                goal=state.get_goal(centroids[i]) - position,
                 obstacle_squares=obstacle_squares[i],
             )
-            updated_bugs.append(navigator.update(bug))
-        return tuple(updated_bugs)
+            updated_states.append(navigator.update(state))
+        return tuple(updated_states)
 
     def _compute_velocities(
-        self, seen: Observations, team: Team, bugs: tuple[BugState, ...], centroids: Array
+        self, seen: Observations, team: Team, states: tuple[NavigationState, ...], centroids: Array
     ) -> Array:
         """Return the desired velocities toward the waypoints, (n, 2) m/s."""
-        waypoints = np.array([bug.waypoint for bug in bugs])
-        is_passing = np.array([bug.is_passing for bug in bugs])
+        waypoints = np.array([state.waypoint for state in states])
+        passes_waypoint = np.array([state.passes_waypoint for state in states])
         # A robot with its centroid in view follows it until the next scan.
-        follows_centroid = np.array([bug.fixed_goal is None and not bug.is_passing for bug in bugs])
+        follows_centroid = np.array(
+            [state.fixed_goal is None and not state.passes_waypoint for state in states]
+        )
         waypoints = np.where(follows_centroid[:, None], centroids, waypoints)
         offsets = waypoints - seen.positions
         distance = np.hypot(*offsets.T)
-        speed = np.where(is_passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
+        speed = np.where(passes_waypoint, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
         # A waypoint that is close must not be overshot.
         speed = np.minimum(speed, distance / self.response_time)
         return compute_approach_velocities(offsets, math.inf, speed)
@@ -382,69 +384,96 @@ class Navigator:
     obstacle_squares: Squares
     """Squares in which it has detected obstacle points."""
 
-    def update(self, bug: BugState) -> BugState:
-        """Return the navigation state after the scan."""
-        is_goal_in_view = self.view.contains(self.goal)
-        is_free_ahead = self.view.compute_free_distance(self.goal) >= self.view.reach - _ROUNDING_M
-        if is_goal_in_view or (bug.mode is Mode.GOAL and is_free_ahead):
-            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
-        if bug.mode is Mode.PROJECTED:
-            return bug
-        if bug.mode is Mode.LEAVING:
-            offset = bug.waypoint - self.position
-            if math.hypot(*offset) > _RETURN_RADIUS_M and self.view.contains(offset):
-                return bug
-            assert bug.fixed_goal is not None
-            # The next point at which it leaves a boundary has to be nearer to the goal.
-            goal = replace(bug.fixed_goal, best_point=bug.waypoint)
-            bug = replace(bug, mode=Mode.GOAL, fixed_goal=goal)
-        if bug.mode is Mode.GOAL:
-            return self._move_to_goal(bug)
-        return self._follow_boundary(bug)
+    def update(self, state: NavigationState) -> NavigationState:
+        """Return the navigation state after the scan.
 
-    def _head_for(self, bug: BugState, mode: Mode, waypoint: Array, *, is_passing: bool = False) -> BugState:
-        """Return the state of a robot that moves through free space."""
-        return replace(bug, mode=mode, waypoint=freeze(waypoint), is_passing=is_passing, boundary=None)
+        In any mode, a robot moves straight to its goal once that is in view. Otherwise, the mode decides.
+        """
+        if self.view.contains(self.goal):
+            return self._head_for(state, Mode.GOAL, self.position + self.goal)
+        if state.mode is Mode.BEST_POINT:
+            return state
+        if state.mode in (Mode.BOUNDARY, Mode.RETURN):
+            return self._follow_boundary(state)
+        if state.mode is Mode.LEAVING:
+            if self._must_approach_waypoint(state):
+                return state
+            state = self._finish_leaving(state)
+        elif self._is_free_ahead():
+            return self._head_for(state, Mode.GOAL, self.position + self.goal)
+        return self._move_to_goal(state)
 
-    def _move_to_goal(self, bug: BugState) -> BugState:
+    def _is_free_ahead(self) -> bool:
+        """Return whether the sensor sees no obstacle on the straight path to the goal."""
+        return self.view.compute_free_distance(self.goal) >= self.view.reach - _ROUNDING_M
+
+    def _must_approach_waypoint(self, state: NavigationState) -> bool:
+        """Return whether the waypoint is in view, and the robot has not yet reached it."""
+        offset = state.waypoint - self.position
+        return math.hypot(*offset) > _RETURN_RADIUS_M and self.view.contains(offset)
+
+    def _finish_leaving(self, state: NavigationState) -> NavigationState:
+        """Return the state of a robot that has left a boundary, and moves to its goal again."""
+        assert state.fixed_goal is not None
+        # The next point at which it leaves a boundary has to be nearer to the goal.
+        goal = replace(state.fixed_goal, best_point=state.waypoint)
+        return replace(state, mode=Mode.GOAL, fixed_goal=goal)
+
+    def _head_for(
+        self, state: NavigationState, mode: Mode, waypoint: Array, *, passes_waypoint: bool = False
+    ) -> NavigationState:
+        """Return the state of a robot that moves straight to a waypoint through free space."""
+        return replace(
+            state, mode=mode, waypoint=freeze(waypoint), passes_waypoint=passes_waypoint, boundary=None
+        )
+
+    def _move_to_goal(self, state: NavigationState) -> NavigationState:
         """Return the state of a robot that moves to the goal, past the obstacle that blocks the path."""
         ends = self.view.find_contour_ends(self.goal, self.controller.jump)
         remaining = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
         path_lengths = {turn: math.hypot(*end.point) + remaining[turn] for turn, end in ends.items()}
-        if bug.turn in ends:
+        if state.turn in ends:
             # The robot does not alternate between two ends with about the same path length.
-            path_lengths[bug.turn] -= _MIN_IMPROVEMENT_M
+            path_lengths[state.turn] -= _MIN_IMPROVEMENT_M
         goal_distance = math.hypot(*self.goal)
         approaching_turns = [turn for turn in ends if remaining[turn] < goal_distance]
-        turn = min(approaching_turns or ends, key=path_lengths.__getitem__, default=bug.turn)
-        bug = replace(bug, turn=turn)
+        turn = min(approaching_turns or ends, key=path_lengths.__getitem__, default=state.turn)
+        state = replace(state, turn=turn)
         if approaching_turns:
-            return self._head_for(bug, Mode.GOAL, self.position + ends[turn].point, is_passing=True)
-        return self._enter_boundary(bug, ends)
+            return self._head_for(state, Mode.GOAL, self.position + ends[turn].point, passes_waypoint=True)
+        return self._enter_boundary(state, ends)
 
-    def _enter_boundary(self, bug: BugState, ends: dict[int, ContourEnd]) -> BugState:
-        """Return the state of a robot that fixes its goal, and begins to follow a boundary."""
-        attempts = bug.attempts
+    def _enter_boundary(self, state: NavigationState, ends: dict[int, ContourEnd]) -> NavigationState:
+        """Fix the goal where it is now, start to follow a boundary, and return the new state.
+
+        If the goal is blocked, or the robot may follow the boundary only for a short length, it moves to its
+        best point instead.
+        """
+        attempts = state.attempts
         best_point = None
-        if bug.fixed_goal is None:
+        if state.fixed_goal is None:
             attempts += 1
         else:
-            best_point = bug.fixed_goal.best_point
-        max_length = math.inf
-        if self.controller.detour is not None:
-            max_length = self.controller.detour * math.hypot(*self.goal) * _PATIENCE_DECAY**attempts
+            best_point = state.fixed_goal.best_point
+        max_length = self._compute_max_boundary_length(attempts)
         position = freeze(self.position)
-        bug = replace(
-            bug,
+        state = replace(
+            state,
             mode=Mode.BOUNDARY,
-            is_passing=True,
+            passes_waypoint=True,
             attempts=attempts,
             fixed_goal=FixedGoal(freeze(self.position + self.goal), best_point),
             boundary=FollowedBoundary(position, position, length=0.0, max_length=max_length),
         )
         if self._is_goal_blocked() or max_length < _MIN_BOUNDARY_LENGTH_M:
-            return self._move_to_best_point(bug, self._find_best_point(bug, ends))
-        return self._follow_boundary(bug)
+            return self._move_to_best_point(state, self._find_best_point(state, ends))
+        return self._follow_boundary(state)
+
+    def _compute_max_boundary_length(self, attempts: int) -> float:
+        """Return the length after which the robot gives up a boundary, m; shorter with each attempt."""
+        if self.controller.detour is None:
+            return math.inf
+        return self.controller.detour * math.hypot(*self.goal) * _MAX_LENGTH_DECAY**attempts
 
     def _is_goal_blocked(self) -> bool:
         """Return whether the goal is in a known obstacle, or too close to one."""
@@ -454,38 +483,38 @@ class Navigator:
         distance = np.hypot(*(self.goal - (centers - self.position)).T).min()
         return bool(distance < self.view.clearance + _SQUARE_SIDE_M)
 
-    def _follow_boundary(self, bug: BugState) -> BugState:
+    def _follow_boundary(self, state: NavigationState) -> NavigationState:
         """Return the state of a robot that follows a boundary."""
-        assert bug.boundary is not None
-        assert bug.fixed_goal is not None
+        assert state.boundary is not None
+        assert state.fixed_goal is not None
         nearest_point = self.view.find_nearest_point()
         if nearest_point is None:
-            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
+            return self._head_for(state, Mode.GOAL, self.position + self.goal)
         ends = self.view.find_contour_ends(nearest_point, self.controller.jump)
         # A closed contour has no end to move to.
-        offset = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
-        boundary = bug.boundary.extend(self.position)
-        best_point = self._find_best_point(bug, ends)
-        bug = replace(
-            bug,
+        offset = ends[state.turn].point if state.turn in ends else np.zeros(2)
+        boundary = state.boundary.extend(self.position)
+        best_point = self._find_best_point(state, ends)
+        state = replace(
+            state,
             waypoint=freeze(self.position + offset),
-            fixed_goal=replace(bug.fixed_goal, best_point=best_point),
+            fixed_goal=replace(state.fixed_goal, best_point=best_point),
             boundary=boundary,
         )
-        if bug.mode is Mode.RETURN:
+        if state.mode is Mode.RETURN:
             if boundary.length > _MAX_RETURN_FACTOR * boundary.max_length:
                 # The robot has lost its best point, and stays where it is.
                 best_point = freeze(self.position)
-            return self._move_to_best_point(bug, best_point)
+            return self._move_to_best_point(state, best_point)
         leaving_point = self._find_leaving_point(best_point)
         if leaving_point is not None:
-            return self._head_for(bug, Mode.LEAVING, leaving_point, is_passing=True)
+            return self._head_for(state, Mode.LEAVING, leaving_point, passes_waypoint=True)
         is_around = boundary.is_around()
         if is_around or not ends or boundary.length > boundary.max_length:
             # After a full turn, the robot keeps going; otherwise it returns the way it came.
-            turn = bug.turn if is_around else -bug.turn
-            return self._move_to_best_point(replace(bug, mode=Mode.RETURN, turn=turn), best_point)
-        return bug
+            turn = state.turn if is_around else -state.turn
+            return self._move_to_best_point(replace(state, mode=Mode.RETURN, turn=turn), best_point)
+        return state
 
     def _find_leaving_point(self, best_point: Array) -> Array | None:
         """Return the point in view nearest to the goal, (2,) m, if it is nearer than the best point."""
@@ -498,9 +527,9 @@ class Navigator:
             return None
         return np.asarray(self.position + depths[ray] * directions[ray])
 
-    def _find_best_point(self, bug: BugState, ends: dict[int, ContourEnd]) -> Array:
+    def _find_best_point(self, state: NavigationState, ends: dict[int, ContourEnd]) -> Array:
         """Return the boundary point, followed so far or now in view, that is nearest to the goal, (2,) m."""
-        assert bug.fixed_goal is not None
+        assert state.fixed_goal is not None
         rays = np.arange(len(self.view.free_distances))
         if len(ends) == 2:
             # The contour extends counter-clockwise from one end to the other.
@@ -508,29 +537,29 @@ class Navigator:
             count = (ends[COUNTERCLOCKWISE].ray - first) % len(rays)
             rays = np.sort((first + np.arange(count)) % len(rays))
         best_so_far = np.zeros(2)
-        if bug.fixed_goal.best_point is not None:
-            best_so_far = bug.fixed_goal.best_point - self.position
+        if state.fixed_goal.best_point is not None:
+            best_so_far = state.fixed_goal.best_point - self.position
         contour = self.view.free_distances[rays, None] * self.view.directions[rays]
         points = np.vstack([best_so_far, contour])
         nearest = np.hypot(*(self.goal - points).T).argmin()
         return freeze(self.position + points[nearest])
 
-    def _move_to_best_point(self, bug: BugState, best_point: Array) -> BugState:
+    def _move_to_best_point(self, state: NavigationState, best_point: Array) -> NavigationState:
         """Return the state of a robot that heads for its best point if that is in view, or returns to it."""
-        assert bug.fixed_goal is not None
-        goal = replace(bug.fixed_goal, best_point=best_point, resting_centroid=None)
+        assert state.fixed_goal is not None
+        goal = replace(state.fixed_goal, best_point=best_point, resting_centroid=None)
         offset = best_point - self.position
         distance = math.hypot(*offset)
         free_distance = self.view.compute_free_distance(offset)
         # Seen from here, the boundary may be a little closer to the point than it was before.
         if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.view.clearance:
-            return replace(bug, mode=Mode.RETURN, fixed_goal=goal)
+            return replace(state, mode=Mode.RETURN, fixed_goal=goal)
         fraction = min(1.0, free_distance / max(distance, _MIN_LENGTH))
         return replace(
-            bug,
-            mode=Mode.PROJECTED,
+            state,
+            mode=Mode.BEST_POINT,
             waypoint=freeze(self.position + offset * fraction),
-            is_passing=False,
+            passes_waypoint=False,
             fixed_goal=goal,
             boundary=None,
         )

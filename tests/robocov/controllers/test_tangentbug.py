@@ -145,10 +145,10 @@ def test_the_goal_is_fixed_while_a_robot_follows_a_boundary() -> None:
     modes = set()
     for _ in range(round(20 / DT)):
         simulation.step()
-        bug = simulation.memory.bugs[0]
-        modes.add(bug.mode)
-        if bug.mode is Mode.BOUNDARY:
-            np.testing.assert_allclose(bug.fixed_goal.position, [5.0, 5.0], atol=1e-9)
+        state = simulation.memory.states[0]
+        modes.add(state.mode)
+        if state.mode is Mode.BOUNDARY:
+            np.testing.assert_allclose(state.fixed_goal.position, [5.0, 5.0], atol=1e-9)
     assert modes >= {Mode.GOAL, Mode.BOUNDARY}
 
 
