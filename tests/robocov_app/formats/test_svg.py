@@ -310,7 +310,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"<svg><g xlink:href='#a'/></svg>", ":1: not XML: unbound prefix"),
         (b"<html><svg/></html>", ": expected <svg>, got <html>"),
         (b"<x:y xmlns:x='urn:z'/>", ": expected <svg>, got other XML"),
-        (b"\x1f\x8b\x08", ": expected plain SVG, got compressed"),
+        (b"\x1f\x8b\x08", ": expected plain SVG, got a gzip-compressed file"),
         (
             b"<!DOCTYPE svg [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><svg>&a;</svg>",
             ":2: expected plain SVG, got an entity 'a' that refers to another file ('file:///etc/passwd')",
@@ -332,7 +332,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"<!DOCTYPE svg [<!ATTLIST g" + b" a CDATA ''" * 1001 + b">]><svg/>", "more than 1000 declarations"),
         (b"<svg xmlns='" + b"x" * 2000 + b"'/>", "a namespace of 2000 characters"),
         (b"<svg>&lol;</svg>", "not XML: undefined entity"),
-        ("<!DOCTYPE svg [<!ENTITY a SYSTEM 'b'>]><svg/>".encode("utf-16"), "stands for another file"),
+        ("<!DOCTYPE svg [<!ENTITY a SYSTEM 'b'>]><svg/>".encode("utf-16"), "refers to another file"),
         (b"<?xml version='1.0' encoding='EBCDIC-CP-BE'?><svg/>", "not XML: "),
         (b"<svg width='0' height='5'/>", "<svg>: expected a size, got 0 x 5 px"),
         (b"<svg data-origin='1'/>", "<svg>: expected two numbers"),

@@ -194,6 +194,7 @@ def list_state(driver: Driver) -> list[object]:
         [pane.controller for pane in session.timeline.panes],
         window.canvas._painters[0].camera,
         window.is_help_open,
+        window.layer_bar.is_open,
         window.dialogs.is_open,
         window.lesson.player,
         window.panel.tab,
