@@ -153,7 +153,9 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
     start = max(start, 0.0)
     step = choose_tick_step(end - start, max_intervals)
     start = float(f"{step * math.floor(start / step):.12g}")
-    return Axis(start, float(f"{end:.6g}"), step)
+    # Rounding must not cut off the highest value of a short axis.
+    end = max(float(f"{end:.6g}"), high)
+    return Axis(start, end, step)
 
 
 def choose_growing_time_limit(end_s: float) -> float:

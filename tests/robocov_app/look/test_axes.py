@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from robocov_app.look.axes import (
@@ -45,6 +45,7 @@ def test_window_and_figures_start_at_zero_for_the_same_values(low: float, differ
         assert choose_growing_value_axis(low, high, 5).start == 0.0
 
 
+@example(low=10.71875, difference=6.103515625e-05, max_intervals=1.0)
 @given(st.floats(1e-3, 1e3), st.floats(0.0, 1e3), st.floats(1.0, 8.0))
 def test_growing_axis_contains_all_values(low: float, difference: float, max_intervals: float) -> None:
     axis = choose_growing_value_axis(low, low + difference, max_intervals)
