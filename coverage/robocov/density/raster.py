@@ -279,15 +279,15 @@ def _build_grid(raster: Raster) -> _Grid:
 
 
 def _integrate_rows(coefficients: Array) -> Array:
-    """Return the integrals of φ, u φ and u² φ along a row from the left side of the grid to each square.
+    """Return the integrals of φ, u φ and u² φ along a row, from the left edge of the grid to each square.
 
-    In a square, φ is the polynomial of `_Grid`, with u = i + ξ in column i. The result contains the integrals
-    at η = 0, and their increase to η = 1, (3, 2, rows, columns); see `_Grid.left`.
+    In a square, φ is the polynomial of `_Grid`, with u = i + ξ in column i. The result has the shape
+    (3, 2, rows, columns): index 0 of the second axis holds the integrals at η = 0, and index 1 their change
+    from η = 0 to η = 1; see `_Grid.left`.
     """
     constant, slope_x, slope_y, twist = coefficients
     i = np.arange(constant.shape[1])
-    # Along a row, φ is start + slope ξ. The first entry of each is that at η = 0, the second its increase to
-    # η = 1.
+    # Along a row, φ is start + slope ξ. Index 0 is the value at η = 0, index 1 the change to η = 1.
     start = np.stack([constant, slope_y])
     slope = np.stack([slope_x, twist])
     # Integrals over ξ from 0 to 1 of φ, ξ φ and ξ² φ.

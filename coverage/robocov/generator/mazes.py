@@ -177,7 +177,7 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
 def _clear_disc(
     request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner_disc: DiscStart
 ) -> bool:
-    """Remove the walls that a disc touches; return whether there were any."""
+    """Remove the walls that touch the disc, and return whether any were removed."""
     x = _compute_lines(request, request.width, shape[0], thickness)
     y = _compute_lines(request, request.height, shape[1], thickness)
     segments = _list_segments(walls)

@@ -539,9 +539,9 @@ def _choose_candidate_stride(site_count: int, robot_count: int) -> int:
 
 
 def _build_configuration_space(components: NDArray[np.object_], radius: float) -> shapely.Geometry:
-    """Return the area of some components where the center of a robot may be, with coordinates in meters.
+    """Return the region of the given components in which the center of a robot may lie, in meters.
 
-    It may be slightly too large, but never too small, so that the bound holds for every placement.
+    The region may be slightly too large but is never too small, so the bound holds for every placement.
     """
     # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which makes
     # the area larger.

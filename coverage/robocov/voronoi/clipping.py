@@ -332,9 +332,9 @@ def _add_crossing(
     """Add a vertex to `cut_polygon` at the point where an edge of `polygon` crosses the current bisector.
 
     The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
-    the other side. The crossing follows by linear interpolation from their excesses, which are proportional
-    to their distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`. `other_cell` is the
-    cell on the other side of the edge that begins there.
+    the other side. The crossing is interpolated linearly from their excesses, which are proportional to
+    their signed distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`. `other_cell` is
+    the neighboring cell across the edge that starts at the new vertex.
     """
     inner_excess = polygon[inner, _EXCESS]
     fraction = inner_excess / (inner_excess - polygon[outer, _EXCESS])

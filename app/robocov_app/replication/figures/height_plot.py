@@ -172,14 +172,16 @@ def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]
 
 
 def _find_frame(points: Array, aspect: float) -> PageBox:
-    """Return low x, low y, width and height of the enlarged frame, m, with an aspect.
+    """Return low x, low y, width and height, m, of the frame that is enlarged, with the given aspect ratio.
 
-    It contains all points, (k, 2) m, and leaves space for labels, most of it on the right.
+    The frame contains all points, (k, 2) m, and leaves space for labels, most of it on the right.
     """
     low = points.min(axis=0)
     high = points.max(axis=0)
-    width, height = (high - low) * _FRAME_FACTORS
-    width, height = max(width, height * aspect), max(height, width / aspect)
+    min_width, min_height = (high - low) * _FRAME_FACTORS
+    # The frame is extended in one direction to have this aspect ratio.
+    width = max(min_width, min_height * aspect)
+    height = max(min_height, min_width / aspect)
     return (
         float(low[0] - _FRAME_LEFT_FRACTION * width),
         float((low[1] + high[1] - height) / 2.0),

@@ -266,7 +266,7 @@ Parameter = NumberParameter | OptionParameter
 
 
 def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
-    """Yield a parameter for each gain of a controller; all but the first few numbers are advanced."""
+    """Yield a parameter for each gain; numeric ones after the first `MAX_BASIC_GAINS` are advanced."""
     number_count = 0
     for name, gain in controller.available_gains.items():
         value = controller.get_value(name)
@@ -314,7 +314,7 @@ def label_gain(name: str, controller: str = "") -> str:
 def _build_gain_parameter(
     name: str, label: str, gain: Gain, value: Value, *, is_advanced: bool
 ) -> NumberParameter:
-    """Build the parameter of a numeric gain; its slider covers a range around the default value."""
+    """Build the parameter for a numeric gain, with a slider range around its default value."""
     reference_value = min(max(gain.default or 1.0, gain.low), gain.high)
     if reference_value > 0 and gain.low >= 0:
         lowest = reference_value / SLIDER_SPAN

@@ -190,14 +190,14 @@ def _select_cached_states(recorded: list[RunState], cached: list[RunState]) -> l
 
 
 def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, dt: float) -> None:
-    """Prepend the trail stored in the nodes of a path to that of the steps that were simulated again.
+    """Prepend the trail stored in the nodes of a path to the trail of the steps simulated again.
 
     Parameters
     ----------
     path : list of Node
         Nodes from the root of the run to the present.
     last_steps : mapping of int to int
-        Last step of each node on the path, by its number.
+        Last step of each node on the path, keyed by node number.
     pane : Pane
         Pane whose trail is extended.
     dt : float, s
@@ -243,7 +243,7 @@ def _add_cached_states(history: RunHistory, path: list[Node], last_steps: Mappin
     path : list of Node
         Nodes from the root of the run to the end of the branch.
     last_steps : mapping of int to int
-        Last step of each node on the path, by its number.
+        Last step of each node on the path, keyed by node number.
     """
     first_missing = 0
     if len(history):

@@ -121,7 +121,7 @@ class AddCircleTool(SegmentTool):
         return add_obstacle(session, map_edits.build_circle(center, event.unsnapped_point), self.name)
 
     def build_overlay(self, session: Session) -> ViewerToolOverlay:
-        """Return a preview of the circle up to the cursor."""
+        """Return a preview of the circle whose rim passes through the cursor."""
         center = self.segment.start
         if center is None:
             return ViewerToolOverlay()

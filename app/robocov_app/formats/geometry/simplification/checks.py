@@ -99,7 +99,7 @@ class SimplificationCheck:
         return has_wrong_area, is_too_far
 
     def _find_distant_vertices(self) -> BoolArray:
-        """Select, for each side, the farthest of the vertices that it represents, if it is too far away."""
+        """Mark the farthest vertex represented by each side if its distance exceeds the tolerance."""
         simplified = self.simplified
         points = self.outline.points
         allowed = self.allowed
