@@ -160,9 +160,9 @@ def prepare(driver: Driver) -> None:
     viewer.tool.move(session, build_event((6.5, 7.5)))
     session.playback.step()
     session.show_time(0.7)
-    window.canvas.fit()
+    window.canvas.camera.fit()
     window.canvas.zoom(1.4, (200, 200))
-    window.canvas.pan(20, 20)
+    window.canvas.camera.pan(20, 20)
     viewer.message = ""
 
 

@@ -27,14 +27,14 @@ def test_the_point_under_the_pointer_stays_there() -> None:
 def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:
     canvas = driver.window.canvas
     whole = canvas.to_pixel((1.0, 1.0))
-    canvas.is_animated = True
+    canvas.camera.is_animated = True
     driver.window.do("zoom:in")
     assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(whole)
     assert driver.window.build_frame_key() is None
     driver.run_frames(1)
     between = canvas.to_pixel((1.0, 1.0))
     driver.run_frames(15)
-    assert not canvas.is_moving
+    assert not canvas.camera.is_moving
     zoomed = canvas.to_pixel((1.0, 1.0))
     assert len({whole, between, zoomed}) == 3
     driver.window.do("fit")
@@ -48,7 +48,7 @@ def test_quick_turns_of_the_wheel_add_up(driver: Driver) -> None:
         driver.window.do("zoom:in")
     zoomed = canvas.to_pixel((1.0, 1.0))
     driver.window.do("fit")
-    canvas.is_animated = True
+    canvas.camera.is_animated = True
     for _ in range(3):
         driver.window.do("zoom:in")
         driver.run_frames(1)
@@ -58,7 +58,7 @@ def test_quick_turns_of_the_wheel_add_up(driver: Driver) -> None:
 
 def test_motion_can_be_switched_off(driver: Driver) -> None:
     canvas = driver.window.canvas
-    canvas.is_animated = True
+    canvas.camera.is_animated = True
     driver.window.do("motion")
     driver.window.do("zoom:in")
-    assert not canvas.is_moving
+    assert not canvas.camera.is_moving

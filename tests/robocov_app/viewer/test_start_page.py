@@ -49,7 +49,7 @@ def press(page: StartPage, *names: str) -> None:
 
 
 def click(page: StartPage, name: str) -> None:
-    item = next(item for item in page.items if item.name == name)
+    item = next(item for item in page.focus.items if item.name == name)
     pygame.event.post(pygame.event.Event(pygame.MOUSEMOTION, pos=item.box.center, rel=(0, 0), buttons=()))
     pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=item.box.center, button=1))
     page.run_frame(0.02)
@@ -71,11 +71,11 @@ def test_everything_is_inside_the_window_and_nothing_overlaps(
 ) -> None:
     recent = [tmp_path / f"{number}.robocov" for number in range(9)] if has_recent else []
     with open_page(size, recent) as page:
-        boxes = [item.box for item in page.items]
+        boxes = [item.box for item in page.focus.items]
         assert all(page.screen.get_rect().contains(box) for box in boxes)
         assert not any(first.colliderect(second) for first, second in itertools.combinations(boxes, 2))
-        assert len([item for item in page.items if item.name.startswith("card:")]) == 6
-        assert any(item.name.startswith("recent:") for item in page.items) == has_recent
+        assert len([item for item in page.focus.items if item.name.startswith("card:")]) == 6
+        assert any(item.name.startswith("recent:") for item in page.focus.items) == has_recent
 
 
 @pytest.mark.parametrize("number", range(1, 7))
@@ -90,11 +90,11 @@ def test_a_card_is_chosen_by_its_key_and_by_a_click(number: int) -> None:
 def test_cards_and_maps_are_reached_by_tab_arrows_and_enter() -> None:
     with open_page() as page:
         press(page, "tab")
-        assert page.focus == "card:1"
+        assert page.focus.name == "card:1"
         press(page, "right", "down")
-        assert page.focus == "card:5"
+        assert page.focus.name == "card:5"
         press(page, "down")
-        name = page.focus.removeprefix("map:")
+        name = page.focus.name.removeprefix("map:")
         press(page, "return")
         assert name in list_bundled_maps()
         assert page.choice == choose_map(name)
@@ -104,7 +104,7 @@ def test_all_maps_are_reached_by_the_arrows_beside_the_thumbnails() -> None:
     with open_page() as page:
         seen = set()
         for _ in range(len(list_bundled_maps())):
-            seen |= {item.name for item in page.items if item.name.startswith("map:")}
+            seen |= {item.name for item in page.focus.items if item.name.startswith("map:")}
             click(page, "maps:on")
         assert {f"map:{name}" for name in list_bundled_maps()} <= seen
 

@@ -134,7 +134,7 @@ class ViewerPointer(Pointer):
         is_right = event.button == RIGHT_BUTTON
         if event.button == LEFT_BUTTON or (is_right and self._viewer.tool.uses_right_button):
             return self._press_tool(event, pane, now)
-        return PanGesture(self._canvas.pan, self._click_without_tool)
+        return PanGesture(self._canvas.camera.pan, self._click_without_tool)
 
     def _press_chart(self, pixel: Pixel) -> Gesture | None:
         """Handle a press on the chart: switch the quantity, open a branch, or show the time at the mouse."""
@@ -173,7 +173,7 @@ class ViewerPointer(Pointer):
             self._viewer_panel.show_tab("robot")
         if hand.is_holding:
             return ViewerToolGesture(self, pane)
-        return PanGesture(canvas.pan, self._click_without_tool)
+        return PanGesture(canvas.camera.pan, self._click_without_tool)
 
     def build_event(self, pixel: Pixel, pane: int, *, is_right: bool = False) -> ViewerPointerEvent:
         """Build the tool event for a pixel of a pane; the point is snapped to the map if the tool snaps.

@@ -137,9 +137,9 @@ class ViewerWindow(CommandWindow):
         self.video: ScreenVideo | None = None
         self.run_saver = RunSaver(viewer.costs.lattice)
         self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
-        self.canvas.is_animated = not is_unattended
+        self.canvas.camera.is_animated = not is_unattended
         self.chart = Chart(viewer)
-        self.lesson = LessonGuide(viewer, self.canvas.fit, is_unattended=is_unattended)
+        self.lesson = LessonGuide(viewer, self.canvas.camera.fit, is_unattended=is_unattended)
         titles = {layer.name: layer.title for layer in build_standard_layers()}
         window_commands = list_window_commands(self.canvas, self.chart, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands]
@@ -216,7 +216,7 @@ class ViewerWindow(CommandWindow):
         super().restore_view()
         self.lesson.end()
         self.layer_bar.is_open = False
-        self.canvas.fit()
+        self.canvas.camera.fit()
 
     def close(self) -> None:
         """Save a draft of unsaved work, and end the lesson, the video and the cost computation."""
@@ -242,7 +242,7 @@ class ViewerWindow(CommandWindow):
         self._unrecorded_s += seconds
         self._pass_time(seconds)
         set_title(self.viewer.files.title)
-        self.canvas.update(seconds)
+        self.canvas.camera.update(seconds)
         self._cost_curves.update()
         self._arrange()
         self._inspector.update(self.viewer.now)
@@ -263,7 +263,7 @@ class ViewerWindow(CommandWindow):
         )
         if (
             self.video is not None
-            or self.canvas.is_moving
+            or self.canvas.camera.is_moving
             or (session.playback.is_playing and not is_at_rest)
         ):
             return None

@@ -1,0 +1,108 @@
+"""The camera that all panes share: it shows the whole map, zooms, pans and glides."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.render.camera import Camera
+from robocov_app.render.painter import Painter
+from robocov_app.toolkit.tools.viewport import zoom_about
+from robocov_app.viewer.canvas.camera_glide import CameraGlide
+from robocov_app.viewer.presenter import Presenter
+
+MAX_GLIDE_STEP_S = 0.05
+
+
+class SharedCamera:
+    """Gives the painters of all panes the same camera.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+
+    Attributes
+    ----------
+    is_animated : bool
+        Whether the camera may glide; False while the window is unattended.
+    """
+
+    def __init__(self, viewer: Presenter) -> None:
+        self.is_animated = False
+        self._viewer = viewer
+        self._painters: Sequence[Painter] = ()
+        self._camera: Camera | None = None  # None while the whole map is shown
+        self._glide: CameraGlide | None = None  # towards `_camera`, while it lasts
+
+    def attach(self, painters: Sequence[Painter]) -> None:
+        """Let these painters, of one pane each, show what the previous ones showed."""
+        self._painters = painters
+        if self._camera is not None:
+            self._pass_to_painters(self._camera)
+
+    def fit(self) -> None:
+        """Show the whole map at once."""
+        self._glide = None
+        self._camera = None
+        for painter in self._painters:
+            painter.fit()
+
+    def show_whole_map(self) -> None:
+        """Show the whole map, after a smooth change of the camera."""
+        start = self._painters[0].camera
+        self.fit()
+        self._glide_from(start)
+
+    def zoom(self, factor: float, pane: int, pixel: tuple[float, float]) -> None:
+        """Zoom by a factor about a pixel of a pane."""
+        start = self._painters[pane].camera
+        # Quick turns of the wheel add up, although the map has not yet followed.
+        target = start if self._glide is None else self._glide.end.with_view(start.view)
+        map_size = float(np.ptp(self._get_bounds(), axis=0).max())
+        self._show(zoom_about(target, factor, pixel, map_size))
+        self._glide_from(start)
+
+    def pan(self, dx: float, dy: float) -> None:
+        """Move the map by dx and dy pixels; the center of the view stays within the bounds of the map."""
+        camera = self._painters[0].camera.pan(dx, dy)
+        x, y = np.clip(camera.center, *self._get_bounds()).tolist()
+        self._show(replace(camera, center=(x, y)))
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the camera is gliding."""
+        return self._glide is not None
+
+    def update(self, seconds: float) -> None:
+        """Advance a change of the camera by real time, s."""
+        if self._glide is None:
+            return
+        # After a rest, the time since the previous frame may be longer than the whole change.
+        camera = self._glide.advance(min(seconds, MAX_GLIDE_STEP_S))
+        if self._glide.is_over:
+            self._glide = None
+        self._pass_to_painters(camera)
+        if self._glide is None and self._camera is None:
+            self.fit()
+
+    def _show(self, camera: Camera) -> None:
+        """Show the section of the map that a camera shows, at once."""
+        self._glide = None
+        self._camera = camera
+        self._pass_to_painters(camera)
+
+    def _glide_from(self, start: Camera) -> None:
+        """Let the camera glide from `start` to the present one, unless the user prefers no motion."""
+        if self.is_animated and self._viewer.view.has_motion:
+            self._glide = CameraGlide(start, self._painters[0].camera.with_view(start.view))
+            self.update(0.0)
+
+    def _pass_to_painters(self, camera: Camera) -> None:
+        for painter in self._painters:
+            painter.camera = camera.with_view(painter.camera.view)
+
+    def _get_bounds(self) -> Array:
+        """Return the bounds of the map as rows (x_min, y_min) and (x_max, y_max), (2, 2) m."""
+        return np.reshape(self._viewer.session.displayed.environment.region.bounds, (2, 2))
