@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
-from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, style_axes, to_plot_color
+from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.theme import LIGHT, Theme
 
 NOTE = "medians of alternating calls on one thread; below 1 robocov is faster; a bar marks the goal"
@@ -92,7 +92,7 @@ def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) 
     page.write(heading, _MARGIN_PX, top + _HEADING_OFFSET_PX, points=TEXT + 1.5, bold=True)
     axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
     width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
-    axes = page.add_axes((_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
+    axes = page.add_axes(PageBox(_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
     style_axes(axes, page.theme, grid="x")
     axes.set_xscale("log")
     axes.axvline(1.0, color=to_plot_color(page.theme.faint), linewidth=1)

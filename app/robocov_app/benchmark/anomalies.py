@@ -16,8 +16,8 @@ MIN_PATH_LENGTH_M = 0.1
 MAX_RAPF_RATIO = 1.2
 """A team ends far above RAPF if the ratio of its final cost to that of RAPF in the same run exceeds this."""
 
-_Costs: TypeAlias = dict[tuple[str, tuple[str, int]], float]
-"""Final mean distances by track and run, m."""
+_RunValues: TypeAlias = dict[tuple[str, tuple[str, int]], float]
+"""A value for each run, by track and run."""
 
 
 class Anomaly(NamedTuple):
@@ -67,8 +67,8 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
     return anomalies
 
 
-def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _Costs:
-    """Return the final mean distances of the runs that did not fail."""
+def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _RunValues:
+    """Return the final mean distances, m, of runs that did not fail, without those that are unknown or 0."""
     return {
         (row["track"], get_run_key(row)): row["mean_distance_m"]
         for row in rows
@@ -76,7 +76,7 @@ def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _Costs:
     }
 
 
-def _find_better_tracks(ratios: _Costs) -> set[str]:
+def _find_better_tracks(ratios: _RunValues) -> set[str]:
     """Return the tracks on which the median ratio of the costs to those of RAPF is below 1."""
     ratios_by_track: dict[str, list[float]] = {}
     for (track, _), ratio in ratios.items():

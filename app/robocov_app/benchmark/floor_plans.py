@@ -34,6 +34,8 @@ _MIN_PASSAGE_M = 0.6
 _INNER_WALL_M = 0.12
 _HALF_WALL_M = _INNER_WALL_M / 2.0
 _START_RADIUS_M = 0.6
+_START_MARGIN_M = 0.01
+"""Distance of the start disc from walls, so that the disc is still free when its center has been rounded."""
 _MIN_BLOCKED_FRACTION = 0.04
 _MIN_WALL_PIECE_M = 0.15
 
@@ -108,6 +110,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
         if start is None:
             continue
         document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": start}))
+        # Reading the plan as a map file checks it. A plan that is no valid map is replaced by another one.
         with suppress(MapError):
             return from_json(document, plan.name)
     raise ParameterError(
@@ -128,7 +131,7 @@ def _has_enough_obstacles(plan: Environment) -> bool:
 
 def _find_entry(plan: Environment) -> DiscStart | None:
     """Return the free start disc nearest to the lower left corner; None if there is no space for it."""
-    centers = plan.static.free.buffer(-_START_RADIUS_M - 0.01)
+    centers = plan.static.free.buffer(-_START_RADIUS_M - _START_MARGIN_M)
     if centers.is_empty:
         return None
     lower_left = shapely.Point(plan.region.bounds[:2])
@@ -239,7 +242,8 @@ class _Flat:
             Position of the wall; None, and no wall is added, if the range is only wide enough for one room.
         """
         rng = self._rng
-        if high - low < rng.uniform(4.6, 6.4):
+        min_width_of_two_rooms = rng.uniform(4.6, 6.4)
+        if high - low < min_width_of_two_rooms:
             return None
         split = low + (high - low) * rng.uniform(0.38, 0.62)
         door = rng.uniform(start + _HOME_DOOR_MARGIN_M, end - _HOME_DOOR_MARGIN_M)
@@ -265,33 +269,54 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
     """Draw an office floor: offices on one side of a corridor, an open space with desks on the other."""
     width = rng.uniform(16.0, 20.0)
     height = rng.uniform(10.0, 12.0)
-    low = height * rng.uniform(0.48, 0.56)
-    high = low + rng.uniform(1.4, 1.9)
+    corridor_low = height * rng.uniform(0.48, 0.56)
+    corridor_high = corridor_low + rng.uniform(1.4, 1.9)
+    # The order of the parts determines which random numbers each part gets.
+    obstacles = [
+        *_build_offices(rng, width, corridor_high, height),
+        *_build_open_space_wall(rng, width, corridor_low),
+        *_build_desks(rng, width, corridor_low),
+    ]
+    return _build_box(0.0, 0.0, width, height), obstacles
+
+
+def _build_offices(rng: np.random.Generator, width: float, low: float, high: float) -> list[Obstacle]:
+    """Draw a row of offices between two heights: walls, a door to the corridor for each, and some shelves."""
     obstacles: list[Obstacle] = []
     partitions = np.linspace(0.0, width, int(rng.integers(5, 8)))
     partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
     for left, right in itertools.pairwise(partitions.tolist()):
         door = rng.uniform(left + _OFFICE_DOOR_MARGIN_M, right - _OFFICE_DOOR_MARGIN_M)
         obstacles += _build_wall_with_door(
-            high, left, right, door=door, width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
+            low, left, right, door=door, width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
         )
         if right < width:
-            obstacles.append(WallObstacle(_round_points([(right, high), (right, height)]), _INNER_WALL_M))
+            obstacles.append(WallObstacle(_round_points([(right, low), (right, high)]), _INNER_WALL_M))
         if rng.random() < _SHELF_PROBABILITY:
-            shelf = _build_box(left + _HALF_WALL_M, height - _SHELF_DEPTH_M, left + _SHELF_END_M, height)
+            shelf = _build_box(left + _HALF_WALL_M, high - _SHELF_DEPTH_M, left + _SHELF_END_M, high)
             obstacles.append(PolygonObstacle(shelf))
+    return obstacles
+
+
+def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> list[Obstacle]:
+    """Draw the wall between the corridor and the open space, with two doors."""
     left_door = width * rng.uniform(0.15, 0.35)
     right_door = width * rng.uniform(0.65, 0.85)
     middle = width / 2.0
+    walls: list[Obstacle] = []
     for start, end, door in ((0.0, middle, left_door), (middle, width, right_door)):
-        obstacles += _build_wall_with_door(
-            low, start, end, door=door, width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
+        walls += _build_wall_with_door(
+            y, start, end, door=door, width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
         )
-    for x in np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6)):
-        for y in (_LOWER_DESKS_Y_M, low - _UPPER_DESKS_MARGIN_M):
-            if rng.random() < _DESK_PROBABILITY:
-                obstacles.append(_build_block(x, y, *_DESK_SIZE_M))
-    return _build_box(0.0, 0.0, width, height), obstacles
+    return walls
+
+
+def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[Obstacle]:
+    """Draw two rows of desks in an open space of a width and depth."""
+    columns_x = np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6))
+    rows_y = (_LOWER_DESKS_Y_M, depth - _UPPER_DESKS_MARGIN_M)
+    corners = itertools.product(columns_x, rows_y)
+    return [_build_block(x, y, *_DESK_SIZE_M) for x, y in corners if rng.random() < _DESK_PROBABILITY]
 
 
 def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
@@ -349,8 +374,9 @@ def _build_hedge(rng: np.random.Generator) -> Obstacle:
     angle = rng.uniform(0.0, np.pi)
     along = np.array((np.cos(angle), np.sin(angle)))
     across = np.array((-np.sin(angle), np.cos(angle)))
-    corner = np.array([0.0 * along, along, along + across])
-    return WallObstacle(_round_points(start + rng.uniform(1.4, 2.4) * corner), _HEDGE_WIDTH_M)
+    part_length = rng.uniform(1.4, 2.4)
+    corners = part_length * np.array([np.zeros(2), along, along + across])
+    return WallObstacle(_round_points(start + corners), _HEDGE_WIDTH_M)
 
 
 def _build_tree(rng: np.random.Generator) -> Obstacle:

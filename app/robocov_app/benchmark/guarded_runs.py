@@ -68,6 +68,7 @@ class GuardedService:
 
     def __call__(self, questions: list[Task | Replay], channel: Channel) -> ObservedRun | ReplayAnswer:
         """Execute a task and record it, or call the controller for the observations of a replay."""
+        # A guarded process gets a single question, see `GuardedProcesses`.
         question = questions[-1]
         task = question if isinstance(question, Task) else question.task
         guard = Guard(_list_modules(task))

@@ -29,7 +29,7 @@ MIN_P_VALUE = 0.001
 _MAX_MAP_SEED = 2**31
 _MAX_ATTEMPTS = 100
 _RANK_SAMPLES = 100_000
-_SAME_SUM = 1e-9
+_RANK_SUM_TOLERANCE = 1e-9
 """Tolerance in comparisons of sums of ranks."""
 
 
@@ -175,5 +175,5 @@ def _compute_p_value(observed_sum: float, sizes: Sequence[int]) -> float:
     sums = np.zeros(_RANK_SAMPLES)
     for size in sizes:
         sums += rng.integers(1, size + 1, _RANK_SAMPLES) / size
-    hits = np.count_nonzero(sums <= observed_sum + _SAME_SUM)
+    hits = np.count_nonzero(sums <= observed_sum + _RANK_SUM_TOLERANCE)
     return (1 + int(hits)) / (1 + _RANK_SAMPLES)

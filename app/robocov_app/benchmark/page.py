@@ -48,7 +48,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "µs per robot and second",
         lambda rating: 1e6 * rating.compute_rate("deciding_s"),
     ),
-    "told": Quantity(
+    "sent": Quantity(
         "bytes sent",
         "bytes a robot sends per second",
         lambda rating: rating.compute_rate("told_bytes"),
@@ -129,7 +129,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         yardsticks=_find_yardsticks(results, labels),
     )
     tracks = {
-        name: sorted(track_ratings, key=_sort_by_score)
+        name: sorted(track_ratings, key=_build_sort_key)
         for name, track_ratings in ratings.build_ratings(results).items()
     }
     if not tracks:
@@ -161,7 +161,7 @@ def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]
     return yardsticks
 
 
-def _sort_by_score(rating: Rating) -> tuple[bool, float]:
+def _build_sort_key(rating: Rating) -> tuple[bool, float]:
     """Return a sort key that puts complete ratings first, then higher scores."""
     return not rating.is_complete, -rating.score
 
@@ -250,11 +250,12 @@ def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) 
         if rating.is_complete:
             continue
         keys = [ratings.get_run_key(row) for row in rating.rows]
-        gaps = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
-        cells = [format_number(100.0 * each.compute_median("gap"), ".1f") for each in gaps]
+        compared = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
+        cells = [format_number(100.0 * other.compute_median("gap"), ".1f") for other in compared]
         runs = f"{rating.run_count} of {len(ratings.list_run_keys(rating.track))}"
         rows.append((rating.label, entries.information[rating.label], runs, *cells))
-    head = ("Controller", "Knows", "Runs", "Gap, %", *(f"{each.label}, %" for each in yardsticks))
+    yardstick_headings = [f"{yardstick.label}, %" for yardstick in yardsticks]
+    head = ("Controller", "Knows", "Runs", "Gap, %", *yardstick_headings)
     caption = "Incomplete entries, not ranked: median gaps over their own runs"
     return PageTable(caption, head, rows, frozenset({1}))
 
@@ -439,7 +440,7 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
             source = f"source {entry['source_sha256'][:12]}"
         versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
         rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
-    head = ("Controller", "Name", "Code", "Gains", "Made with")
+    head = ("Controller", "Name", "Code", "Gains", "Versions")
     return PageTable("Entries", head, rows, frozenset({1, 2, 3, 4}))
 
 
@@ -453,8 +454,8 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
     for result, label in zip(results, labels, strict=True):
         runs_by_reason: dict[str, list[str]] = {}
         for anomaly in find_anomalies(result, rapf):
-            place = f"{anomaly.track}, {anomaly.map}, seed {anomaly.seed}"
-            runs_by_reason.setdefault(anomaly.reason, []).append(place)
+            run = f"{anomaly.track}, {anomaly.map}, seed {anomaly.seed}"
+            runs_by_reason.setdefault(anomaly.reason, []).append(run)
         for reason, runs in runs_by_reason.items():
             rows.append((label, str(len(runs)), reason, runs[0]))
     head = ("Controller", "Runs", "What happened", "First run")

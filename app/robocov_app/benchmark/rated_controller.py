@@ -102,11 +102,11 @@ class RatedController:
         -------
         Study
         """
-        name, folder = self._locate()
+        name, folder = self._locate_controller()
         gains = {name: dict(self.gains)} if self.gains else {}
         return suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder)
 
-    def _locate(self) -> tuple[str, Path]:
+    def _locate_controller(self) -> tuple[str, Path]:
         """Return the name of the controller, and the folder to which a relative path of its file refers."""
         if self.controller == ORACLE:
             return _ORACLE_NAME, Path(__file__).parent
@@ -117,9 +117,11 @@ class RatedController:
 
         This is done before the maps are built, which takes seconds.
         """
-        name, folder = self._locate()
+        name, folder = self._locate_controller()
+        if self.controller == ORACLE:
+            name = str(folder / name)
         try:
-            make_controller(str(folder / name) if self.controller == ORACLE else name, dict(self.gains))
+            make_controller(name, dict(self.gains))
         except ParameterError as error:
             raise ParameterError(f"--controller: {error}") from None
 

@@ -46,7 +46,7 @@ def list_references() -> Iterator[tuple[str, int, float]]:
 
 @dataclass(frozen=True)
 class _ReferenceSlot:
-    """Place of one reference in the content of the suite's file."""
+    """The entry of one reference in the content of the suite's file."""
 
     references: dict[str, Any]
     """References of the map by team size, to which the answers are added."""
@@ -87,21 +87,23 @@ def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interrupt
     }
     missing_references = [key for key, slot in slots.items() if not slot.reference]
     missing_bounds = [key for key, slot in slots.items() if slot.reference.get("lower_bound_m") is None]
-    left = total = len(missing_references) + len(missing_bounds)
+    total = len(missing_references) + len(missing_bounds)
+    missing_count = total
     _save_maps(path, maps)
     with show_progress("references", total, quiet=quiet) as update:
 
         def report_answer() -> None:
-            nonlocal left
-            left -= 1
+            nonlocal missing_count
+            missing_count -= 1
             _save_maps(path, maps)
-            update(total - left)
+            update(total - missing_count)
 
         searched = {key: slots[key] for key in missing_references}
         _search_references(searched, workers, stop, report_answer)
         bounded = {key: slots[key] for key in missing_bounds if slots[key].reference}
         _compute_bounds(bounded, workers, stop, report_answer)
-    return 2 * len(slots) - left, left
+    # Each slot has a reference and a bound.
+    return 2 * len(slots) - missing_count, missing_count
 
 
 def _search_references(

@@ -52,6 +52,10 @@ _CELL_EDGE_WIDTH_PT = 0.8
 _MAX_RING_WIDTH_PT = 1.1
 _MAX_RING_WIDTH_FRACTION = 0.25
 """Maximum width of the ring of a robot, as a fraction of its radius."""
+_HEADING_DISTANCE_RADII = 1.25
+_HEADING_SIZE_RADII = 0.9
+"""Distance of the triangle that shows a heading from the center of its disc, and its size, in disc radii."""
+
 # Drawing order, from the bottom to the top.
 _CELLS_ORDER = 1
 _DENSITY_ORDER = 1.5
@@ -153,6 +157,7 @@ def _draw_moving_obstacle(
     fill: Any = to_plot_color(theme.moving_obstacle)
     is_hollow = bool(obstacle.polygon.interiors)
     if is_hollow:
+        # The shape is drawn without its holes, which a fill would cover.
         fill = "none"
     shape = Polygon(
         np.asarray(obstacle.polygon.exterior.coords),
@@ -164,9 +169,7 @@ def _draw_moving_obstacle(
     axes.add_patch(shape)
     shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
     axes.plot(*obstacle.path.T, zorder=_PATHS_ORDER, **_build_path_style(theme))
-    ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    points_per_meter = abs(float(ends[1, 0] - ends[0, 0]))
-    half_arrow = 0.5 * _ARROW_PT * obstacle.heading / points_per_meter
+    half_arrow = 0.5 * _ARROW_PT * obstacle.heading / _compute_points_per_meter(axes)
     arrow = {
         "arrowstyle": "-|>",
         "linewidth": _MOVING_WIDTH_PT,
@@ -296,23 +299,23 @@ def _draw_headings(
 
     The first column of `steering`, (n, ...), is the heading, rad. `radii` are those of discs, points.
     """
-    dots_per_inch = get_figure(axes).dpi_scale_trans
-    is_turning = record.working[-1] & record.team.is_unicycle
-    for robot in np.flatnonzero(is_turning).tolist():
+    inches_to_pixels = get_figure(axes).dpi_scale_trans
+    is_working_unicycle = record.working[-1] & record.team.is_unicycle
+    for robot in np.flatnonzero(is_working_unicycle).tolist():
         heading = steering[robot, 0]
-        distance_in = 1.25 * radii[robot] / POINTS_PER_INCH
+        distance_in = _HEADING_DISTANCE_RADII * radii[robot] / POINTS_PER_INCH
         offset = ScaledTranslation(
-            distance_in * np.cos(heading), distance_in * np.sin(heading), dots_per_inch
+            distance_in * np.cos(heading), distance_in * np.sin(heading), inches_to_pixels
         )
         axes.plot(
             *record.positions[-1, robot],
             transform=axes.transData + offset,
             # A triangle (3 sides, style 0); without rotation it points up.
             marker=(3, 0, float(np.degrees(heading)) - 90.0),
-            ms=0.9 * radii[robot],
-            mec="none",
-            c=to_plot_color(theme.ink),
-            ls="",
+            markersize=_HEADING_SIZE_RADII * radii[robot],
+            markeredgecolor="none",
+            color=to_plot_color(theme.ink),
+            linestyle="",
             zorder=_GOALS_ORDER,
             clip_on=False,
         )
@@ -330,7 +333,7 @@ def _draw_goals(
     goal_points = _to_points(axes, goals)
     distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
-    # Of a goal that is reached, only the ends of the cross would stick out from under the disc.
+    # The disc of a robot at its goal would hide the cross, except for its ends.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
     axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, **_build_goal_style(is_centroid, theme, size))
 
@@ -362,9 +365,7 @@ def draw_robots(
     list of float
         Radii of the discs, points.
     """
-    ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    points_per_meter = float(ends[1, 0] - ends[0, 0])
-    true_radii = radius * points_per_meter
+    true_radii = radius * _compute_points_per_meter(axes)
     radii: list[float] = fit_radii(_to_points(axes, positions), true_radii, _MIN_DISC_PT, _DISC_PT).tolist()
     axes.scatter(
         positions[:, 0],
@@ -395,6 +396,12 @@ def draw_robots(
                 zorder=_NUMBERS_ORDER,
             )
     return radii
+
+
+def _compute_points_per_meter(axes: Axes) -> float:
+    """Return the number of points of the page in a meter of the map."""
+    ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    return abs(float(ends[1, 0] - ends[0, 0]))
 
 
 def _to_points(axes: Axes, positions: Array) -> Array:

@@ -28,7 +28,15 @@ from robocov_app.figures.curves import (
 )
 from robocov_app.figures.extent import Extent, enclose_maps
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, check_not_empty, to_plot_color
+from robocov_app.figures.page import (
+    SMALL,
+    TEXT,
+    FigurePage,
+    PageBox,
+    PagePanel,
+    check_not_empty,
+    to_plot_color,
+)
 from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -235,7 +243,8 @@ def plot_coverage(
             distance_label = WEIGHTED_DISTANCE
         _draw_curves(page, curves, times, arrangement.curves, distance_label)
     boxes = _draw_maps(page, snapshots, extent, limit, arrangement.maps)
-    page.draw_footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
+    zoom = boxes[0].width / extent.width
+    page.draw_footer(handles, boxes, zoom, arrangement.maps.left)
     return page.figure
 
 
@@ -320,8 +329,8 @@ def _arrange_below(
         curves_height = min(curves_height, _MAX_CURVES_FRACTION * (height - head - footer_height))
     curves_end = head + curves_height
     return _Arrangement(
-        curves=(page.margin, head, width - 2 * page.margin, curves_height),
-        maps=(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
+        curves=PageBox(page.margin, head, width - 2 * page.margin, curves_height),
+        maps=PageBox(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
         bar_row=curves_end + _BAR_ROW_BELOW_CURVES * scale,
         bar_min_left=page.margin,
         is_below=True,
@@ -338,8 +347,8 @@ def _arrange_beside(
     maps_left = (1.0 - maps_fraction) * width + page.margin
     maps_width = maps_fraction * width - 2 * page.margin
     return _Arrangement(
-        curves=(page.margin, head, 0.5 * width - page.margin, height - head),
-        maps=(maps_left, head, maps_width, height - head - footer_height),
+        curves=PageBox(page.margin, head, 0.5 * width - page.margin, height - head),
+        maps=PageBox(maps_left, head, maps_width, height - head - footer_height),
         bar_row=_BAR_ROW * scale,
         bar_min_left=0.5 * width if has_curves else maps_left,
         is_below=False,
@@ -361,10 +370,11 @@ def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = 
     arena.set_meter_axes(axes, snapshot.environment, theme)
     axes.apply_aspect()
     extent = axes.get_window_extent()
+    # As on pages, texts and lines have scale 1 at 100 dots per inch.
     scale = axes.figure.dpi / 100
     # The image is at least as fine as on the smallest page, because small axes may be saved at a larger size.
     enlargement = max(MIN_SIZE_PX[0] / extent.width, 1.0)
-    box = (0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
+    box = PageBox(0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
     _draw_snapshot(axes, snapshot, limit, theme, box=box, scale=enlargement * scale)
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
@@ -419,12 +429,15 @@ def _draw_curves(
     left, top, width, height = box
     if not times:
         _draw_curve_panel(page, curves, box, distance_label, "m")
-    elif width > _MIN_ASPECT_SIDE_BY_SIDE * height:
-        _draw_curve_panel(page, curves, (left, top, width / 2, height), distance_label, "m")
-        _draw_curve_panel(page, times, (left + width / 2, top, width / 2, height), TIME, "s")
+        return
+    if width > _MIN_ASPECT_SIDE_BY_SIDE * height:
+        distances_box = PageBox(left, top, width / 2, height)
+        times_box = PageBox(left + width / 2, top, width / 2, height)
     else:
-        _draw_curve_panel(page, curves, (left, top, width, height / 2), distance_label, "m")
-        _draw_curve_panel(page, times, (left, top + height / 2, width, height / 2), TIME, "s")
+        distances_box = PageBox(left, top, width, height / 2)
+        times_box = PageBox(left, top + height / 2, width, height / 2)
+    _draw_curve_panel(page, curves, distances_box, distance_label, "m")
+    _draw_curve_panel(page, times, times_box, TIME, "s")
 
 
 def _draw_curve_panel(
@@ -441,20 +454,21 @@ def _draw_maps(
     """Draw the map of each snapshot below its title; return the boxes of the maps, px."""
     scale = page.scale
     panels = _arrange_panels(area, len(snapshots), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
-    for snapshot, (box, caption_width) in zip(snapshots, panels, strict=True):
+    for snapshot, panel in zip(snapshots, panels, strict=True):
+        box = panel.box
+        max_width = panel.caption_width
         axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
-        left, top, _, _ = box
-        title_row = top - _CAPTION_TITLE_ROW * scale
-        facts_row = top - _CAPTION_FACTS_ROW * scale
-        page.write(snapshot.title, left, title_row, points=TEXT + 1.5, bold=True, max_width=caption_width)
-        page.write(snapshot.facts, left, facts_row, color=page.theme.faint, max_width=caption_width)
-    return [box for box, _ in panels]
+        title_row = box.top - _CAPTION_TITLE_ROW * scale
+        facts_row = box.top - _CAPTION_FACTS_ROW * scale
+        page.write(snapshot.title, box.left, title_row, points=TEXT + 1.5, bold=True, max_width=max_width)
+        page.write(snapshot.facts, box.left, facts_row, color=page.theme.faint, max_width=max_width)
+    return [panel.box for panel in panels]
 
 
 def _arrange_panels(
     area: PageBox, count: int, aspect: float, caption_height: float, gap: float
-) -> list[tuple[PageBox, float]]:
+) -> list[PagePanel]:
     """Arrange panels of equal size in a grid, as large as possible.
 
     Parameters
@@ -492,7 +506,7 @@ def _arrange_panels(
         row, column = divmod(number, columns)
         x = left + column * (slot + gap) + indent
         y = top + row * (panel_height + caption_height + gap) + caption_height
-        panels.append(((x, y, panel_width, panel_height), slot - indent))
+        panels.append(PagePanel(PageBox(x, y, panel_width, panel_height), slot - indent))
     return panels
 
 
@@ -502,11 +516,11 @@ def _draw_snapshot(
     """Draw distances, the borders of geodesic cells, the map and the robots in axes that fill a box, px."""
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
-    columns = max(round(DOTS_PER_PIXEL * box[2]), 2)
-    rows = max(round(DOTS_PER_PIXEL * box[3]), 2)
+    columns = max(round(DOTS_PER_PIXEL * box.width), 2)
+    rows = max(round(DOTS_PER_PIXEL * box.height), 2)
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
-    zoom = DOTS_PER_PIXEL * box[2] / (high_x - low_x)
+    zoom = DOTS_PER_PIXEL * box.width / (high_x - low_x)
     pixels = _paint_distances(
         snapshot.field, x, y, limit, theme, zoom=zoom, border_width=_BORDER_WIDTH * scale
     )
@@ -572,13 +586,12 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     float
         Left end of the scale and its label, px.
     """
-    maps = arrangement.maps
     middle = arrangement.bar_row
     theme = page.theme
     scale = page.scale
-    right = maps[0] + maps[2] - _BAR_INDENT * scale
+    right = arrangement.maps.right - _BAR_INDENT * scale
     width = _BAR_WIDTH * scale
-    box = (right - width, middle - _BAR_RISE * scale, width, _BAR_HEIGHT * scale)
+    box = PageBox(right - width, middle - _BAR_RISE * scale, width, _BAR_HEIGHT * scale)
     axes = page.add_axes(box)
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for spine in axes.spines.values():

@@ -164,17 +164,16 @@ def add_curve_axes(
     """
     if box is None:
         page_width, page_height = page.size
-        box = (0.0, 0.0, page_width, page_height)
-    box_left, box_top, box_width, box_height = box
+        box = PageBox(0.0, 0.0, page_width, page_height)
     scale = page.scale
     left = margins.left * scale
     top = margins.top * scale
     bottom = margins.bottom * scale
     label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
-    right = min(margins.right * scale + label_width, margins.max_right_fraction * box_width)
-    width = box_width - left - right
-    height = box_height - top - bottom
-    return page.add_axes((box_left + left, box_top + top, width, height))
+    right = min(margins.right * scale + label_width, margins.max_right_fraction * box.width)
+    width = box.width - left - right
+    height = box.height - top - bottom
+    return page.add_axes(PageBox(box.left + left, box.top + top, width, height))
 
 
 def draw_curves(
@@ -255,7 +254,8 @@ def _draw_line(
     dash_lengths = style.list_dash_lengths()
     if dash_lengths:
         # matplotlib measures dashes in line widths; this makes them equally long on lines of all widths.
-        dashes = 0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dash_lengths)
+        # The first number is the position in the pattern at which the line starts.
+        dashes = (0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dash_lengths))
     axes.plot(times, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
     last = int(np.nonzero(np.isfinite(values))[0][-1])
     axes.plot(

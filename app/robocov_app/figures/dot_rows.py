@@ -11,7 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import POINTS_PER_INCH, TEXT, FigurePage, get_figure, style_axes, to_plot_color
+from robocov_app.figures.page import (
+    POINTS_PER_INCH,
+    TEXT,
+    FigurePage,
+    PageBox,
+    get_figure,
+    style_axes,
+    to_plot_color,
+)
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import Theme
@@ -119,7 +127,7 @@ def create_row_axes(
     page_height = round(top + _ROW_HEIGHT_PX * scale * height + bottom)
     page = FigurePage((width, page_height), theme, scale)
     axes_width = width - left - _RIGHT_MARGIN * scale
-    axes = page.add_axes((left, top, axes_width, page_height - top - bottom))
+    axes = page.add_axes(PageBox(left, top, axes_width, page_height - top - bottom))
     axes.set_ylim(height, 0.0)
     return axes, short_names
 

@@ -14,7 +14,15 @@ from matplotlib.ticker import FixedLocator, Locator, LogLocator, MaxNLocator, Nu
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, FigurePage, get_figure, set_value_axis, style_axes, to_plot_color
+from robocov_app.figures.page import (
+    SMALL,
+    FigurePage,
+    PageBox,
+    get_figure,
+    set_value_axis,
+    style_axes,
+    to_plot_color,
+)
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT, Theme
@@ -177,7 +185,7 @@ def _choose_decimals(low: float, high: float) -> int:
 def _create_axes(size: tuple[int, int]) -> Axes:
     """Create axes that fill a page, except for margins for labels."""
     width, height = size
-    return FigurePage(size, LIGHT, 1.0).add_axes((52, 34, width - 70, height - 84))
+    return FigurePage(size, LIGHT, 1.0).add_axes(PageBox(52, 34, width - 70, height - 84))
 
 
 def _shorten_name(name: str) -> str:

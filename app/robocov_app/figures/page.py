@@ -27,8 +27,8 @@ TITLE = 12.5
 TEXT = 9.5
 SMALL = 8.5
 POINTS_PER_INCH = 72
-PageBox: TypeAlias = tuple[float, float, float, float]
-"""Left, top, width and height, px."""
+
+
 PlotColor: TypeAlias = tuple[float, float, float]
 """A color of matplotlib: red, green and blue from 0 to 1."""
 
@@ -40,6 +40,8 @@ _MAX_SCALE = 6.0
 # Lengths at scale 1, px.
 _MARGIN = 18.0
 _MAX_SCALE_BAR = 120
+_MAX_SCALE_BAR_FRACTION = 1 / 7
+"""Maximum length of the scale bar, as a fraction of the page width."""
 _SCALE_BAR_LABEL = 80
 _PANEL_GAP = 14
 _LEGEND_GAP = 24
@@ -123,6 +125,25 @@ def _get_font_weight(bold: bool) -> str:
     return "bold" if bold else "normal"
 
 
+class PageBox(NamedTuple):
+    """A rectangle on a page, px from the top left."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    @property
+    def right(self) -> float:
+        """Right edge."""
+        return self.left + self.width
+
+    @property
+    def bottom(self) -> float:
+        """Bottom edge."""
+        return self.top + self.height
+
+
 class PageAxes(Axes):
     """Axes of a page, for which notebooks display the whole page.
 
@@ -198,7 +219,8 @@ class FigurePage:
         self.scale = scale
         self.margin = _MARGIN * scale
         self.content_width = width - 2 * self.margin
-        self._max_bar_length = max(min(_MAX_SCALE_BAR * scale, width / 7), _MIN_SCALE_BAR_PX)
+        max_bar_length = min(_MAX_SCALE_BAR * scale, _MAX_SCALE_BAR_FRACTION * width)
+        self._max_bar_length = max(max_bar_length, _MIN_SCALE_BAR_PX)
         dpi = 100.0 * scale
         # matplotlib truncates the number of pixels, so rounding errors could turn 900 into 899.
         inches = ((width + 1e-3) / dpi, (height + 1e-3) / dpi)
@@ -212,10 +234,9 @@ class FigurePage:
 
     def add_axes(self, box: PageBox) -> Axes:
         """Add axes that fill a box, px."""
-        left, top, width, height = box
-        x, y = self.to_figure(left, top + height)
+        x, y = self.to_figure(box.left, box.bottom)
         page_width, page_height = self.size
-        rectangle = (x, y, width / page_width, height / page_height)
+        rectangle = (x, y, box.width / page_width, box.height / page_height)
         return self.figure.add_axes(rectangle, axes_class=PageAxes)
 
     def add_map_axes(self, box: PageBox, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
@@ -334,6 +355,7 @@ class FigurePage:
         gap = _PANEL_GAP * self.scale
         rows = math.ceil(count / columns)
         max_width = (page_width - self.margin) / columns - self.margin
+        # There is no gap below the last row.
         max_height = (page_height - top - bottom + gap) / rows - caption_height - gap
         width = min(max_width, max_height * aspect)
         height = width / aspect
@@ -346,7 +368,7 @@ class FigurePage:
             row, column = divmod(number, columns)
             x = left + column * (slot_width + self.margin)
             y = top + row * slot_height + caption_height
-            panels.append(PagePanel((x, y, width, height), slot_width))
+            panels.append(PagePanel(PageBox(x, y, width, height), slot_width))
         return panels
 
     def measure_footer(self, handles: Sequence[Artist], start: float = 0) -> float:
@@ -375,16 +397,20 @@ class FigurePage:
         """
         start = max(start, self.margin)
         end = self.size[0] - self.margin
-        left = boxes[0][0]
-        right = max(box_left + width for box_left, _, width, _ in boxes)
-        bottom = max(box_top + height for _, box_top, _, height in boxes)
+        left = boxes[0].left
+        right = max(box.right for box in boxes)
+        bottom = max(box.bottom for box in boxes)
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), start):
             y = bottom + _ONE_LINE_MIDDLE * self.scale
-            max_left = end - legend.width - (end - start - self._compute_legend_space(start))
-            bar_end = self._draw_scale_bar(max(min(left, max_left), start), y, zoom)
-            x = min(max(right, bar_end + _LEGEND_GAP * self.scale + legend.width), end)
-            self._draw_legend(handles, legend.columns, "center right", (x, y))
+            # The bar starts below the left edge of the maps, or farther left if the legend needs the space.
+            bar_space = end - start - self._compute_legend_space(start)
+            max_bar_left = end - legend.width - bar_space
+            bar_left = max(min(left, max_bar_left), start)
+            bar_end = self._draw_scale_bar(bar_left, y, zoom)
+            min_legend_right = bar_end + _LEGEND_GAP * self.scale + legend.width
+            legend_right = min(max(right, min_legend_right), end)
+            self._draw_legend(handles, legend.columns, "center right", (legend_right, y))
         else:
             self._draw_scale_bar(left, bottom + _UPPER_LINE_MIDDLE * self.scale, zoom)
             middle = ((start + end) / 2, bottom + _LEGEND_TOP * self.scale)

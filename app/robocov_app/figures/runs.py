@@ -72,6 +72,9 @@ _COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
 """Space around the curves on a page without maps; the title is above them."""
 _MAP_HEAD = 58
 """Space above the map of a page at scale 1, px."""
+_METRICS_SIZE_PX = (1200, 800)
+_METRIC_TITLE_HEIGHT = 40
+"""Space above the panels of metrics at scale 1, px, for the title."""
 _METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=24, max_right_fraction=0.5)
 
 
@@ -247,7 +250,7 @@ def plot_comparison(
     first_box = panels[0].box
     _write_heading(page, captions.shared, first_box, layout.caption_height + _HEADING_RISE * page.scale)
     footer_boxes = [_widen_box(panel) if layout.is_one_line else panel.box for panel in panels]
-    page.draw_footer(handles, footer_boxes, first_box[2] / extent.width)
+    page.draw_footer(handles, footer_boxes, first_box.width / extent.width)
     return page.figure
 
 
@@ -313,15 +316,14 @@ def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) ->
 
 def _widen_box(panel: PagePanel) -> PageBox:
     """Return the box of a panel, widened to its caption if that is wider."""
-    left, top, width, height = panel.box
-    return left, top, max(width, panel.caption_width), height
+    return panel.box._replace(width=max(panel.box.width, panel.caption_width))
 
 
 def _write_heading(page: FigurePage, text: str, first_box: PageBox, up: float) -> None:
     """Write the heading `up` pixels above the first panel, unless it is empty."""
     if text:
-        left, top, _, _ = first_box
-        page.write(text, left, top - up, points=HEADING, bold=True, max_width=page.content_width)
+        y = first_box.top - up
+        page.write(text, first_box.left, y, points=HEADING, bold=True, max_width=page.content_width)
 
 
 def _build_captions(
@@ -465,7 +467,7 @@ def _create_map_page(
     free_height = page.size[1] - above - page.measure_footer(handles)
     width = min(page.content_width, free_height * aspect)
     height = width / aspect
-    box = ((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
+    box = PageBox((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
     _write_above_map(page, title, box, up=_NAME_ROW, points=TITLE, is_title=True)
     _write_above_map(page, facts, box, up=_FACTS_ROW, points=TEXT, is_title=False)
     page.draw_footer(handles, [box], width / (high_x - low_x))
@@ -538,7 +540,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     if len(drawn) < len(environments):
         title = f"{len(drawn)} of {len(environments)}"
     bounds = np.array([environment.region.bounds for environment in drawn])
-    map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
+    map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()  # of the largest map
     aspect = map_width / map_height
     handles = _list_different_handles(drawn, theme)
     # A page of the maximum height serves to measure; its final height is chosen below.
@@ -564,15 +566,14 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
         bottom=page.measure_footer(handles),
     )
     for environment, panel in zip(drawn, panels, strict=True):
-        left, map_top, _, _ = panel.box
         low_x, low_y, _, _ = environment.region.bounds
         axes = page.add_map_axes(panel.box, low_x, low_y, low_x + map_width, low_y + map_height)
         arena.draw_map(axes, environment, theme)
-        name_row = map_top - _SHEET_NAME_ROW * scale
-        page.write(environment.name, left, name_row, bold=True, max_width=panel.caption_width)
-    first_box, _ = panels[0]
+        name_row = panel.box.top - _SHEET_NAME_ROW * scale
+        page.write(environment.name, panel.box.left, name_row, bold=True, max_width=panel.caption_width)
+    first_box = panels[0].box
     _write_heading(page, title, first_box, above + _SHEET_HEADING_RISE * scale)
-    page.draw_footer(handles, [box for box, _ in panels], first_box[2] / map_width)
+    page.draw_footer(handles, [panel.box for panel in panels], first_box.width / map_width)
     return page.figure
 
 
@@ -654,7 +655,7 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     matplotlib.figure.Figure
     """
     theme = get_theme(theme)
-    page = FigurePage((1200, 800), theme)
+    page = FigurePage(_METRICS_SIZE_PX, theme)
     page.write_title(title, 26)
     for number, panel in enumerate(METRIC_PANELS):
         curves = [
@@ -668,9 +669,10 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
 
 def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[TimeCurve], unit: str) -> Axes:
     """Create the axes of a panel in a grid of 2 x 2, with space for the labels of its curves."""
-    scale = page.scale
-    width = 600.0
-    height = 400.0 - 20 * scale
+    page_width, page_height = page.size
+    top = _METRIC_TITLE_HEIGHT * page.scale
+    width = page_width / 2
+    height = (page_height - top) / 2
     row, column = divmod(number, 2)
-    box = (column * width, 40 * scale + row * height, width, height)
+    box = PageBox(column * width, top + row * height, width, height)
     return add_curve_axes(page, curves, _METRIC_MARGINS, box=box, unit=unit)

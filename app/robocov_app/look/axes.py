@@ -33,9 +33,10 @@ _MIN_TIME_LIMIT_FRACTION = 0.96
 """Fraction of `MIN_TIME_LIMIT_S` up to which a growing time axis has this length."""
 _EARLY_TIME_S = 40.0
 _EARLY_INTERVALS = 4.0
-"""Before the early time, half a round quarter of the time so far is the step of a growing time axis."""
+"""Before `_EARLY_TIME_S`, the step of a growing time axis is half of a round quarter of the time so far."""
 _LATE_INTERVALS = 5.0
-"""From then on, the step is a round fifth of the time so far."""
+"""From `_EARLY_TIME_S` on, the step is a round fifth of the time so far."""
+_TIME_TOLERANCE_S = 1e-9
 _MIN_TIME_STEP_S = 5.0
 """A growing time axis ends at a multiple of at least this step."""
 _MIN_VALUE = 1e-3
@@ -176,4 +177,5 @@ def choose_growing_time_limit(end_s: float) -> float:
     else:
         step = round_down(end_s / _LATE_INTERVALS)
     step = max(step, _MIN_TIME_STEP_S)
-    return float(math.ceil((end_s * (1.0 + _FREE_TIME_FRACTION) + 1e-9) / step) * step)
+    min_limit = end_s * (1.0 + _FREE_TIME_FRACTION)
+    return float(math.ceil((min_limit + _TIME_TOLERANCE_S) / step) * step)

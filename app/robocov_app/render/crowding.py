@@ -39,7 +39,7 @@ def compute_nearest_distances(points: Array, sample_step: int = 1) -> Array:
         squares = np.asarray(delta[..., 0] ** 2 + delta[..., 1] ** 2)
         np.fill_diagonal(squares, np.inf)
         return np.asarray(np.sqrt(squares.min(axis=1)))
-    # The nearest point in the tree is the point itself, so the second nearest is asked for.
+    # The nearest point in the tree is the point itself, so the second nearest one is queried.
     distances, _ = KDTree(points).query(points[::sample_step], k=[2])
     return np.asarray(distances).ravel()
 

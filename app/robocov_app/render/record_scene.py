@@ -92,14 +92,14 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
     # The row of each robot among the selected ones; -1 for the others.
     new_row = np.full(len(seen.positions), -1, dtype=np.intp)
     new_row[robots] = np.arange(len(robots))
-    robot, neighbor = seen.neighbors.list_pairs()
-    is_kept = (new_row[robot] >= 0) & (new_row[neighbor] >= 0)
+    first, second = seen.neighbors.list_pairs()
+    is_kept = (new_row[first] >= 0) & (new_row[second] >= 0)
     if seen.neighbors.is_complete:
         neighbors = Neighbors(len(robots))
     else:
         ranges = None if seen.neighbors.ranges is None else seen.neighbors.ranges[robots]
         neighbors = Neighbors.from_pairs(
-            len(robots), new_row[robot[is_kept]], new_row[neighbor[is_kept]], ranges
+            len(robots), new_row[first[is_kept]], new_row[second[is_kept]], ranges
         )
     robot_arrays = _select_rows(
         seen, ("positions", "velocities", "obstacle_points", "max_speeds", "steering"), robots

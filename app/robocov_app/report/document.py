@@ -109,7 +109,9 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
     styles = choose_group_styles(result)
     selection = select_runs(result, MAX_SHOWN_RUNS, replay.MAX_PANES)
     runs = _build_replay_runs(result, selection.runs)
-    thumbnails = [_build_thumbnail(*pair) for pair in zip(runs, selection.runs, strict=True)]
+    thumbnails = [
+        _build_thumbnail(replay_run, run) for replay_run, run in zip(runs, selection.runs, strict=True)
+    ]
     return {
         "key": key,
         "styles": styles,

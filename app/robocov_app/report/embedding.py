@@ -40,6 +40,8 @@ MAX_OBSTACLE_VERTICES = 4000
 _RATES_HZ = (MAX_RATE_HZ, 4.0, 2.5, 2.0, 1.25, 1.0)
 _MIN_RATE_HZ = 0.05
 _TIME_TOLERANCE_S = 1e-9
+_FRACTION_TOLERANCE = 1e-9
+"""Tolerance in comparisons of fractions of a step between two times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +214,9 @@ def embed_run(
         times = list_even_times(duration, rate)
         step = 1.0 / rate
     else:
+        # Only the first and the last frame are embedded. Even if they are the same, the step is positive.
         times = np.unique([0.0, duration])
-        step = max(duration, 1e-9)
+        step = max(duration, _TIME_TOLERANCE_S)
     positions = _interpolate_points(record, record.positions, times + start)
     content: dict[str, Any] = {
         "title": run.title,
@@ -307,8 +310,8 @@ def _embed_cost(
 
 def list_even_times(end: float, rate: float) -> Array:
     """Return the multiples of ``1 / rate`` seconds from 0 to `end`, and `end` itself, s."""
-    times = np.arange(math.floor(end * rate + 1e-9) + 1) / rate
-    if end - times[-1] > 1e-9:
+    times = np.arange(math.floor(end * rate + _FRACTION_TOLERANCE) + 1) / rate
+    if end - times[-1] > _TIME_TOLERANCE_S:
         return np.append(times, end)
     return times
 
@@ -356,8 +359,8 @@ def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
     fraction = ((times - time[before]) / (time[after] - time[before]))[:, None]
     mixed = (1.0 - fraction) * rows[before] + fraction * rows[after]
     # At a time of the record, only the row at that time is used, because the other one may be nan.
-    mixed = np.where(fraction >= 1.0 - 1e-9, rows[after], mixed)
-    return np.where(fraction <= 1e-9, rows[before], mixed)
+    mixed = np.where(fraction >= 1.0 - _FRACTION_TOLERANCE, rows[after], mixed)
+    return np.where(fraction <= _FRACTION_TOLERANCE, rows[before], mixed)
 
 
 def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bool]:

@@ -148,6 +148,7 @@ class _SmallCopy:
                 element.set(name, _replace_colors(value))
             elif name in _COORDINATES:
                 element.set(name, _shorten_number(value, _COORDINATE_DECIMALS))
+            # Matplotlib gives horizontal text a rotation by -0 degrees.
             elif name == "transform" and not value.startswith("rotate(-0 "):
                 element.set(name, value)
         if "clip-path" in source.attrib:

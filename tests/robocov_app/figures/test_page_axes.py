@@ -6,7 +6,7 @@ import pytest
 from drawn_run import ROOMS, record_walk
 from PIL import Image
 
-from robocov_app.figures.page import FigurePage
+from robocov_app.figures.page import FigurePage, PageBox
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import DARK
 
@@ -28,7 +28,7 @@ def test_later_drawing_on_page_axes_is_shown():
 
 
 def test_page_axes_do_not_depend_on_the_style_of_the_user():
-    axes = FigurePage((400, 300), DARK).add_axes((20, 20, 360, 260))
+    axes = FigurePage((400, 300), DARK).add_axes(PageBox(20, 20, 360, 260))
     before = axes._repr_png_()
     with matplotlib.rc_context({"savefig.facecolor": "red", "savefig.bbox": "tight", "savefig.dpi": 17}):
         assert axes._repr_png_() == before

@@ -126,7 +126,7 @@ def test_missing_runs_of_an_unfinished_sweep_are_counted(folder, tmp_path) -> No
         run for run, _ in zip(move_runs(load_result(folder).runs, copy), range(7), strict=False)
     )
     (copy / "results.csv").write_text(lines[0] + "\n")
-    with pytest.raises(InputError, match="not one of the 24 runs of the sweep is done"):
+    with pytest.raises(InputError, match="none of the 24 runs of the sweep is done"):
         load_result(copy)
 
 
@@ -202,7 +202,10 @@ def test_damaged_runs_of_a_comparison_are_left_out_and_named(tmp_path) -> None:
     result = load_result(tmp_path / "three")
     assert [run.controller for run in result.runs] == ["rapf"]
     assert [name for name, _ in result.damaged_runs] == ["rpf", "lloyd"]
-    assert "another map than in rapf" in result.damaged_runs[1].reason and result.missing_count == 0
+    assert (
+        "expected the map of rapf, got a different map" in result.damaged_runs[1].reason
+        and result.missing_count == 0
+    )
 
 
 def test_labels_of_controllers_with_the_same_name_are_numbered(tmp_path) -> None:

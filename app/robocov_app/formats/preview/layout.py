@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from matplotlib.artist import Artist
 
-from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox
+from robocov_app.figures.page import SMALL, TITLE, FigurePage, PagePanel
 from robocov_app.look.theme import Theme
 from robocov_app.render.panel_grid import choose_column_count
 
@@ -39,34 +39,20 @@ class Caption(NamedTuple):
     facts: str
 
 
-class Panel(NamedTuple):
-    """The position of an arena.
-
-    Attributes
-    ----------
-    box : (left, top, width, height), px
-    caption_width : float, px
-        Width available for the caption above the arena.
-    """
-
-    box: PageBox
-    caption_width: float
-
-
 class ImportPage(NamedTuple):
     """The page of an import.
 
     Attributes
     ----------
     page : FigurePage
-    panels : list of Panel
+    panels : list of PagePanel
         Positions of the map as read and of the map as imported.
     lines : list of str
         Lines of the report, wrapped to the width of the page.
     """
 
     page: FigurePage
-    panels: list[Panel]
+    panels: list[PagePanel]
     lines: list[str]
 
 
@@ -114,13 +100,13 @@ def lay_out_page(
     left = (width - columns * slot_width - (columns - 1) * margin) / 2
     # A second page, of the final width, to measure the lines and the legend that determine the height.
     page = FigurePage((int(width), _MAX_WIDTH_PX), theme, _SCALE)
-    lines = wrap_lines(page, lines, width - left - margin)
-    lines_height = (LINE_HEIGHT_PX * len(lines) + _MARGIN_BELOW_LINES_PX) * page.scale
+    wrapped_lines = wrap_lines(page, lines, width - left - margin)
+    lines_height = (LINE_HEIGHT_PX * len(wrapped_lines) + _MARGIN_BELOW_LINES_PX) * page.scale
     height_below = page.measure_footer(handles) + lines_height
     gaps_height = (rows - 1) * _ROW_GAP_PX * page.scale
     height = title_height + rows * (caption_height + arena_height) + gaps_height + height_below
     page = FigurePage((int(width), int(max(height, _MIN_HEIGHT_PX))), theme, _SCALE)
-    boxes = page.arrange_panels(
+    panels = page.arrange_panels(
         _ARENA_COUNT,
         columns,
         aspect=aspect,
@@ -129,7 +115,7 @@ def lay_out_page(
         top=title_height,
         bottom=height_below,
     )
-    return ImportPage(page, [Panel(box, width) for box, width in boxes], lines)
+    return ImportPage(page, panels, wrapped_lines)
 
 
 def measure_caption_indent(page: FigurePage, name: str) -> float:

@@ -112,7 +112,7 @@ def plot_import(
         layout = lay_out_page(theme, aspect, captions, handles, report.format_remarks())
         _write_title(layout, environment, report)
         for panel, caption in zip(layout.panels, captions, strict=True):
-            _write_caption(layout.page, caption, panel.box[0], panel.box[1], panel.caption_width)
+            _write_caption(layout.page, caption, panel.box.left, panel.box.top, panel.caption_width)
         boxes = [panel.box for panel in layout.panels]
         before = layout.page.add_map_axes(boxes[0], *comparison.bounds)
         after = layout.page.add_map_axes(boxes[1], *comparison.bounds)
@@ -121,15 +121,15 @@ def plot_import(
         _draw_area(after, comparison.opened, theme.start, theme.start, _MARK_OPACITY)
         if comparison.gap is not None:
             _draw_gap(after, comparison.gap, theme)
-        _, _, arena_width, _ = boxes[0]
-        layout.page.draw_footer(handles, boxes, arena_width / (high_x - low_x))
+        zoom = boxes[0].width / (high_x - low_x)
+        layout.page.draw_footer(handles, boxes, zoom)
         _write_lines(layout)
         return layout.page.figure
 
 
 def _get_left(layout: ImportPage) -> float:
     """Return the left edge of the arenas, px."""
-    return min(panel.box[0] for panel in layout.panels)
+    return min(panel.box.left for panel in layout.panels)
 
 
 def _write_title(layout: ImportPage, environment: Environment, report: ImportReport) -> None:

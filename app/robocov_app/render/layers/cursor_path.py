@@ -85,7 +85,7 @@ def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) ->
         box.centerx = round(x + side * (box.width / 2 + gap))
         box.centery = round(y + down * (box.height / 2 + gap))
         visible_box = box.clamp(canvas.surface.get_clip())
-        cost = _rate_hidden(canvas, scene, corners, visible_box)
+        cost = _compute_hiding_cost(canvas, scene, corners, visible_box)
         if visible_box != box:
             cost += _HIDDEN_PATH_COST
         if cost < best_cost:
@@ -94,7 +94,7 @@ def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) ->
     return best_box
 
 
-def _rate_hidden(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect) -> int:
+def _compute_hiding_cost(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect) -> int:
     """Return a cost that counts the sections of the path, (w, 2) px, and the robots that a box would hide."""
     path = limit_pixels(corners).tolist()
     n_sections = sum(bool(box.clipline(start, end)) for start, end in pairwise(path))

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pygame
+from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, premultiply
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.layers.ray_scans import draw_dots
@@ -141,19 +143,25 @@ def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
     (left, bottom), (right, top) = ends.round().astype(int).tolist()
     if right <= left or bottom <= top:
         return
-    # States above WALL are drawn as walls.
-    state = np.minimum(known_map.state[visible], WALL)
-    is_inside = ~raster.is_outside[visible]
-    pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
-    for value, opacity in _CELL_OPACITIES.items():
-        is_unknown = value == UNKNOWN
-        color = canvas.theme.obstacle if is_unknown else canvas.theme.forces["repulsion_obstacle"]
-        pixels[(state == value) & is_inside] = premultiply(color, opacity)
+    pixels = _color_cells(known_map, visible, canvas.theme)
     # The first row is the lowest one in the map, but the highest one in a picture.
     upright = np.ascontiguousarray(pixels[::-1])
-    picture = pygame.image.frombuffer(upright.tobytes(), (state.shape[1], state.shape[0]), "RGBA")
+    n_rows, n_columns, _ = pixels.shape
+    picture = pygame.image.frombuffer(upright.tobytes(), (n_columns, n_rows), "RGBA")
     scaled = pygame.transform.scale(picture, (right - left, bottom - top))
     canvas.surface.blit(scaled, (left, top), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def _color_cells(known_map: DiscoveredMap, visible: tuple[slice, slice], theme: Theme) -> NDArray[np.uint8]:
+    """Return the premultiplied RGBA colors, (rows, columns, 4), of the visible cells of a discovered map."""
+    # States above WALL are drawn as walls.
+    state = np.minimum(known_map.state[visible], WALL)
+    is_inside = ~known_map.raster.is_outside[visible]
+    pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
+    for value, opacity in _CELL_OPACITIES.items():
+        color = theme.obstacle if value == UNKNOWN else theme.forces["repulsion_obstacle"]
+        pixels[(state == value) & is_inside] = premultiply(color, opacity)
+    return pixels
 
 
 def _get_pale_colors(canvas: Canvas) -> tuple[Color, Color]:

@@ -83,7 +83,8 @@ class TrajectoriesLayer:
         width = canvas.scale * canvas.theme.trajectory_line * choose_width_factor(n_robots)
         pen = Pen(self._choose_colors(canvas, n_robots), width)
         key = _build_key(canvas, scene, pen, n_robots)
-        is_continued = key == self._key and self._n_drawn_rows > 0 and self._find_last_row(trail)
+        self._n_drawn_rows = self._count_drawn_rows(trail)
+        is_continued = key == self._key and self._n_drawn_rows > 0
         is_fading = False
         if not is_continued:
             self._start_page(canvas, trail, key)
@@ -100,18 +101,21 @@ class TrajectoriesLayer:
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
 
-    def _find_last_row(self, trail: Array) -> bool:
-        """Return whether the trail still contains the row that was drawn last.
+    def _count_drawn_rows(self, trail: Array) -> int:
+        """Return how many rows of a trail are on the page: those up to the row that was drawn last.
 
-        It is at a lower index if older rows were removed; the number of drawn rows is updated accordingly.
+        They are fewer than in the last frame if older rows were removed since, and 0 if the trail does not
+        contain the row that was drawn last.
         """
         n_rows = self._n_drawn_rows
+        if n_rows == 0 or trail.shape[1:] != self._last_row.shape:
+            return 0
         if n_rows <= len(trail) and _are_same_rows(trail[[n_rows - 1]], self._last_row).all():
-            return True
+            return n_rows
         rows = np.flatnonzero(_are_same_rows(trail[:n_rows], self._last_row))
-        if len(rows):
-            self._n_drawn_rows = int(rows[-1]) + 1
-        return len(rows) > 0
+        if not len(rows):
+            return 0
+        return int(rows[-1]) + 1
 
     def _start_page(self, canvas: Canvas, trail: Array, key: object) -> None:
         """Start an empty page, and open paths at the first positions of the trail."""

@@ -13,7 +13,7 @@ from robocov.arrays import Array
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.figures.gains import GainGrid, draw_gain_grid
-from robocov_app.figures.page import TITLE, FigurePage
+from robocov_app.figures.page import TITLE, FigurePage, PageBox
 from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
@@ -174,7 +174,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
         row, column = divmod(number, columns)
         x = left + column * (width + left + right)
         y = above + row * (height + above + below)
-        axes = page.add_axes((x, y, width, height))
+        axes = page.add_axes(PageBox(x, y, width, height))
         gap_grid = GainGrid(
             column_label="k_rep (N m³)",
             row_label="rho_0 (m)",

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from robocov.errors import format_count
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, FigurePage, style_axes, to_plot_color
+from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.colors import mix
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -64,7 +64,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
         row, column = divmod(number, columns)
         x = _FIRST_PANEL_LEFT_PX + column * slot_width
         y = _FIRST_PANEL_TOP_PX + row * slot_height
-        axes = page.add_axes((x, y, slot_width - _PANEL_GAP_PX, slot_height - _PANEL_LABELS_PX))
+        axes = page.add_axes(PageBox(x, y, slot_width - _PANEL_GAP_PX, slot_height - _PANEL_LABELS_PX))
         axes.set_ylim(bottom, top)
         _draw_panel(
             axes, name, [degradation for degradation in degradations if degradation.axis == name], theme

@@ -135,7 +135,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     width = size[0] - page.margin - left
     panels = []
     for start, panel_width, heading in _PANELS:
-        panels.append(page.add_axes((left + start * width, top, panel_width * width, height)))
+        panels.append(page.add_axes(PageBox(left + start * width, top, panel_width * width, height)))
         page.write(heading, left + start * width, top - 16 * scale)
     points = np.array([[optimum.x, optimum.y] for optimum in path] + [median])
     frame = _find_frame(points, _PANELS[1][1] * width / height)
@@ -171,8 +171,17 @@ def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]
     return [*labeled, last]
 
 
-def _find_frame(points: Array, aspect: float) -> PageBox:
-    """Return low x, low y, width and height, m, of the frame that is enlarged, with the given aspect ratio.
+class _Frame(NamedTuple):
+    """The rectangle of the map that is enlarged, m."""
+
+    low_x: float
+    low_y: float
+    width: float
+    height: float
+
+
+def _find_frame(points: Array, aspect: float) -> _Frame:
+    """Return the frame that is enlarged, with the given aspect ratio.
 
     The frame contains all points, (k, 2) m, and leaves space for labels, most of it on the right.
     """
@@ -182,15 +191,15 @@ def _find_frame(points: Array, aspect: float) -> PageBox:
     # The frame is extended in one direction to have this aspect ratio.
     width = max(min_width, min_height * aspect)
     height = max(min_height, min_width / aspect)
-    return (
-        float(low[0] - _FRAME_LEFT_FRACTION * width),
-        float((low[1] + high[1] - height) / 2.0),
-        float(width),
-        float(height),
+    return _Frame(
+        low_x=float(low[0] - _FRAME_LEFT_FRACTION * width),
+        low_y=float((low[1] + high[1] - height) / 2.0),
+        width=float(width),
+        height=float(height),
     )
 
 
-def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme) -> None:
+def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: _Frame, theme: Theme) -> None:
     """Draw the cell, the only one of its partition, and the outline of the frame that is enlarged."""
     fill = to_plot_color(theme.get_cell_color(1))
     axes.add_patch(
@@ -241,7 +250,7 @@ def _draw_path(
     axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **label_style)
 
 
-def _set_frame(axes: Axes, frame: PageBox, theme: Theme) -> None:
+def _set_frame(axes: Axes, frame: _Frame, theme: Theme) -> None:
     """Set the limits of axes to the enlarged frame, and outline it."""
     x, y, width, height = frame
     axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
@@ -257,10 +266,9 @@ def _draw_distance(
 ) -> None:
     """Draw the distance of the optimum from the centroid against the height, and a note on the loss."""
     line = to_plot_color(theme.final)
-    # In millimeters.
-    highest = 1e3 * path[0].distance
+    max_distance_mm = 1e3 * path[0].distance
     inner = path[1:-1]
-    axes.axhline(highest, color=to_plot_color(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.axhline(max_distance_mm, color=to_plot_color(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
     axes.plot(*_get_distance_curve(inner), color=line, linewidth=2.4)
     axes.plot(
         *_get_distance_curve(labeled[1:-1]),
@@ -270,7 +278,7 @@ def _draw_distance(
         markersize=5.5,
         markeredgewidth=0.0,
     )
-    axes.set(xscale="log", xlim=(inner[0].height, inner[-1].height), ylim=(0.0, 1.12 * highest))
+    axes.set(xscale="log", xlim=(inner[0].height, inner[-1].height), ylim=(0.0, 1.12 * max_distance_mm))
     axes.xaxis.set_major_formatter("{x:g}")
     _simplify_axes(axes, theme, "height h (m)", grid="y")
     worst = max(inner, key=lambda optimum: optimum.loss)

@@ -21,7 +21,7 @@ from robocov.voronoi import partition
 from robocov_app.figures import arena
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TITLE, FigurePage, to_plot_color
+from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox, to_plot_color
 from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.assets import ASSETS
@@ -303,13 +303,13 @@ def build_panels(
     panels : list of Axes
     """
     min_x, min_y, max_x, max_y = environment.region.bounds
+    # A first page, of any height, serves to measure the margin and the footer.
     sketch = FigurePage((width, width), theme, PAGE_SCALE)
     panel_width = (width - (count + 1) * sketch.margin) / count
     panel_height = panel_width / ((max_x - min_x) / (max_y - min_y))
     top = above * PAGE_SCALE
     page = FigurePage((width, round(top + panel_height + sketch.measure_footer(handles))), theme, PAGE_SCALE)
-    boxes = [
-        (page.margin + k * (panel_width + page.margin), top, panel_width, panel_height) for k in range(count)
-    ]
+    lefts = [page.margin + k * (panel_width + page.margin) for k in range(count)]
+    boxes = [PageBox(left, top, panel_width, panel_height) for left in lefts]
     page.draw_footer(handles, boxes, panel_width / (max_x - min_x))
     return page, [page.add_map_axes(box, min_x, min_y, max_x, max_y) for box in boxes]

@@ -66,21 +66,25 @@ def _choose_suffixes(gain_sets: Sequence[Gains]) -> list[str]:
     """
     if len(gain_sets) == 1:
         return [""]
-    differing_gains = [values for values in zip(*gain_sets, strict=False) if len(set(values)) > 1]
-    if len(differing_gains) == 1:
-        suffixes = [f" {name} {format_value(value, digits=4)}" for name, value in differing_gains[0]]
-        has_one_name = len({name for name, _ in differing_gains[0]}) == 1
+    # All sets list the gains of the controller in the same order, so each column belongs to one gain.
+    columns = zip(*gain_sets, strict=False)
+    differing_columns = [pairs for pairs in columns if len(set(pairs)) > 1]
+    if len(differing_columns) == 1:
+        suffixes = [f" {name} {format_value(value, digits=4)}" for name, value in differing_columns[0]]
+        has_one_name = len({name for name, _ in differing_columns[0]}) == 1
         is_unique = len(set(suffixes)) == len(gain_sets)
         if has_one_name and is_unique and max(map(len, suffixes)) <= _MAX_GAIN_SUFFIX_CHARS:
             return suffixes
-    letter_suffixes = []
-    for number in range(len(gain_sets)):
-        round_number, letter_number = divmod(number, len(_LETTERS))
-        suffix = f" {_LETTERS[letter_number]}"
-        if round_number > 0:
-            suffix += str(round_number + 1)
-        letter_suffixes.append(suffix)
-    return letter_suffixes
+    return [_format_letter_suffix(number) for number in range(len(gain_sets))]
+
+
+def _format_letter_suffix(number: int) -> str:
+    """Return the suffix with a number from 0: A, B, ..., Z, A2, B2, ..."""
+    round_number, letter_number = divmod(number, len(_LETTERS))
+    suffix = f" {_LETTERS[letter_number]}"
+    if round_number > 0:
+        suffix += str(round_number + 1)
+    return suffix
 
 
 def label_runs(result: ReportedResult) -> dict[ReportedRun, str]:
@@ -132,6 +136,7 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
         styles[run.label + TUNED_SUFFIX] = controller_styles[run.controller]
     for variant in list_variants(result):
         styles[variant.label] = controller_styles[variant.controller]
+    # Groups come first in `controllers`, so the styles of failed controllers are left over.
     for group, style in zip(groups, choose_curve_styles(controllers), strict=False):
         styles[group.label] = style
     return styles

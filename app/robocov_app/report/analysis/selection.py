@@ -1,7 +1,6 @@
 """Selection of the runs that a page shows as pictures and in the replay."""
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -60,8 +59,10 @@ def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_pane
     note = "All runs."
     if len(runs) > max_runs:
         runs, note = _select_extremes(result, max_runs)
-    groups = _select_groups(result, runs, max_variants=max_panes)
-    middle_runs = _find_middle_case(groups, compute_medians(result)) or runs[:1]
+    groups = list_variants(result)
+    if len(groups) > max_panes:
+        groups = choose_compared_groups(result).groups
+    middle_runs = _find_middle_case(groups, runs, compute_medians(result)) or runs[:1]
     panes = tuple(runs.index(run) for run in middle_runs[:max_panes])
     return RunSelection(runs, note, panes)
 
@@ -86,7 +87,8 @@ def _select_extremes(result: ReportedResult, max_runs: int) -> tuple[tuple[Repor
 def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> set[ReportedRun]:
     """Return the best and the worst run of each controller, and the runs of the middle case."""
     scales = compute_medians(result)
-    extremes = set(_find_middle_case(_select_groups(result, runs), scales))
+    groups = choose_compared_groups(result).groups
+    extremes = set(_find_middle_case(groups, runs, scales))
     known_runs = [run for run in runs if np.isfinite(scale_distance(run, scales))]
     for controller_runs in group_by(known_runs, lambda run: run.controller).values():
         distances = [scale_distance(run, scales) for run in controller_runs]
@@ -95,40 +97,30 @@ def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> set[R
     return extremes
 
 
-def _select_groups(
-    result: ReportedResult, runs: Iterable[ReportedRun], max_variants: int = 0
-) -> list[RunGroup]:
-    """Return all variants, reduced to given runs; if there are many variants, only the compared groups."""
-    selected = set(runs)
-    groups = list_variants(result)
-    if len(groups) > max_variants:
-        groups = choose_compared_groups(result).groups
-    return [_keep_runs(group, selected) for group in groups]
-
-
-def _keep_runs(group: RunGroup, runs: Collection[ReportedRun]) -> RunGroup:
-    """Return a group reduced to its runs that are in `runs`."""
-    return replace(group, runs=tuple(run for run in group.runs if run in runs))
-
-
-def _find_middle_case(groups: Sequence[RunGroup], scales: Scales) -> tuple[ReportedRun, ...]:
-    """Return the runs of the case that is most typical for all groups.
+def _find_middle_case(
+    groups: Sequence[RunGroup], runs: Sequence[ReportedRun], scales: Scales
+) -> tuple[ReportedRun, ...]:
+    """Return those of the given runs whose case is the most typical one for all groups.
 
     It is a case that the largest number of groups have. Among these, it is the one whose ranks, by distance,
     are nearest to the middle of each group.
     """
-    offsets: list[tuple[float, ReportedRun]] = []
+    candidates = set(runs)
+    offsets: dict[ReportedRun, float] = {}
     for group in groups:
-        known_runs = [run for run in group.runs if np.isfinite(scale_distance(run, scales))]
+        group_runs = [run for run in group.runs if run in candidates]
+        known_runs = [run for run in group_runs if np.isfinite(scale_distance(run, scales))]
         ranked_runs = sorted(known_runs, key=lambda run: scale_distance(run, scales))
-        count = len(ranked_runs)
+        middle_rank = (len(ranked_runs) - 1) / 2
         for rank, run in enumerate(ranked_runs):
-            offsets.append((abs(rank - (count - 1) / 2) / count, run))
-    cases = group_by(offsets, lambda pair: pair[1].case).values()
-    middle_case = min(cases, key=_rate_case, default=[])
-    return tuple(run for _, run in middle_case)
+            offsets[run] = abs(rank - middle_rank) / len(ranked_runs)
 
+    def build_sort_key(case_runs: Sequence[ReportedRun]) -> tuple[int, float]:
+        """Return a key that puts the cases with the most runs first, then those nearest to the middle."""
+        return -len(case_runs), sum(offsets[run] for run in case_runs)
 
-def _rate_case(case: Sequence[tuple[float, ReportedRun]]) -> tuple[int, float]:
-    """Return a sort key of a case, a list of (distance from the middle rank, run): the most runs first."""
-    return -len(case), sum(offset for offset, _ in case)
+    if not offsets:
+        return ()
+    cases = group_by(offsets, lambda run: run.case).values()
+    middle_case = min(cases, key=build_sort_key)
+    return tuple(middle_case)

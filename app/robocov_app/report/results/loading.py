@@ -69,25 +69,17 @@ def _load_runs(folder: Path) -> ReportedResult:
     """Load a run, or the runs of a comparison; runs that cannot be read are listed as damaged."""
     kind: ResultKind = "run"
     run_folders = [folder]
-    is_unfinished = False
+    started_folders = run_folders
     path = folder / COMPARISON_FILE
     if path.is_file():
         kind = "comparison"
         document = read_document(path, ComparisonDocument, "robocov-comparison", 1)
         run_folders = [folder / name for name in document.folders]
+        started_folders = run_folders
         is_unfinished = not document.runs
-    saved_runs: list[SavedRun] = []
-    damaged_runs: list[DamagedRun] = []
-    for run_folder in run_folders:
-        if is_unfinished and not (run_folder / RUN_FILE).is_file():
-            continue
-        try:
-            saved_run = load_saved_runs(run_folder)[0]
-            if saved_runs:
-                _check_same_map(saved_run, saved_runs[0])
-            saved_runs.append(saved_run)
-        except InputError as error:
-            damaged_runs.append(describe_damage(run_folder, error))
+        if is_unfinished:
+            started_folders = [path for path in run_folders if (path / RUN_FILE).is_file()]
+    saved_runs, damaged_runs = _read_runs(started_folders)
     if not saved_runs and not damaged_runs:
         raise InputError(f"{path}: there is no run in it")
     runs = []
@@ -115,6 +107,21 @@ def _load_runs(folder: Path) -> ReportedResult:
     )
 
 
+def _read_runs(folders: Sequence[Path]) -> tuple[list[SavedRun], list[DamagedRun]]:
+    """Read the runs in folders, which must all have the same map; return readable and damaged runs."""
+    saved_runs: list[SavedRun] = []
+    damaged_runs: list[DamagedRun] = []
+    for folder in folders:
+        try:
+            saved_run = load_saved_runs(folder)[0]
+            if saved_runs:
+                _check_same_map(saved_run, saved_runs[0])
+            saved_runs.append(saved_run)
+        except InputError as error:
+            damaged_runs.append(describe_damage(folder, error))
+    return saved_runs, damaged_runs
+
+
 def _check_same_map(saved_run: SavedRun, first_run: SavedRun) -> None:
     """Raise InputError if a run does not have the same map as the first run of its comparison."""
     environment = build_roster(saved_run.record).environment
@@ -122,7 +129,7 @@ def _check_same_map(saved_run: SavedRun, first_run: SavedRun) -> None:
     is_same_boundary = environment.boundary == first_environment.boundary
     if not is_same_boundary or environment.obstacles != first_environment.obstacles:
         path = saved_run.folder / RUN_FILE
-        raise InputError(f"{path}: another map than in {first_run.folder.name}")
+        raise InputError(f"{path}: expected the map of {first_run.folder.name}, got a different map")
 
 
 def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:
@@ -188,7 +195,7 @@ def _load_sweep(folder: Path) -> ReportedResult:
     study = _read_study(results.study, folder / STUDY_FILE)
     rows = list(results.rows())
     if not rows:
-        raise InputError(f"{folder}: not one of the {study.run_count} runs of the sweep is done")
+        raise InputError(f"{folder}: none of the {study.run_count} runs of the sweep is done")
     runs = [_build_run_of_row(row, study, folder) for row in rows]
     facts = study.facts
     if study.teams:
