@@ -71,9 +71,9 @@ NOTES = (
     "Medians over runs, with exceptions: contacts are the runs in which a robot touched a wall or another "
     "one; at rest is the fraction of runs that end with no robot moving 5 cm in any 4 s; rest is the "
     "Kaplan-Meier median of the time when that starts; runs that do not come to rest are censored. B/s: "
-    "bytes that a robot sends per second, received or not: 20 for a position, 5 for each changed cell of a "
-    "shared map, 28 for each reported position of another robot (number, position, time). µs/s: processor "
-    "time of the controller per robot and second, which depends on the machine.",
+    "bytes that a robot sends per second, received or not: 20 for each position (number, position), and the "
+    "sizes of the messages of its controller, in which robots share maps and reports about other robots. "
+    "µs/s: processor time of the controller per robot and second, which depends on the machine.",
 )
 
 

@@ -140,9 +140,8 @@ def describe_method() -> list[str]:
         "near_final_s: the time from which J stays within 5 % of its final value. settled_at_s: the time "
         "from which no robot moves 5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of "
         "|F v|, all robots.",
-        "told_bytes: 20 bytes (position and number) a robot and control period, or message; where maps are "
-        "shared also 5 bytes for each cell that has changed on its map, also through messages, and by "
-        "atlas-shared 28 bytes (number, position, time) for each other robot that it knows of, at each plan.",
+        "told_bytes: what all robots send, received or not: 20 bytes (number and position) a robot and "
+        "control period, or at the message rate, and the messages of the controller, such as shared maps.",
         "deciding_s: processor time of the controller alone, all robots; it depends on the machine.",
     ]
 

@@ -15,7 +15,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS, get_information
 from robocov.controllers.base import Information
 from robocov.errors import InputError, format_count
 from robocov.mapfile import to_json
@@ -48,6 +47,8 @@ NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
 """The probability of missing changed rows is reported for one row, and for this fraction of all rows."""
+_READING_SHARED_MAPS = ("atlas-shared", "frontier-median", "greedy-submodular", "voronoi-graph")
+"""Controllers whose robots read the maps of others directly, without messages."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run and are not compared."""
 _DESCRIBED = ("label", "information", "gains")
@@ -313,7 +314,7 @@ def reads_shared_maps(controller: str) -> bool:
     bool
         False for controllers of users, whose robots have to send messages.
     """
-    return controller in CONTROLLERS and get_information(CONTROLLERS[controller]) == "shared map"
+    return controller in _READING_SHARED_MAPS
 
 
 def _create_generator(seed: int, *stream: int) -> np.random.Generator:

@@ -13,8 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.controllers import get_information
-from robocov.controllers.teammates import Teammates
+from robocov.conditions.communication import POSITION_BYTES
 from robocov.controllers.user_modules import provide_modules
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
@@ -22,7 +21,6 @@ from robocov.files.result_names import COST_FILE, ERROR_FILE, RECORD_FILE, RUN_F
 from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.observation import Snapshot
-from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Channel
@@ -49,17 +47,11 @@ MEAN_TIME = "mean_time_s"
 """Additional figure of runs in which robots differ in speed."""
 EFFORT_FILE = "effort.json"
 """File with the effort of a run with metrics; not part of the table, since computing times vary."""
-POSITION_BYTES = 20
-"""Size of a message with the number and the position of a robot."""
-CELL_BYTES = 5
-"""Size of the state and the index of a map cell."""
-REPORT_BYTES = 28
-"""Size of the number and the position of another robot, and the time of that position."""
 Watch: TypeAlias = Callable[[Snapshot], object]
 """Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
-_RESULTS_VERSION = 4
-"""To be increased whenever the same inputs give other results. 4: noise and message loss use NumPy."""
+_RESULTS_VERSION = 5
+"""To be increased whenever the same inputs give other results. 5: robots share maps by messages."""
 
 
 @cache
@@ -218,7 +210,7 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
             if step and step % _COLLECTION_STEPS == 0:
                 gc.collect(0)
             if step and task.metrics:
-                meter.count()
+                meter.count_positions()
             if watch is not None:
                 watch(simulation.observe_and_decide())
             return False
@@ -230,48 +222,29 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
 class CommunicationMeter:
     """Counts the bytes that robots send, whether they are received or not.
 
-    Each robot sends its position at the message rate of the conditions, by default in each control step.
-    Robots that share maps also send each changed cell of their map, even if another robot measured it, and,
-    whenever they plan, the positions of others that they know.
+    Each robot sends its position at the message rate of the conditions, by default in each control step. The
+    messages of the controller are counted by the simulation.
 
-    Attributes
+    Parameters
     ----------
-    bytes : float or None
-        Number of bytes; None if the controller shares maps in a form that cannot be measured.
+    simulation : Simulation
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         rate: float | None = getattr(simulation.conditions, "message_rate", None)
-        self._messages_per_step = 1.0 if rate is None else min(1.0, rate * simulation.dt)
-        self._shares_maps = get_information(simulation.controller) == "shared map"
-        self._maps = self._get_maps()
-        self._reports = self._get_reports()
-        self.bytes: float | None = 0.0
+        self._positions_per_step = 1.0 if rate is None else min(1.0, rate * simulation.dt)
+        self._position_bytes = 0.0
 
-    def _get_maps(self) -> tuple[DiscoveredMap, ...] | None:
-        return getattr(self._simulation.memory, "maps", None) if self._shares_maps else ()
+    def count_positions(self) -> None:
+        """Count the positions that the robots sent in the latest step."""
+        sender_count = int(self._simulation.working.sum())
+        self._position_bytes += self._positions_per_step * POSITION_BYTES * sender_count
 
-    def _get_reports(self) -> tuple[Teammates, ...]:
-        return getattr(self._simulation.memory, "reports", ()) if self._shares_maps else ()
-
-    def count(self) -> None:
-        """Count the bytes of the latest step."""
-        previous_maps = self._maps
-        previous_reports = self._reports
-        self._maps = self._get_maps()
-        self._reports = self._get_reports()
-        if self.bytes is None or previous_maps is None or self._maps is None:
-            self.bytes = None
-            return
-        self.bytes += self._messages_per_step * POSITION_BYTES * int(self._simulation.working.sum())
-        for previous_map, current_map in zip(previous_maps, self._maps, strict=True):
-            if current_map is not previous_map:
-                changed_cells = int(np.count_nonzero(current_map.state != previous_map.state))
-                self.bytes += CELL_BYTES * changed_cells
-        for previous_report, report in zip(previous_reports, self._reports, strict=True):
-            if report is not previous_report:
-                self.bytes += REPORT_BYTES * len(report.robots)
+    @property
+    def bytes(self) -> float:
+        """Number of bytes so far."""
+        return self._position_bytes + self._simulation.sent_bytes
 
 
 def prepare_cost(task: Task) -> CoverageCost:

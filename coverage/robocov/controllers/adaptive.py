@@ -10,6 +10,12 @@ import scipy
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, is_plan_due
+from robocov.controllers.density_exchange import (
+    MeasurementExchange,
+    MessageLists,
+    ParameterExchange,
+    add_received_measurements,
+)
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
@@ -43,6 +49,10 @@ class AdaptiveMemory:
     """(n, m) s, λ."""
     measurements: Array
     """(n, s) Measurements of φ in the squares, also those of other robots; nan if there is none."""
+    has_new_measurements: BoolArray
+    """(n,) Whether the measurements of each robot have changed since its latest estimate."""
+    parameter_exchange: ParameterExchange
+    measurement_exchange: MeasurementExchange
     goals: Array | None = None
     """(n, 2) m"""
     plan_time: float = -np.inf
@@ -54,13 +64,15 @@ class Adaptive(BaseController):
     """Lloyd's algorithm with a density that is learned (Schwager, Rus and Slotine, IJRR 28, 2009).
 
     A robot measures the density only at its own position. It estimates the density everywhere from its own
-    measurements and from what its neighbors send, and moves to the centroid of its Voronoi cell under that
+    measurements and from the messages of others, and moves to the centroid of its Voronoi cell under that
     estimate. It does not explore: where no robot has been, the estimate stays close to `prior`.
 
-    With ``estimate="basis"``, the estimate is a sum of Gaussians as in the paper, and neighbors send each
-    other their estimates. With ``estimate="gp"``, it is the mean of a Gaussian process, and neighbors send
-    each other their measurements. Both have the information "shared map". Obstacles are not known; robots
-    slide along them as with `Lloyd`.
+    With ``estimate="basis"``, the estimate is a sum of Gaussians as in the paper, and robots send each other
+    their parameters: 4 + 8 `basis`² bytes every `period` seconds. With ``estimate="gp"``, it is the mean of a
+    Gaussian process, and robots send each other measurements, their own and received ones: at most 50 every
+    `period` seconds, 4 + 10 k bytes for k measurements. Both have the information "shared map";
+    `robocov.controllers.density_exchange` describes the messages. Obstacles are not known; robots slide along
+    them as with `Lloyd`.
 
     The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
 
@@ -74,7 +86,8 @@ class Adaptive(BaseController):
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
 
     The first term of da_i/dt fits the robot's measurements. The second one, with P_i = ∫ K (q - p_i)^T dq
-    over V_i, makes the paper's Lyapunov function decrease. The third one is the consensus with the neighbors.
+    over V_i, makes the paper's Lyapunov function decrease. The third one is the consensus with the neighbors;
+    a_j are the newest parameters that robot i has received from robot j.
 
     *Gaussian process.* One measurement is stored for each of 20 by 20 squares, as if taken at its center. The
     kernel is the squared exponential with the length `correlation`, as in Luo and Sycara (ICRA 2018) and
@@ -132,10 +145,14 @@ class Adaptive(BaseController):
             information=np.zeros((robot_count, function_count, function_count)),
             projections=np.zeros((robot_count, function_count)),
             measurements=np.full((robot_count, len(lattice.squares)), np.nan),
+            has_new_measurements=np.zeros(robot_count, dtype=bool),
+            parameter_exchange=ParameterExchange.create_empty(robot_count),
+            measurement_exchange=MeasurementExchange.create_empty(robot_count, len(lattice.squares)),
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
         """Update the estimates if they are due, and compute the forces toward the centroids."""
+        memory = self._receive(seen, memory)
         if memory.goals is None or is_plan_due(memory.plan_time, self.period, seen.time):
             memory = self._plan(seen, memory)
         assert memory.goals is not None
@@ -143,7 +160,31 @@ class Adaptive(BaseController):
             memory.goals - seen.positions, self.k_prop, memory.team.max_speed
         )
         forces = compute_drive_forces(velocities, seen, memory.team, self.response_time)
-        return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
+        terms = {"attraction": forces}
+        memory, messages = self._send(seen, memory)
+        return Decision(forces, memory.goals, terms, memory=memory, messages=messages)
+
+    def _receive(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
+        """Return the memory with the content of the messages that arrive in this step."""
+        if not seen.messages:
+            return memory
+        if self.estimate == "basis":
+            return replace(memory, parameter_exchange=memory.parameter_exchange.receive(seen))
+        measurements = add_received_measurements(seen, memory.measurements)
+        is_added = np.isnan(memory.measurements) & ~np.isnan(measurements)
+        return replace(
+            memory,
+            measurements=measurements,
+            has_new_measurements=memory.has_new_measurements | is_added.any(axis=1),
+        )
+
+    def _send(self, seen: Observations, memory: AdaptiveMemory) -> tuple[AdaptiveMemory, MessageLists]:
+        """Return the memory after the robots sent what they can send in this step, and the messages."""
+        if self.estimate == "basis":
+            parameter_exchange, messages = memory.parameter_exchange.send(seen, memory.parameters)
+            return replace(memory, parameter_exchange=parameter_exchange), messages
+        measurement_exchange, messages = memory.measurement_exchange.send(seen, memory.measurements)
+        return replace(memory, measurement_exchange=measurement_exchange), messages
 
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory with new estimates, and with the centroids of the cells under them as goals."""
@@ -171,6 +212,7 @@ class Adaptive(BaseController):
             Which samples are in the cell of each robot.
         """
         lattice = memory.lattice
+        exchange = memory.parameter_exchange.forget_silent_robots(seen.neighbors)
         dt = self.period
         functions = lattice.evaluate_basis(seen.positions)
         # Λ is `information`, λ is `projections`.
@@ -184,7 +226,7 @@ class Adaptive(BaseController):
         # With da/dt = drive - decay a, an implicit step solves (1 + dt decay) a' = a + dt drive.
         drive = (
             self.learning * projections
-            + self.consensus * self._average_neighbors(seen, memory.parameters)
+            + self.consensus * exchange.compute_means(memory.parameters)
             + self.coupling * coupling
         )
         identity = np.eye(memory.parameters.shape[1])
@@ -197,33 +239,29 @@ class Adaptive(BaseController):
             parameters=parameters,
             information=information,
             projections=projections,
+            parameter_exchange=exchange.start_period(),
         )
 
-    def _average_neighbors(self, seen: Observations, parameters: Array) -> Array:
-        """Return the mean parameters of each robot's neighbors; its own parameters if it has none."""
-        means = parameters.copy()
-        for robot in range(len(parameters)):
-            neighbors = seen.neighbors.list_neighbors(robot)
-            if len(neighbors) > 0:
-                means[robot] = parameters[neighbors].mean(axis=0)
-        return means
-
     def _learn_by_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with the robots' own measurements, and those of their neighbors."""
+        """Return the memory with the robots' own measurements, and the estimates from all that they know."""
         lattice = memory.lattice
         values = _measure(seen)
         measurements = memory.measurements.copy()
         estimates = memory.estimates.copy()
         for robot, position in enumerate(seen.positions):
-            known = measurements[robot]
-            for neighbor in seen.neighbors.list_neighbors(robot):
-                known = np.where(np.isnan(known), memory.measurements[neighbor], known)
             square = ((lattice.squares - position) ** 2).sum(axis=1).argmin()
-            known[square] = values[robot]
-            measurements[robot] = known
-            if not np.array_equal(known, memory.measurements[robot], equal_nan=True):
-                estimates[robot] = np.maximum(self._estimate_by_process(lattice, known), self.least)
-        return replace(memory, estimates=estimates, measurements=measurements)
+            is_new = measurements[robot, square] != values[robot]
+            measurements[robot, square] = values[robot]
+            if is_new or memory.has_new_measurements[robot]:
+                estimate = self._estimate_by_process(lattice, measurements[robot])
+                estimates[robot] = np.maximum(estimate, self.least)
+        return replace(
+            memory,
+            estimates=estimates,
+            measurements=measurements,
+            has_new_measurements=np.zeros(len(values), dtype=bool),
+            measurement_exchange=memory.measurement_exchange.start_period(measurements),
+        )
 
     def _estimate_by_process(self, lattice: Lattice, measurements: Array) -> Array:
         """Return the estimate of one robot at the samples, (k,), from measurements in the squares, (s,)."""

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from robocov.arrays import Array
+from robocov.conditions import Conditions
 from robocov.controllers import Adaptive, Lloyd
 from robocov.controllers.adaptive import AdaptiveMemory, Lattice
 from robocov.controllers.base import Controller
@@ -14,7 +15,7 @@ from robocov.density import Gaussian, Gaussians
 from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.environment import Environment
-from robocov.observation import Observations
+from robocov.observation import Decision, Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -68,10 +69,22 @@ def learn_everywhere(
     """Return the memory of five robots that were moved to random positions in the square."""
     rng = np.random.default_rng(4)
     memory = controller.begin(REGION, Team.homogeneous(5))
+    messages: list[list[ReceivedMessage]] = []
     for k in range(steps):
         seen = build_observations(rng.uniform(0.2, 9.8, (5, 2)), k * controller.period, density, reach)
-        memory = controller.decide(seen, memory).memory
+        decision = controller.decide(replace(seen, messages=messages), memory)
+        messages = deliver(decision, seen.neighbors)
+        memory = decision.memory
     return memory
+
+
+def deliver(decision: Decision, neighbors: Neighbors) -> list[list[ReceivedMessage]]:
+    """Return the messages that arrive at each robot if none is lost."""
+    received: list[list[ReceivedMessage]] = [[] for _ in range(neighbors.robot_count)]
+    for sender, messages in enumerate(decision.messages):
+        for receiver in neighbors.list_neighbors(sender):
+            received[receiver] += [ReceivedMessage(sender, message.payload) for message in messages]
+    return received
 
 
 @pytest.mark.parametrize("estimate", ["basis", "gp"])
@@ -144,6 +157,58 @@ def test_a_learning_team_covers_nearly_as_well_as_one_that_knows_the_density(est
     uninformed_cost = compute_final_cost(SQUARE, Lloyd(), starts)
     learned_cost = compute_final_cost(hot_square, Adaptive(estimate=estimate), starts)
     assert informed_cost < learned_cost < 0.7 * uninformed_cost + 0.3 * informed_cost
+
+
+@pytest.mark.parametrize("estimate", ["basis", "gp"])
+def test_robots_use_nothing_that_was_sent_less_than_the_latency_ago(estimate: str) -> None:
+    """Change what two robots know after 1 s: with a latency of 2 s, the third one notices after 3 s."""
+    starts = SQUARE.start().sample(3, seed=2, radius=0.1)
+    conditions = Conditions(delay=2.0)
+    usual = Simulation(SQUARE, Adaptive(estimate=estimate), starts, conditions=conditions)
+    changed = Simulation(SQUARE, Adaptive(estimate=estimate), starts, conditions=conditions)
+    is_same = []
+    for step in range(240):
+        if step == 60:
+            changed.memory = change_measurements(changed.memory, robots=[0, 1])
+        usual.step()
+        changed.step()
+        is_same.append((usual.memory.estimates[2] == changed.memory.estimates[2]).all())
+    assert all(is_same[:180])
+    assert not any(is_same[210:])
+
+
+def change_measurements(memory: AdaptiveMemory, robots: list[int]) -> AdaptiveMemory:
+    """Return a memory in which some robots have measured and learned other values."""
+    measurements = memory.measurements.copy()
+    projections = memory.projections.copy()
+    measurements[robots, 0] = 5.0
+    projections[robots] += 1.0
+    return replace(memory, measurements=measurements, projections=projections)
+
+
+def test_lost_measurements_are_sent_again() -> None:
+    starts = SQUARE.start().sample(4, seed=2, radius=0.1)
+    conditions = Conditions(loss=0.5, message_rate=4.0)
+    hot_square = SQUARE.with_density(HOT)
+    simulation = Simulation(hot_square, Adaptive(estimate="gp"), starts, conditions=conditions)
+    simulation.run(12.0)
+    is_known = ~np.isnan(simulation.memory.measurements)
+    assert np.count_nonzero(is_known[0]) > 20
+    assert (is_known == is_known[0]).all()
+
+
+@pytest.mark.parametrize("estimate", ["basis", "gp"])
+def test_a_copy_continues_with_the_same_messages(estimate: str) -> None:
+    starts = SQUARE.start().sample(3, seed=2, radius=0.1)
+    hot_square = SQUARE.with_density(HOT)
+    conditions = Conditions(loss=0.3, delay=0.3)
+    simulation = Simulation(hot_square, Adaptive(estimate=estimate), starts, conditions=conditions)
+    simulation.run(1.0)
+    twin = simulation.copy()
+    simulation.run(1.0)
+    twin.run(1.0)
+    np.testing.assert_array_equal(twin.positions, simulation.positions)
+    np.testing.assert_array_equal(twin.memory.estimates, simulation.memory.estimates)
 
 
 def compute_final_cost(environment: Environment, controller: Controller, starts: Array) -> float:

@@ -28,7 +28,12 @@ from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, dra
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference
 from robocov_app.benchmark.running import run_benchmark
-from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
+from robocov_app.benchmark.verification import (
+    Verification,
+    VerificationOptions,
+    reads_shared_maps,
+    verify_result,
+)
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform
 from robocov_app.terminal.interruption import Interruption
@@ -157,7 +162,7 @@ ISOLATED = [
     pytest.param(name, track, id=f"{name}-{track}", marks=[pytest.mark.slow] if name in SLOW else [])
     for name, kind in CONTROLLERS.items()
     for track in ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
-    if kind.information != "shared map"
+    if not reads_shared_maps(name)
 ]
 
 

@@ -1,0 +1,239 @@
+"""Messages of robots that learn a density together: parameters of their estimates, or measurements.
+
+Once in each learning period, robots send what they know, as far as the communication allows:
+
+- *Parameters.* All m parameters of its estimate, in one message of 4 + 8 m bytes. A receiver uses the newest
+  parameters from each neighbor until newer ones arrive, or until it forgets the neighbor.
+- *Measurements.* At most `MAX_SENT_MEASUREMENTS` of its own measurements and of those that it has received,
+  in messages of 4 + 10 k bytes for k measurements. Those that it has not sent yet come first, then those that
+  it sent longest ago. So lost messages are made up for, and robots that meet later receive all measurements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.observation import Message, Observations
+from robocov.observation.neighbors import Neighbors
+
+HEADER_BYTES = 4
+"""Size of the number of the sender, at the start of a message."""
+PARAMETER_BYTES = 8
+"""Size of a parameter."""
+MEASUREMENT_BYTES = 10
+"""Size of a measurement: 2 bytes for the number of its square, 8 for its value."""
+MAX_SENT_MEASUREMENTS = 50
+"""Maximum number of measurements that a robot sends in one learning period."""
+
+MessageLists: TypeAlias = Sequence[Sequence[Message]]
+"""The messages that each robot sends in a step; empty if no robot sends any."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ParameterExchange:
+    """Parameters that robots have received, and whether they still have to send their own. Immutable.
+
+    Attributes
+    ----------
+    received : tuple of mapping of int to (m,) array
+        The newest parameters that each robot has received from others, by the index of the sender.
+    is_unsent : (n,) bool array
+        Whether each robot has parameters that it has not sent yet.
+    """
+
+    received: tuple[Mapping[int, Array], ...]
+    is_unsent: BoolArray
+
+    @classmethod
+    def create_empty(cls, robot_count: int) -> ParameterExchange:
+        """Create the exchange of robots that have not received anything."""
+        return cls(received=({},) * robot_count, is_unsent=np.zeros(robot_count, dtype=bool))
+
+    def receive(self, seen: Observations) -> ParameterExchange:
+        """Return the exchange after the messages of a step have arrived."""
+        if not seen.messages:
+            return self
+        received = []
+        for robot, known in enumerate(self.received):
+            arrived = {message.sender: message.payload for message in seen.get_messages(robot)}
+            received.append({**known, **arrived} if arrived else known)
+        return replace(self, received=tuple(received))
+
+    def start_period(self) -> ParameterExchange:
+        """Return the exchange at the start of a learning period, when all parameters are new."""
+        return replace(self, is_unsent=np.ones(len(self.received), dtype=bool))
+
+    def forget_silent_robots(self, neighbors: Neighbors) -> ParameterExchange:
+        """Return the exchange without the parameters of robots that are no longer neighbors."""
+        received = []
+        for robot, known in enumerate(self.received):
+            heard = set(neighbors.list_neighbors(robot).tolist())
+            received.append(known if heard.issuperset(known) else _select_senders(known, heard))
+        return replace(self, received=tuple(received))
+
+    def compute_means(self, parameters: Array) -> Array:
+        """Compute the mean of the parameters that each robot has received.
+
+        Parameters
+        ----------
+        parameters : (n, m) array
+            Parameters of the robots themselves.
+
+        Returns
+        -------
+        (n, m) array
+            The robot's own parameters if it has received none.
+        """
+        means = parameters.copy()
+        for robot, known in enumerate(self.received):
+            if known:
+                means[robot] = np.mean([known[sender] for sender in sorted(known)], axis=0)
+        return means
+
+    def send(self, seen: Observations, parameters: Array) -> tuple[ParameterExchange, MessageLists]:
+        """Send parameters that have not been sent yet, where the communication allows it.
+
+        Parameters
+        ----------
+        seen : Observations
+        parameters : (n, m) array
+
+        Returns
+        -------
+        exchange : ParameterExchange
+        messages : sequence of sequence of Message
+        """
+        if not self.is_unsent.any():
+            return self, ()
+        is_sender = self.is_unsent & find_possible_senders(seen)
+        size = HEADER_BYTES + PARAMETER_BYTES * parameters.shape[1]
+        messages: list[list[Message]] = [[] for _ in parameters]
+        for robot in np.flatnonzero(is_sender).tolist():
+            messages[robot].append(Message(parameters[robot].copy(), size))
+        return replace(self, is_unsent=self.is_unsent & ~is_sender), messages
+
+
+class Measurements(NamedTuple):
+    """Content of a message with k measurements."""
+
+    squares: IntArray
+    """(k,) Numbers of the squares."""
+    values: Array
+    """(k,) φ in the squares."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasurementExchange:
+    """When robots sent which measurements, and how many they may still send. Immutable.
+
+    Attributes
+    ----------
+    sent_times : (n, s) array, s
+        When each robot last sent the measurement in each square; -inf if it never did.
+    allowances : (n,) int array
+        How many measurements each robot may still send in this learning period.
+    """
+
+    sent_times: Array
+    allowances: IntArray
+
+    @classmethod
+    def create_empty(cls, robot_count: int, square_count: int) -> MeasurementExchange:
+        """Create the exchange of robots that have not sent anything."""
+        return cls(
+            sent_times=np.full((robot_count, square_count), -np.inf),
+            allowances=np.zeros(robot_count, dtype=np.intp),
+        )
+
+    def start_period(self, measurements: Array) -> MeasurementExchange:
+        """Return the exchange at the start of a learning period.
+
+        Parameters
+        ----------
+        measurements : (n, s) array
+            Measurements that each robot knows; nan if there is none.
+        """
+        known_counts = (~np.isnan(measurements)).sum(axis=1)
+        return replace(self, allowances=np.minimum(known_counts, MAX_SENT_MEASUREMENTS))
+
+    def send(self, seen: Observations, measurements: Array) -> tuple[MeasurementExchange, MessageLists]:
+        """Send measurements, as many as the allowances and the communication permit.
+
+        Parameters
+        ----------
+        seen : Observations
+        measurements : (n, s) array
+            Measurements that each robot knows; nan if there is none.
+
+        Returns
+        -------
+        exchange : MeasurementExchange
+        messages : sequence of sequence of Message
+        """
+        if not self.allowances.any():
+            return self, ()
+        is_sender = (self.allowances > 0) & find_possible_senders(seen)
+        sent_times = self.sent_times.copy()
+        allowances = self.allowances.copy()
+        messages: list[list[Message]] = [[] for _ in measurements]
+        for robot in np.flatnonzero(is_sender).tolist():
+            count = self._count_measurements_to_send(seen, robot)
+            known = np.flatnonzero(~np.isnan(measurements[robot]))
+            order = np.argsort(sent_times[robot, known], kind="stable")
+            squares = known[order[:count]]
+            content = Measurements(squares, measurements[robot, squares])
+            messages[robot].append(Message(content, HEADER_BYTES + MEASUREMENT_BYTES * len(squares)))
+            sent_times[robot, squares] = seen.time
+            allowances[robot] -= len(squares)
+        return replace(self, sent_times=sent_times, allowances=allowances), messages
+
+    def _count_measurements_to_send(self, seen: Observations, robot: int) -> int:
+        """Return how many measurements a robot sends in this step: at least one."""
+        allowance = int(self.allowances[robot])
+        if seen.send_limits is None:
+            return allowance
+        fitting = int((seen.send_limits[robot] - HEADER_BYTES) // MEASUREMENT_BYTES)
+        return min(allowance, max(1, fitting))
+
+
+def add_received_measurements(seen: Observations, measurements: Array) -> Array:
+    """Add the measurements that arrive in a step to those that the robots know.
+
+    A robot keeps the measurement that it has in a square.
+
+    Parameters
+    ----------
+    seen : Observations
+    measurements : (n, s) array
+        Measurements that each robot knows; nan if there is none.
+
+    Returns
+    -------
+    (n, s) array
+        The same array if nothing has arrived.
+    """
+    if not seen.messages:
+        return measurements
+    measurements = measurements.copy()
+    for robot, known in enumerate(measurements):
+        for message in seen.get_messages(robot):
+            squares = message.payload.squares
+            is_new = np.isnan(known[squares])
+            known[squares[is_new]] = message.payload.values[is_new]
+    return measurements
+
+
+def find_possible_senders(seen: Observations) -> BoolArray:
+    """Return which robots can send a message in this step, (n,)."""
+    if seen.send_limits is None:
+        return np.ones(len(seen.positions), dtype=bool)
+    return np.asarray(seen.send_limits > 0)
+
+
+def _select_senders(received: Mapping[int, Array], senders: set[int]) -> dict[int, Array]:
+    return {sender: parameters for sender, parameters in received.items() if sender in senders}
