@@ -121,23 +121,25 @@ def build_pane_layout(
     width, height = size or MAX_DEFAULT_SIZE_PX
     columns = _count_columns(len(records), aspect, (width, height))
     rows = math.ceil(len(records) / columns)
-    scale = choose_scale((width, height))
-    scale = max(min(scale, width / columns / _MIN_PANE_WIDTH_PX), _MIN_SCALE)
-    pane_width = (width - (columns - 1) * PANE_GAP_PX) // columns
-    pane_height = 0
-    if size is None:
-        max_height = (height - (_HEADER_PADDING_PX + ROW_HEIGHT_PX) * scale) / rows - PANE_GAP_PX
-        pane_width, pane_height = _fit_pane(aspect, pane_width, max_height, scale)
-        width = columns * pane_width + (columns - 1) * PANE_GAP_PX
-    header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
-    gaps = (rows - 1) * PANE_GAP_PX
-    if size is None:
-        height = len(header) + rows * pane_height + gaps
+    max_scale = width / columns / _MIN_PANE_WIDTH_PX
+    scale = max(min(choose_scale((width, height)), max_scale), _MIN_SCALE)
+    gaps_width = (columns - 1) * PANE_GAP_PX
+    gaps_height = (rows - 1) * PANE_GAP_PX
+    pane_width = (width - gaps_width) // columns
+    if size is not None:
+        header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
+        pane_height = (height - len(header) - gaps_height) // rows
+    else:
+        # The legend has at least one row.
+        min_header_height = (_HEADER_PADDING_PX + ROW_HEIGHT_PX) * scale
+        max_pane_height = (height - min_header_height) / rows - PANE_GAP_PX
+        pane_width, pane_height = _fit_pane(aspect, pane_width, max_pane_height, scale)
+        width = columns * pane_width + gaps_width
+        header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
+        height = len(header) + rows * pane_height + gaps_height
         # Video encoders need even sizes.
         width += width % 2
         height += height % 2
-    else:
-        pane_height = (height - len(header) - gaps) // rows
     pane = (pane_width, max(pane_height, _MIN_PANE_HEIGHT_PX))
     return PaneLayout(columns=columns, pane=pane, scale=scale, header=header, size=(width, height))
 

@@ -123,6 +123,7 @@ def sweep(
         ledger, table = stack.enter_context(_open_results(study, Path(folder), parquet=parquet))
         progress = SweepProgress(len(study))
         reporter = stack.enter_context(report_progress(title, progress, quiet=quiet))
+        # An interruption ends the survey early. Tasks that were not surveyed are not executed either.
         surveyed_tasks = takewhile(lambda _: not interruption.requested, generate_tasks(study))
         survey = ledger.survey(surveyed_tasks, retry_failed=retry_failed, keep_versions=keep_versions)
         progress.reused = survey.reused

@@ -37,6 +37,8 @@ from robocov_app.replication.results.outcomes import Outcomes, PairedComparison
 from robocov_app.replication.results.step_times import StepTimes
 
 _RESAMPLES = 2000
+_LIMIT_QUANTILES = (0.025, 0.975)
+"""Quantiles of the resampled values that are the limits of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +246,7 @@ def estimate_maximum_over_maps(statistic: Callable[[IntArray], Any], maps: Seque
         estimates.append(float(statistic(rows)))
         resampled.append(statistic(rng.choice(rows, size=(_RESAMPLES, len(rows)))))
     highest = np.max(resampled, axis=0)
-    low, high = np.quantile(highest, [0.025, 0.975]).tolist()
+    low, high = np.quantile(highest, _LIMIT_QUANTILES).tolist()
     return Interval(max(estimates), low, high, highest)
 
 

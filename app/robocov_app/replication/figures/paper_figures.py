@@ -83,10 +83,10 @@ def draw_figure(
     records = [run.record for run in pair]
     with_goals = [record for record in records if arena.has_goals(record)]
     are_goals_hidden = all(_are_goals_hidden(record) for record in with_goals)
-    unnamed = (CELL_CENTROID, GOAL) if are_goals_hidden else ()
+    hidden_labels = (CELL_CENTROID, GOAL) if are_goals_hidden else ()
     titles = [run.record.label for run in pair]
     costs = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in pair]
-    return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme, unnamed)
+    return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme, hidden_labels)
 
 
 def _are_goals_hidden(record: Record) -> bool:
@@ -228,7 +228,7 @@ def draw_side_by_side(
     records: Sequence[Record],
     headings: Iterable[tuple[str, str]],
     theme: Theme,
-    unnamed: Sequence[str] = (),
+    hidden_labels: Sequence[str] = (),
 ) -> Figure:
     """Draw runs on the same map next to each other.
 
@@ -238,7 +238,7 @@ def draw_side_by_side(
     headings : iterable of (str, str)
         Title and final cost above each panel.
     theme : Theme
-    unnamed : sequence of str
+    hidden_labels : sequence of str
         Labels that are left out of the legend.
 
     Returns
@@ -248,7 +248,7 @@ def draw_side_by_side(
     handles = merge_legends(
         (arena.build_run_handles(record, theme, "paper") for record in records), arena.get_label
     )
-    handles = [handle for handle in handles if arena.get_label(handle) not in unnamed]
+    handles = [handle for handle in handles if arena.get_label(handle) not in hidden_labels]
     page, panels = build_panels(records[0].environment, len(records), WIDE_PX, handles, theme, above=30.0)
     for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):
         arena.draw_run(axes, record, theme, "paper")

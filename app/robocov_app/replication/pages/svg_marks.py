@@ -13,6 +13,13 @@ from robocov_app.replication.formatting import format_amount
 _BAR_WIDTH_PX = 320.0
 _BAR_HEIGHT_PX = 44.0
 _BAR_EDGE_PX = 14.0
+_RANGE_TOP_PX = 4
+_RANGE_HEIGHT_PX = 26
+_AXIS_Y_PX = 30
+_BOUND_BOTTOM_PX = 34
+_INTERVAL_Y_PX = 17.0
+_LABEL_Y_PX = 43
+"""Vertical positions in a bar: the shaded range, its axis, the lines at bounds, the interval, and labels."""
 _MIN_LABEL_GAP_PX = 40.0
 """If two bounds are closer than this, their labels are to their left and right instead of centered."""
 
@@ -22,6 +29,10 @@ _STRIP_LEFT_PX = 12.0
 _STRIP_RIGHT_PX = 16.0
 _STRIP_LABEL_PX = 13.0
 _STRIP_AXIS_PX = 22.0
+_DOT_ROWS = 8
+_DOT_ROW_STEP = 5
+_MAX_DOT_OFFSET_PX = 7.0
+"""Dots with similar values are in different rows of a strip, up to this distance from its middle."""
 _MIN_TICK_GAP_PX = 36.0
 _TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)
 """Ticks of an axis of gaps."""
@@ -59,19 +70,22 @@ def draw_interval_bar(criterion: Criterion) -> Markup:
     start = to_x(criterion.low)
     end = to_x(criterion.high)
     parts = [
-        f'<rect class="expected" x="{start}" y="4" width="{round(end - start, 1)}" height="26" rx="3"/>',
-        f'<path class="axis" d="M{_BAR_EDGE_PX} 30H{_BAR_WIDTH_PX - _BAR_EDGE_PX}"/>',
+        f'<rect class="expected" x="{start}" y="{_RANGE_TOP_PX}" width="{round(end - start, 1)}" '
+        f'height="{_RANGE_HEIGHT_PX}" rx="3"/>',
+        f'<path class="axis" d="M{_BAR_EDGE_PX} {_AXIS_Y_PX}H{_BAR_WIDTH_PX - _BAR_EDGE_PX}"/>',
     ]
     are_labels_close = len(bounds) == 2 and end - start < _MIN_LABEL_GAP_PX
     for value, anchor in zip(bounds, ("end", "start"), strict=False):
         style = f' style="text-anchor: {anchor}"' if are_labels_close else ""
         label = format_amount(value, criterion.unit)
-        parts.append(f'<path class="bound" d="M{to_x(value)} 4V34"/>')
-        parts.append(f'<text x="{to_x(value)}" y="43"{style}>{label}</text>')
+        parts.append(f'<path class="bound" d="M{to_x(value)} {_RANGE_TOP_PX}V{_BOUND_BOTTOM_PX}"/>')
+        parts.append(f'<text x="{to_x(value)}" y="{_LABEL_Y_PX}"{style}>{label}</text>')
     state = {True: "yes", False: "no", None: "open"}[criterion.is_met]
     if math.isfinite(interval.low):
-        parts.append(f'<path class="interval {state}" d="M{to_x(interval.low)} 17.0H{to_x(interval.high)}"/>')
-    parts.append(f'<circle class="estimate {state}" cx="{to_x(interval.estimate)}" cy="17.0" r="5.5"/>')
+        line = f"M{to_x(interval.low)} {_INTERVAL_Y_PX}H{to_x(interval.high)}"
+        parts.append(f'<path class="interval {state}" d="{line}"/>')
+    x = to_x(interval.estimate)
+    parts.append(f'<circle class="estimate {state}" cx="{x}" cy="{_INTERVAL_Y_PX}" r="5.5"/>')
     description = f"{criterion.result_text}; expected: {criterion.range_text}"
     return _build_svg("bar", _BAR_WIDTH_PX, _BAR_HEIGHT_PX, description, parts)
 
@@ -153,18 +167,28 @@ def _draw_strip(strip: DotStrip, top: float, to_x: Callable[[float], float]) -> 
     """Return the SVG elements of a strip: its name, a dot for each map, and a line at the median."""
     kind = "ours" if strip.is_ours else "other"
     middle = top + _STRIP_LABEL_PX + (_STRIP_HEIGHT_PX - _STRIP_LABEL_PX) / 2
+    # Above the baseline of the label there is a little space.
     label_y = top + _STRIP_LABEL_PX - 2
     parts = [f'<text class="name" x="{_STRIP_LEFT_PX - 4}" y="{label_y}">{escape(strip.label)}</text>']
     ranked = sorted(strip.medians_by_map.items(), key=lambda item: item[1])
-    for k, (name, value) in enumerate(ranked):
-        # Dots with similar values are at different heights (of eight), so that they hardly overlap.
-        y = round(middle + 7.0 * ((k * 5 % 8) / 7.0 - 0.5) * 2.0, 1)
+    for rank, (name, value) in enumerate(ranked):
+        y = round(middle + _compute_dot_offset(rank), 1)
         title = f"<title>{escape(name)}: {format_amount(value, '%')}</title>"
         parts.append(f'<circle class="{kind}" cx="{to_x(value)}" cy="{y}" r="3">{title}</circle>')
     # The mean of the two middle values, which are the same if the number of values is odd.
     median = ranked[(len(ranked) - 1) // 2][1] / 2 + ranked[len(ranked) // 2][1] / 2
     parts.append(f'<path class="middle" d="M{to_x(median)} {middle - 11}V{middle + 11}"/>')
     return parts
+
+
+def _compute_dot_offset(rank: int) -> float:
+    """Return the vertical offset of a dot, px, which keeps dots with neighboring ranks apart.
+
+    There are eight rows of dots. From one rank to the next, the row changes by five, modulo eight.
+    """
+    row = rank * _DOT_ROW_STEP % _DOT_ROWS
+    fraction = row / (_DOT_ROWS - 1)
+    return _MAX_DOT_OFFSET_PX * (fraction - 0.5) * 2.0
 
 
 def _build_svg(kind: str, width: float, height: float, description: str, parts: Sequence[str]) -> Markup:

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from robocov.controllers import CONTROLLERS, get_gains
-from robocov.metrics.results import read_results
+from robocov.metrics.results import Results, read_results
 from robocov_app.replication.design.plan import ROBOTS
 from robocov_app.replication.design.studies import Contest
 from robocov_app.replication.results.outcomes import (
@@ -68,25 +68,33 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         values[key, "placement"] = np.full((len(instances), ROBOTS, 2), np.nan)
     for instance_index, row in _read_rows(folder, instances):
         controller_key = _identify_controller(row["controller"], row)
-        for key, candidate in controller_keys.items():
-            if candidate != controller_key:
-                continue
-            for measure, column in COLUMNS.items():
-                if row.get(column) is not None:
-                    values[key, measure][instance_index] = row[column]
-            values[key, "placement"][instance_index] = results.record(row["run"]).positions[-1]
-            history = results.history(row["run"])
-            values[key, "early"][instance_index] = compute_mean_until(history, EARLY_S)
-            values[key, "first_minute"][instance_index] = compute_mean_until(history, FIRST_MINUTE_S)
-            reference = references.get(row["map"])
-            if reference is not None:
-                values[key, "gap"][instance_index] = (
-                    values[key, "final"][instance_index] / reference.mean_distance - 1.0
-                )
+        # Several contenders may have the same controller and gains.
+        matching_keys = [key for key, candidate in controller_keys.items() if candidate == controller_key]
+        if not matching_keys:
+            continue
+        measured = _measure_run(row, results, references)
+        for key in matching_keys:
+            for measure, value in measured.items():
+                values[key, measure][instance_index] = value
     share_sides = {}
     for study_map in contest.study.maps:
         share_sides[study_map.name] = float(np.sqrt(study_map.environment.free_area / ROBOTS))
     return Outcomes(instances, values, share_sides)
+
+
+def _measure_run(row: Mapping[str, Any], results: Results, references: References) -> dict[str, Any]:
+    """Return the known measures of a run: those in its row, and those that its files and its map give."""
+    measured: dict[str, Any] = {
+        measure: row[column] for measure, column in COLUMNS.items() if row.get(column) is not None
+    }
+    measured["placement"] = results.record(row["run"]).positions[-1]
+    history = results.history(row["run"])
+    measured["early"] = compute_mean_until(history, EARLY_S)
+    measured["first_minute"] = compute_mean_until(history, FIRST_MINUTE_S)
+    reference = references.get(row["map"])
+    if reference is not None and "final" in measured:
+        measured["gap"] = measured["final"] / reference.mean_distance - 1.0
+    return measured
 
 
 def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:
