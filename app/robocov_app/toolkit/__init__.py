@@ -5,5 +5,6 @@
 - `widgets`: buttons, sliders and fields of a panel
 - `dialogs`: questions and choices
 - `tools`: gestures of the mouse, snapping and zooming
-- `panel`, `overlay`: the panel next to a map, and drawings over the window
+- `command_bar`, `tool_rail`, `panel`: the parts around a map
+- `overlay`: drawings over the window
 """

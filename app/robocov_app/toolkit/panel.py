@@ -1,14 +1,13 @@
 """Parts of a window with widgets, and panels with tabbed pages whose buttons run commands."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.toolkit.commands.command import CommandTable
-from robocov_app.toolkit.tools.tool import Toolbox
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
 
@@ -235,13 +234,3 @@ class CommandPanel(SidePanel):
         ui.row(*[0.0] * len(row), below=4)
         for button in row:
             self.show_button(ui, button.label, button.command, small=True)
-
-    def show_tools(self, ui: Ui, toolbox: Toolbox[Any], columns: int) -> None:
-        """Show a button for each tool, in a grid with the given number of columns."""
-        ui.header("TOOLS")
-        ui.row(*[0.0] * columns, below=4)
-        for tool in toolbox.by_name.values():
-            label = tool.button_text or tool.title
-            is_selected = tool is toolbox.current
-            self.show_button(ui, label, f"tool:{tool.name}", selected=is_selected, small=True)
-        ui.space(6)

@@ -19,7 +19,11 @@ VIEW_COMMANDS = ("fit", "zoom:in", "zoom:out")
 _MARGIN_PX = 4.0
 _BUTTON_HEIGHT_PX = 36.0
 _GAP_PX = 2.0
-_VIEW_GAP_PX = 10.0
+_GROUP_GAP_PX = 7.0
+"""Space between groups, with a line in its middle."""
+_GROUP_LINE_PX = 26.0
+"""Length of this line."""
+_SHIFT_SYMBOL = "⇧"
 
 
 class ToolRail(WindowPart):
@@ -59,24 +63,54 @@ class ToolRail(WindowPart):
         self.request_redraw(self._toolbox.current.name)
 
     def show_content(self, ui: Ui) -> None:
-        """Show a button for each tool, and below them those of the camera."""
-        height = ui.box.height / ui.scale
-        tools = list(self._toolbox.by_name.values())
+        """Show a button for each tool, in groups, and below them those of the camera."""
+        groups = self._toolbox.groups
+        count = len(self._toolbox.by_name)
         ui.inset(_MARGIN_PX, _MARGIN_PX, _MARGIN_PX)
-        pitch = min(_BUTTON_HEIGHT_PX + _GAP_PX, (height - _MARGIN_PX) / len(tools))
+        height = ui.box.height / ui.scale - 2 * _MARGIN_PX
+        tools_height = height - (len(groups) - 1) * _GROUP_GAP_PX
+        pitch = min(_BUTTON_HEIGHT_PX + _GAP_PX, (tools_height + _GAP_PX) / count)
+        for number, group in enumerate(groups):
+            if number:
+                _show_line(ui)
+            ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
+            for tool in group:
+                is_selected = tool is self._toolbox.current
+                self._show_button(ui, tool.name, f"tool:{tool.name}", tool.title, selected=is_selected)
+        view_count = int((tools_height - count * pitch - _GROUP_GAP_PX) / pitch)
+        if view_count < 1:
+            return
+        _show_line(ui)
         ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
-        for tool in tools:
-            is_selected = tool is self._toolbox.current
-            self._show_button(ui, tool.name, f"tool:{tool.name}", tool.title, selected=is_selected)
-        free = height - 2 * _MARGIN_PX - len(tools) * pitch - _VIEW_GAP_PX
-        ui.space(_VIEW_GAP_PX)
-        ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
-        for command in VIEW_COMMANDS[: max(int(free / pitch), 0)]:
+        for command in VIEW_COMMANDS[:view_count]:
             self._show_button(ui, command, command, self._commands[command].title)
 
     def _show_button(self, ui: Ui, icon: str, command: str, title: str, *, selected: bool = False) -> None:
         """Show a button with the key of its command; the tip is the command's title and its keys."""
         entry = self._commands[command]
-        shortcut = entry.key_text if len(entry.key_text) == 1 else ""
+        shortcut = _abbreviate_key(entry.key_text)
         if ui.icon_button(icon, title, key=command, tip=entry.tip, selected=selected, shortcut=shortcut):
             self._run_command(command)
+
+
+def _show_line(ui: Ui) -> None:
+    """Show a short line between two groups."""
+    ui.row(height=_GROUP_GAP_PX, below=0)
+    cell = ui.cell()
+    if ui.surface is None:
+        return
+    line = Rect(0, 0, ui.px(_GROUP_LINE_PX), 1)
+    line.center = cell.center
+    draw_edge(ui.surface, line, ui.theme)
+
+
+def _abbreviate_key(key_text: str) -> str:
+    """Return a key that is short enough for the corner of a button; empty if it is too long.
+
+    >>> _abbreviate_key("Shift S")
+    '⇧S'
+    """
+    short = key_text.replace("Shift ", _SHIFT_SYMBOL)
+    if len(short.lstrip(_SHIFT_SYMBOL)) == 1:
+        return short
+    return ""

@@ -84,7 +84,7 @@ def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> N
         assert describe_map(driver.editor).endswith("draft: 1 problem")
         driver.press_key("ctrl+a")
         driver.press_key("delete")
-        assert describe_map(driver.editor).startswith("● Untitled   ·   0 obstacles")
+        assert describe_map(driver.editor).startswith("0 obstacles")
 
 
 def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from x11_hands import MARKS, MAX_WAIT_S, Hands, read_errors, run_window, start_d
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
-from robocov_app.editor.canvas.canvas import MARGIN_PX
+from robocov_app.editor.canvas.canvas import LEGEND_MARGIN_PX, MARGIN_PX
+from robocov_app.render.annotations.legend_strip import ROW_HEIGHT_PX
 from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
@@ -47,9 +48,9 @@ def run_editor(display: str, folder: Path, *words: object) -> Iterator[Hands]:
 class Sheet:
     """Where places of the map are in the window."""
 
-    def __init__(self, bounds: tuple[float, float, float, float], legend_rows: int = 1) -> None:
-        left, top, width, height = build_layout(SIZE, 1.0, 1, 1.0, plot=False, toolbars=False).arena
-        above = 10 + 22 * legend_rows
+    def __init__(self, bounds: tuple[float, float, float, float]) -> None:
+        left, top, width, height = build_layout(SIZE, 1.0, plot=False).arena
+        above = LEGEND_MARGIN_PX + ROW_HEIGHT_PX
         view = float(left), float(top + above), float(width), height - above - STRIP_HEIGHT_PX
         self.camera = Camera.fit(bounds, view, MARGIN_PX)
 

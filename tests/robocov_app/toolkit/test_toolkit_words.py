@@ -11,7 +11,6 @@ def test_the_panel_is_to_the_right_of_the_arena() -> None:
     layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert layout.panel == (960, 44, 320, 676)
     assert layout.arena == (44, 44, 916, 506)
-    assert build_layout((1280, 720), 1.0, 1, 4 / 3, toolbars=False).arena == (0, 0, 960, 550)
     assert is_inside((10, 10, 5, 5), (14, 10))
     assert not is_inside((10, 10, 5, 5), (15, 10))
 

@@ -34,7 +34,6 @@ def draw_layouts(draw: st.DrawFn) -> Layout:
         draw(ASPECTS),
         panel=draw(st.booleans()),
         legend_rows=rows,
-        toolbars=draw(st.booleans()),
     )
 
 

@@ -9,8 +9,8 @@ import pygame
 import pytest
 from driven_window import MIDDLE, Driver, open_viewer
 
+from robocov_app.toolkit.command_bar import NARROW_PX, UNSAVED_SIGN, WIDE_PX
 from robocov_app.toolkit.widgets.icons import ICONS, render_icon
-from robocov_app.viewer.window.top_bar import NARROW_PX, UNSAVED_SIGN, WIDE_PX
 
 
 def test_undo_and_redo_are_buttons_that_tell_whether_there_is_something_to_undo(driver: Driver) -> None:

@@ -24,7 +24,7 @@ from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import legend_strip, scale_bar
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.canvas import LegendEntry
 from robocov_app.render.density_shading import compute_density_range
 from robocov_app.render.density_text import describe_density_range
 from robocov_app.render.fonts import shorten_to_width
@@ -47,11 +47,8 @@ MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
 
 
 def describe_map(editor: Editor) -> str:
-    """Return the status line for a map: title, number of obstacles, free area and number of problems."""
-    title = editor.document.title
-    if editor.document.history.has_unsaved_changes:
-        title = f"● {title}"
-    facts = [title, format_count(len(editor.sketch.obstacles), "obstacle")]
+    """Return the status line for a map: number of obstacles, free area and number of problems."""
+    facts = [format_count(len(editor.sketch.obstacles), "obstacle")]
     measurement = editor.measurement
     if measurement is not None:
         facts.append(f"{measurement.free_area:.2f} m² free")
@@ -80,9 +77,9 @@ class EditorCanvas:
     hovered : Problem or None
         Problem under the cursor.
     cursor_pixel : Point or None
-        Position of the cursor, px; None while it is not over the map.
+        Position of the cursor in the window, px; None while it is not over the map.
     camera : Camera
-        The view.
+        The view, in pixels of the arena: its upper left corner is (0, 0).
     """
 
     def __init__(self, editor: Editor) -> None:
@@ -94,8 +91,6 @@ class EditorCanvas:
         self.cursor_pixel: Point | None = None
         self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
         self._layers = build_layers(self.sheet)
-        self._legend_rows = 1
-        self._legend_key: object = None
         self._legend: LatestValue[Surface] = LatestValue()
         self._has_hull_excess: LatestValue[bool] = LatestValue()
         self._fitted: tuple[Point, float] | None = None  # center and zoom of the last view fitted to the map
@@ -110,33 +105,21 @@ class EditorCanvas:
             self.fit()
 
     def _compute_view_box(self) -> tuple[float, float, float, float]:
-        """Return the box between the legend and the status strip: left, top, width, height, px."""
-        left, top, width, height = self.layout.arena
+        """Return the box between legend and status strip: left, top, width, height in the arena, px."""
+        _, _, width, height = self.layout.arena
         scale = self.layout.scale
         legend_height = 0
         if "legend" in self.editor.shown:
-            legend_height = round((LEGEND_MARGIN_PX + legend_strip.ROW_HEIGHT_PX * self._legend_rows) * scale)
+            # Further rows are drawn over the map, so that it does not move when entries come and go.
+            legend_height = round((LEGEND_MARGIN_PX + legend_strip.ROW_HEIGHT_PX) * scale)
         view_height = max(height - legend_height - round(scale_bar.STRIP_HEIGHT_PX * scale), 1)
-        return float(left), float(top + legend_height), float(width), float(view_height)
-
-    def _update_legend(self, canvas: Canvas) -> None:
-        """Update the entries of the legend and the number of their rows."""
-        is_shown = "legend" in self.editor.shown
-        self.entries = []
-        if is_shown:
-            self.entries = self._build_legend_entries()
-        rows = max(len(legend_strip.arrange_legend_rows(canvas, self.entries)), 1)
-        key = (canvas.surface.get_width(), canvas.scale, self.editor.document, is_shown)
-        if key == self._legend_key:
-            # As long as the key is the same, the legend does not shrink, so that the map does not jump when
-            # entries come and go.
-            rows = max(rows, self._legend_rows)
-        self._legend_rows = rows
-        self._legend_key = key
+        return 0.0, float(legend_height), float(width), float(view_height)
 
     def _build_legend_entries(self) -> list[LegendEntry]:
-        """Build the entries for the current content of the sheet, including the range of the density."""
+        """Build the entries for the current content of the sheet; none while the legend is hidden."""
         editor = self.editor
+        if "legend" not in editor.shown:
+            return []
         sketch = editor.sketch
         has_excess = self._has_hull_excess.get(
             sketch.boundary, None, lambda: compute_hull_excess(sketch).area > MIN_HULL_EXCESS_M2
@@ -177,7 +160,7 @@ class EditorCanvas:
         point = problem.geometry.representative_point()
         margin = round(SCROLL_MARGIN_PX * self.layout.scale)
         visible = Rect(self.camera.view).inflate(-margin, -margin)
-        if not visible.collidepoint(self.to_pixel((point.x, point.y))):
+        if not visible.collidepoint(self._to_arena(self.to_pixel((point.x, point.y)))):
             self._set_camera(replace(self.camera, center=(point.x, point.y)))
 
     def zoom(self, factor: float, pixel: Point | None = None) -> None:
@@ -185,11 +168,10 @@ class EditorCanvas:
         cursor = self.cursor_pixel
         if pixel is None and cursor is not None and self.contains(cursor):
             pixel = cursor
-        if pixel is None:
-            pixel = self.camera.middle
+        fixed = self.camera.middle if pixel is None else self._to_arena(pixel)
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         extent = max(high_x - low_x, high_y - low_y, 1.0)
-        self._set_camera(zoom_about(self.camera, factor, pixel, extent))
+        self._set_camera(zoom_about(self.camera, factor, fixed, extent))
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the view by a number of pixels, but not so far that the map leaves it."""
@@ -209,36 +191,43 @@ class EditorCanvas:
 
     def contains(self, pixel: Point) -> bool:
         """Return whether a pixel of the window is in the map view."""
-        return is_inside(self.camera.view, pixel)
+        return is_inside(self.camera.view, self._to_arena(pixel))
+
+    def _to_arena(self, pixel: Point) -> Point:
+        """Return the pixel of the arena at a pixel of the window."""
+        left, top = self.layout.arena.position
+        return pixel[0] - left, pixel[1] - top
 
     def to_world(self, pixel: Point) -> Point:
         """Return the position of the map at a pixel of the window, m."""
-        x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
+        x, y = self.camera.to_world(np.array(self._to_arena(pixel), dtype=float)).tolist()
         return x, y
 
     def to_pixel(self, point: Point) -> Point:
         """Return the pixel of the window at a position of the map, m."""
         x, y = self.camera.to_pixels(np.array(point)).tolist()
-        return x, y
+        left, top = self.layout.arena.position
+        return x + left, y + top
 
     def find_problem(self, pixel: Point) -> Problem | None:
         """Return the problem whose badge is at a pixel of the window, if any."""
         if "problems" not in self.editor.shown:
             return None
         reach = BADGE_REACH_PX * self.layout.scale
-        for problem, position in overlay.place_badges(self.editor.problems, self._build_view()):
+        pixel = self._to_arena(pixel)
+        for problem, position in overlay.place_badges(self.editor.problems, self.build_view()):
             if distance(position, pixel) < reach:
                 return problem
         return None
 
-    def _build_view(self) -> View:
+    def build_view(self) -> View:
         """Build the description of the current view: camera, theme, size, layers and grid."""
         editor = self.editor
         return View(
             camera=self.camera,
             theme=self.theme,
             scale=self.layout.scale,
-            size=self.layout.size,
+            size=self.layout.arena.size,
             shown=frozenset(editor.shown),
             grid=editor.grid,
             folder=editor.document.get_folder(editor.folder),
@@ -246,30 +235,31 @@ class EditorCanvas:
 
     def draw(self, screen: Surface) -> None:
         """Draw the map, the legend and the status strip."""
-        box = Rect(self.layout.arena)
-        self._update_legend(self._build_view().build_canvas(Surface((box.width, 1))))
+        arena = screen.subsurface(Rect(self.layout.arena))
+        self.entries = self._build_legend_entries()
         self._set_camera(self.camera.with_view(self._compute_view_box()))
-        scene = self._build_scene(screen)
-        screen.fill(self.theme.background, box)
+        scene = self._build_scene(arena)
+        arena.fill(self.theme.background)
         self._draw_sheet(scene)
-        clip = scene.view.clip
-        screen.set_clip(clip)
-        scene.canvas.surface.set_clip(clip)
+        arena.set_clip(scene.view.clip)
         for layer in self._layers:
             layer.draw(scene)
-        screen.set_clip(None)
+        arena.set_clip(None)
         self._draw_legend(scene)
         self._draw_status_strip(scene)
 
-    def _build_scene(self, screen: Surface) -> EditorScene:
+    def _build_scene(self, arena: Surface) -> EditorScene:
         """Build the scene of one frame, with the state of the active tool and of a drag."""
         editor = self.editor
-        view = self._build_view()
+        view = self.build_view()
         state = editor.tool.build_overlay(editor)
         sketch, selection = editor.displayed
+        cursor = self.cursor_pixel
+        if cursor is not None:
+            cursor = self._to_arena(cursor)
         return EditorScene(
-            screen=screen,
-            canvas=view.build_canvas(screen.subsurface(Rect(self.layout.arena))),
+            surface=arena,
+            canvas=view.build_canvas(arena),
             view=view,
             editor=editor,
             state=state,
@@ -279,7 +269,7 @@ class EditorCanvas:
             hidden_keys=_find_hidden_keys(editor.sketch, sketch, state),
             team=self.team,
             hovered=self.hovered,
-            cursor=self.cursor_pixel,
+            cursor=cursor,
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
@@ -293,7 +283,7 @@ class EditorCanvas:
         if scene.state.pending is not None:
             sketch = replace(sketch, density=scene.state.pending.density)
         clip = scene.view.clip
-        scene.screen.blit(self.sheet.draw(scene.view, sketch, scene.hidden_keys), clip, clip)
+        scene.surface.blit(self.sheet.draw(scene.view, sketch, scene.hidden_keys), clip, clip)
         image = self.sheet.reference_image
         if image.error:
             self.editor.show_message(image.error, is_error=True)
@@ -302,21 +292,21 @@ class EditorCanvas:
     def _draw_legend(self, scene: EditorScene) -> None:
         if not self.entries:
             return
-        box = Rect(self.layout.arena)
+        width = scene.surface.get_width()
         canvas = scene.canvas
         labels = tuple(entry.text for entry in self.entries)
-        key = (labels, box.width, canvas.theme.name, canvas.scale)
-        strip = replace(canvas, surface=Surface((box.width, 1)))
+        key = (labels, width, canvas.theme.name, canvas.scale)
+        strip = replace(canvas, surface=Surface((width, 1)))
         legend = self._legend.get(None, key, lambda: legend_strip.render_legend_strip(self.entries, strip))
-        scene.screen.blit(legend, box)
+        scene.surface.blit(legend, (0, 0))
 
     def _draw_status_strip(self, scene: EditorScene) -> None:
         """Draw the status strip at the bottom: scale bar and status line."""
-        box = Rect(self.layout.arena)
+        box = scene.surface.get_rect()
         scale = scene.canvas.scale
         height = round(scale_bar.STRIP_HEIGHT_PX * scale)
-        strip = Rect(box.left, box.bottom - height, box.width, height)
-        canvas = replace(scene.canvas, surface=scene.screen.subsurface(strip))
+        strip = Rect(0, box.height - height, box.width, height)
+        canvas = replace(scene.canvas, surface=scene.surface.subsurface(strip))
         scale_bar.draw_scale_bar(canvas)
         bar_width = scale_bar.choose_bar_length(canvas) * canvas.camera.zoom
         free_width = box.width - (scale_bar.EDGE_PX + SCALE_BAR_LABEL_PX) * scale - bar_width

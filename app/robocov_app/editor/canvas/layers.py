@@ -12,6 +12,7 @@ from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import draw_hatching
 from robocov_app.editor.canvas.scene import EditorScene
 from robocov_app.editor.canvas.sheet import Sheet
+from robocov_app.editor.canvas.start_labels import draw_start_label
 from robocov_app.editor.edits import paths
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
@@ -82,7 +83,7 @@ class DraggedObstacles:
         )
         dx = round(camera.zoom * dragged.offset[0])
         dy = round(-(camera.zoom * dragged.offset[1]))
-        scene.screen.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
+        scene.surface.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
 
     def _draw_image(self, scene: EditorScene, selection: Selection) -> Surface:
         theme = scene.view.theme
@@ -113,7 +114,7 @@ class Passages:
         hatching = self._hatching.get(measurement, look, lambda: draw_hatching(view, measurement))
         if hatching is not None:
             surface, position = hatching
-            scene.screen.blit(surface, position, special_flags=_PREMULTIPLIED)
+            scene.surface.blit(surface, position, special_flags=_PREMULTIPLIED)
         if measurement.gap is not None:
             overlay.draw_gap(scene.canvas, measurement.gap, measurement.radius)
 
@@ -149,7 +150,9 @@ class StartMarkers:
             if name and number == 0:
                 label = f"{name}, default"
             is_selected = name in scene.editor.selection.starts
-            overlay.draw_start(scene.canvas, start, label, is_selected=is_selected)
+            overlay.draw_start(scene.canvas, start, is_selected=is_selected)
+            # Labels stay in place while obstacles are dragged.
+            draw_start_label(scene.canvas, scene.saved, start, label)
 
 
 class TeamAtStart:
@@ -331,9 +334,7 @@ def draw_object_outline(
 ) -> None:
     """Draw the outline of an obstacle, a start or the boundary; `width` in px at scale 1."""
     if isinstance(owner, str):
-        overlay.draw_start(
-            canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=OUTLINED_DOT_SCALE
-        )
+        overlay.draw_start(canvas, sketch.get_start(owner), is_selected=True, dot_scale=OUTLINED_DOT_SCALE)
     elif owner == BOUNDARY:
         corners = overlay.to_pixels(canvas, sketch.boundary or ())
         canvas.draw_outline(corners, color, canvas.scale_width(width + BOUNDARY_EXTRA_WIDTH_PX))

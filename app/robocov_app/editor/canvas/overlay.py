@@ -23,7 +23,7 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import MAX_PIXEL
-from robocov_app.render.canvas import Canvas, TextAnchor
+from robocov_app.render.canvas import Canvas
 from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.toolkit.tools.snapping import Guide
 
@@ -45,8 +45,6 @@ KNOB_RADIUS_PX = 4.5
 LARGE_KNOB_RADIUS_PX = 5.5
 KNOB_RIM_PX = 1.6
 GUIDE_LABEL_OFFSET_PX = (11, 15)  # from the end of a guide to its label
-DISC_LABEL_GAP_PX = 10  # between a disc-shaped start and its label above
-POINTS_LABEL_OFFSET_PX = (-5, -14)  # from the first position of a start to its label
 PATH_DASH_PX = 4.0
 WAYPOINT_RADIUS_PX = 2.5
 ARROW_AHEAD_PX = 4  # from the middle of a leg to the tip of its arrow
@@ -74,7 +72,6 @@ BADGE_RIM_PX = 1.4
 SMALL_BADGE_RIM_PX = 1.0
 
 # Shares of the second color in mixes.
-START_LABEL_INK_SHARE = 0.45
 GHOST_ACCENT_SHARE = 0.35
 LENGTH_INK_SHARE = 0.85
 BADGE_EDGE_INK_SHARE = 0.3
@@ -230,10 +227,8 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         canvas.draw_text(" · ".join(labels), position, size=canvas.theme.small_text, color=color)
 
 
-def draw_start(
-    canvas: Canvas, start: StartSpec, label: str, *, is_selected: bool, dot_scale: float = 1.0
-) -> None:
-    """Draw a start with a label; nothing for a start that is uniform over the free space.
+def draw_start(canvas: Canvas, start: StartSpec, *, is_selected: bool, dot_scale: float = 1.0) -> None:
+    """Draw a start; nothing for a start that is uniform over the free space.
 
     Parameters
     ----------
@@ -241,35 +236,18 @@ def draw_start(
         The canvas.
     start : StartSpec
         The start.
-    label : str
-        Text next to the start; may be empty.
     is_selected : bool
         Whether the start is selected, which makes its lines thicker.
     dot_scale : float
         Factor by which the rings at the positions are enlarged.
     """
-    theme = canvas.theme
-    scale = canvas.scale
     width = SELECTED_LINE_PX if is_selected else LINE_PX
     if isinstance(start, DiscStart):
         ((x, y),) = to_pixels(canvas, (start.center,)).tolist()
-        radius = start.radius * canvas.camera.zoom
-        _draw_circle(canvas, (x, y), radius, width)
-        label_position = (x, y - radius - DISC_LABEL_GAP_PX * scale)
-        anchor: TextAnchor = "middle"
-    elif isinstance(start, PointsStart) and start.positions:
-        positions = to_pixels(canvas, start.positions).tolist()
-        for position in positions:
-            draw_ring(canvas, position, MARK_RADIUS_PX * dot_scale, theme.start, width)
-        x, y = positions[0]
-        dx, dy = POINTS_LABEL_OFFSET_PX
-        label_position = (x + dx * scale, y + dy * scale)
-        anchor = "left"
-    else:
-        return
-    if label:
-        color = mix(theme.start, theme.ink, START_LABEL_INK_SHARE)
-        canvas.draw_text(label, label_position, size=theme.small_text, color=color, anchor=anchor)
+        _draw_circle(canvas, (x, y), start.radius * canvas.camera.zoom, width)
+    elif isinstance(start, PointsStart):
+        for position in to_pixels(canvas, start.positions).tolist():
+            draw_ring(canvas, position, MARK_RADIUS_PX * dot_scale, canvas.theme.start, width)
 
 
 def _draw_circle(canvas: Canvas, center: Point, radius: float, width: float) -> None:
@@ -338,7 +316,7 @@ def draw_preview(canvas: Canvas, state: EditorToolOverlay, cursor: Point | None)
     for shape in state.shapes:
         draw_ghost(canvas, shape.polygon)
     if state.start is not None:
-        draw_start(canvas, state.start, "", is_selected=True)
+        draw_start(canvas, state.start, is_selected=True)
     _draw_preview_line(canvas, state)
     for number, ring in enumerate(state.outlines):
         width = SELECTED_LINE_PX if number == state.chosen else THIN_LINE_PX

@@ -22,10 +22,10 @@ class EditorScene:
 
     Attributes
     ----------
-    screen : Surface
-        The window.
+    surface : Surface
+        The arena: the part of the window in which the map is drawn.
     canvas : Canvas
-        The part of the window in which the map is drawn.
+        Draws on the arena.
     view : View
         The view of the sheet.
     editor : Editor
@@ -45,10 +45,10 @@ class EditorScene:
     hovered : Problem or None
         Problem under the cursor.
     cursor : Point or None
-        Position of the cursor, px.
+        Position of the cursor in the arena, px.
     """
 
-    screen: Surface
+    surface: Surface
     canvas: Canvas
     view: View
     editor: Editor

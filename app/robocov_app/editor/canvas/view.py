@@ -30,13 +30,13 @@ class View:
     Attributes
     ----------
     camera : Camera
-        Position and magnification.
+        Position and magnification, in pixels of the arena.
     theme : Theme
         Colors.
     scale : float
         Scale of the window.
     size : tuple of int
-        Width and height of the window, px.
+        Width and height of the arena, px.
     shown : frozenset of str
         Names of the visible layers.
     grid : float
@@ -55,7 +55,7 @@ class View:
 
     @property
     def clip(self) -> Rect:
-        """Part of the window in which the sheet is visible, px."""
+        """Part of the arena in which the sheet is visible, px."""
         return Rect([round(value) for value in self.camera.view])
 
     def build_canvas(self, surface: Surface) -> Canvas:
@@ -63,7 +63,7 @@ class View:
         return Canvas(surface, self.camera, self.theme, self.scale, choose_robot_hues(0))
 
     def build_transparent_canvas(self) -> Canvas:
-        """Build a canvas with a transparent surface as large as the window."""
+        """Build a canvas with a transparent surface as large as the arena."""
         return self.build_canvas(Surface(self.size, pygame.SRCALPHA, 32))
 
 

@@ -144,6 +144,16 @@ class UndoHistory:
         self.sketch = changed_by_id[id(self.sketch)]
 
     @property
+    def can_undo(self) -> bool:
+        """Whether there is a change to undo."""
+        return bool(self._undoable)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a change to redo."""
+        return bool(self._redoable)
+
+    @property
     def undo_descriptions(self) -> tuple[str, ...]:
         """Descriptions of the changes that can be undone, the newest first."""
         return tuple(step.description for step in reversed(self._undoable))

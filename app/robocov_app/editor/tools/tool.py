@@ -29,7 +29,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     Attributes
     ----------
-    name, title, button_text, key, hint, snaps
+    name, title, key, hint, snaps
         See `Tool`.
     accepts_text : bool
         Whether values can be typed while the tool is busy.

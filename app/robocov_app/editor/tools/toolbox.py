@@ -38,20 +38,9 @@ class EditorToolbox(Toolbox[EditorTool]):
         self.selector = SelectTool()
         self.tape = MeasureTool()
         self.density = DensityTool()
-        tools: list[EditorTool] = [
-            self.selector,
-            PanTool(),
-            PolygonTool(),
-            RectangleTool(),
-            CircleTool(),
-            WallTool(),
-            DoorTool(),
-            BoundaryTool(),
-            self.tape,
-            DiscTool(),
-            StartPositionsTool(),
-            self.density,
-            MotionPathTool(),
-            ReferenceImageTool(),
-        ]
-        super().__init__(tools)
+        super().__init__(
+            (self.selector, PanTool()),
+            (BoundaryTool(), WallTool(), DoorTool(), PolygonTool(), RectangleTool(), CircleTool()),
+            (DiscTool(), StartPositionsTool(), self.density, MotionPathTool()),
+            (ReferenceImageTool(), self.tape),
+        )

@@ -1,4 +1,4 @@
-"""The panel of the editor: buttons, tools, and pages, including one for the selection."""
+"""The panel of the editor: pages for the map, the selection, snapping, problems and the history."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -30,7 +30,6 @@ from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
 from robocov_app.toolkit.widgets.ui import Ui
 
-TOOL_COLUMNS = 4
 ROW_HEIGHT_PX = 20.0  # height of a row in a list
 LABEL_WIDTH_PX = 62.0
 SHORT_LABEL_WIDTH_PX = 14.0
@@ -77,20 +76,6 @@ class FieldCell(NamedTuple):
     unit: str = ""
 
 
-FILE_BUTTONS = (
-    (
-        PanelButton("New", "new"),
-        PanelButton("Open", "open"),
-        PanelButton("Save", "save"),
-        PanelButton("Try it", "try"),
-    ),
-    (
-        PanelButton("Undo", "undo"),
-        PanelButton("Redo", "redo"),
-        PanelButton("Keys", "help"),
-        PanelButton("Commands", "palette"),
-    ),
-)
 START_BUTTONS = (
     PanelButton("Disc", "tool:disc"),
     PanelButton("Points", "tool:places"),
@@ -220,7 +205,6 @@ class EditorPanel(CommandPanel):
             id(sketch),
             selection,
             id(editor.measurement),
-            editor.document.history.has_unsaved_changes,
         )
         if state != self.drawn_state:
             self.drawn_state = state
@@ -237,16 +221,8 @@ class EditorPanel(CommandPanel):
         }
 
     def show_content(self, ui: Ui) -> None:
-        """Show the title, the buttons and tools that are always visible, and the open page."""
+        """Show the tabs and the open page."""
         ui.inset(12, 8, 12)
-        document = self.editor.document
-        title = document.title
-        if document.history.has_unsaved_changes:
-            title = f"{title}, not saved"
-        ui.header(title)
-        for row in FILE_BUTTONS:
-            self.show_buttons(ui, row)
-        self.show_tools(ui, self.editor.toolbox, TOOL_COLUMNS)
         count = len(self.editor.problems)
         titles: dict[str, str] = {}
         if count:
@@ -300,7 +276,7 @@ class EditorPanel(CommandPanel):
                 ui.label(fact.label, style="unit", tip=fact.tip)
                 ui.label(fact.text, key=f"fact:{fact.label}")
             ui.space(4)
-            ui.header("ROBOTS")
+            ui.header("Robots")
             ui.row(
                 MEDIUM_LABEL_WIDTH_PX,
                 0,
@@ -314,7 +290,7 @@ class EditorPanel(CommandPanel):
             self._draw_field(ui, FieldCell("robots", "Team"))
             self.show_button(ui, "−", "fewer", small=True)
             self.show_button(ui, "+", "more", small=True)
-            ui.header("STARTS")
+            ui.header("Starts")
             self.show_buttons(ui, START_BUTTONS)
             ui.row()
             is_on = "robots" in self.editor.shown
@@ -332,7 +308,7 @@ class EditorPanel(CommandPanel):
         title = editor.selection.describe(editor.sketch)
         if editor.selection.vertices:
             title += f" of {select_owners(editor.selection).describe(editor.sketch)}"
-        ui.header(title.upper())
+        ui.header(title[:1].upper() + title[1:])
         self._draw_object_fields(ui, kind)
         for row in OBJECT_BUTTONS[kind]:
             self.show_buttons(ui, row)
@@ -360,13 +336,13 @@ class EditorPanel(CommandPanel):
     def _draw_snap_page(self, ui: Ui) -> None:
         """Draw the page "snap": snap modes, grid, visible layers, and the picture under the map."""
         with ui.scroll("snap"):
-            ui.header("SNAP TO")
+            ui.header("Snap to")
             ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
             for name, mode in SNAPS.items():
                 self._draw_check(ui, f"snap:{name}", mode.title, is_on=name in self.editor.snaps)
             ui.row()
             self._draw_field_pair(ui, FieldCell("grid", "Grid", "m"), FieldCell("angle", "Angle", "°"))
-            ui.header("SHOW")
+            ui.header("Show")
             ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
             for name in LAYERS:
                 # The team has its check box next to the starts.
@@ -376,7 +352,7 @@ class EditorPanel(CommandPanel):
 
     def _draw_picture_section(self, ui: Ui) -> None:
         """Draw the buttons, fields and opacity slider of the picture under the map."""
-        ui.header("PICTURE UNDER THE MAP")
+        ui.header("Picture under the map")
         self.show_buttons(ui, PICTURE_BUTTONS)
         scale = FieldCell("picture:scale", "Pixel", "m")
         turn = FieldCell("picture:turn", "Turn", "°")

@@ -1,6 +1,6 @@
 """The mouse over the map of the editor: tools, panning, double clicks, wheel and context menu."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pygame
 
@@ -8,7 +8,7 @@ from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.toolkit.panel import SidePanel
+from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
 from robocov_app.toolkit.tools.snapping import Snap
 from robocov_app.toolkit.tools.viewport import REACH_PX
@@ -24,8 +24,8 @@ class EditorPointer(Pointer):
         The editor.
     canvas : EditorCanvas
         The view of the map.
-    panel : SidePanel
-        The panel, which receives events first.
+    parts : sequence of WindowPart
+        Top bar, tool rail and panel, which receive events first.
     open_menu : callable
         Opens the context menu at a pixel.
 
@@ -36,9 +36,13 @@ class EditorPointer(Pointer):
     """
 
     def __init__(
-        self, editor: Editor, canvas: EditorCanvas, panel: SidePanel, open_menu: Callable[[Pixel], object]
+        self,
+        editor: Editor,
+        canvas: EditorCanvas,
+        parts: Sequence[WindowPart],
+        open_menu: Callable[[Pixel], object],
     ) -> None:
-        super().__init__((panel,))
+        super().__init__(parts)
         self.editor = editor
         self.canvas = canvas
         self.pans_with_left = False

@@ -1,6 +1,6 @@
 """The window of the editor, which handles events and draws frames."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,12 +25,15 @@ from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode import PlayWindow, build_play_change, open_play_window
 from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import edit_typed_value
+from robocov_app.editor.ui.top_bar import EditorTopBar
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.panel import WindowPart
+from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.command_window import CommandWindow
@@ -92,6 +95,10 @@ class EditorWindow(CommandWindow):
         Commands on files.
     commands : CommandTable
         All commands.
+    top_bar : EditorTopBar
+        The bar at the top.
+    tool_rail : ToolRail
+        The tools, to the left of the map.
     panel : EditorPanel
         The panel.
     pointer : EditorPointer
@@ -126,7 +133,9 @@ class EditorWindow(CommandWindow):
         commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
         self.panel = EditorPanel(editor, self.commands, self.do, self._show_problem)
-        self.pointer = EditorPointer(editor, self.canvas, self.panel, self.open_menu)
+        self.top_bar = EditorTopBar(editor, self.commands, self.do)
+        self.tool_rail = ToolRail(editor.toolbox, self.commands, self.do)
+        self.pointer = EditorPointer(editor, self.canvas, self.parts, self.open_menu)
         self.team_sampler = TeamSampler()
         self._waits_for_workers = waits_for_workers
         editor.snapper.waits_for_targets = waits_for_workers
@@ -149,6 +158,11 @@ class EditorWindow(CommandWindow):
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
         )
+
+    @property
+    def parts(self) -> Sequence[WindowPart]:
+        """Top bar, tool rail and panel."""
+        return (self.top_bar, self.tool_rail, self.panel)
 
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state of the document after an unexpected error."""
@@ -194,7 +208,8 @@ class EditorWindow(CommandWindow):
         canvas = self.canvas
         dialog = editor.dialogs.current
         is_importing = isinstance(dialog, ImportDialog) and dialog.is_busy
-        if self.panel.ui.needs_redraw or editor.moves_since is not None or is_importing:
+        needs_redraw = any(part.ui.needs_redraw for part in self.parts)
+        if needs_redraw or editor.moves_since is not None or is_importing:
             return None
         return FrameState(
             revision=editor.revision,
@@ -231,7 +246,7 @@ class EditorWindow(CommandWindow):
             self.play_window.set_appearance(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
-        """Advance the clock, poll files and workers, and update layout, panel, cursor and title."""
+        """Advance the clock, poll files and workers, and update layout, parts, cursor and title."""
         if self.play_window is not None:
             self._update_play_window(self.play_window, seconds)
             return
@@ -250,7 +265,10 @@ class EditorWindow(CommandWindow):
             self.closed = True
             return
         self._arrange()
-        self.panel.is_covered = self.dialogs.is_open
+        for part in self.parts:
+            part.is_covered = self.dialogs.is_open
+        self.top_bar.update()
+        self.tool_rail.update()
         self.panel.update()
         self.cursor.show(self._choose_cursor())
         title = editor.document.title
@@ -285,14 +303,13 @@ class EditorWindow(CommandWindow):
             return
         self._layout_key = key
         self.theme = get_theme(editor.theme)
-        self.layout = build_layout(
-            key[0], self.scale, 1, 1.0, panel=editor.shows_panel, plot=False, toolbars=False
-        )
+        self.layout = build_layout(key[0], self.scale, panel=editor.shows_panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
-        self.panel.arrange(self.layout, self.theme)
+        for part in self.parts:
+            part.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw the map, the status bar, the panel, the message and everything above the map."""
+        """Draw the map, the status bar, the parts, the message and everything above the map."""
         layout = self.layout
         theme = self.theme
         editor = self.editor
@@ -301,6 +318,8 @@ class EditorWindow(CommandWindow):
         draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
         if layout.has_panel:
             self.panel.draw(self.screen)
+        self.tool_rail.draw(self.screen)
+        self.top_bar.draw(self.screen)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
         self.draw_above_map()

@@ -1,6 +1,6 @@
 """Tools: base class of the mouse tools for a map, their events and their overlays."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import dist
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
@@ -76,8 +76,6 @@ class Tool(Generic[ContextT, EventT]):
         Unique name, as in the command ``tool:name``.
     title : str
         Name in the window.
-    button_text : str
-        Label of its button if the title is too long; if empty, the title is used.
     key : str
         Key that selects the tool.
     hint : str
@@ -88,7 +86,6 @@ class Tool(Generic[ContextT, EventT]):
 
     name = ""
     title = ""
-    button_text = ""
     key = ""
     hint = ""
     snaps = False
@@ -133,17 +130,21 @@ class Toolbox(Generic[ToolT]):
 
     Parameters
     ----------
-    tools : iterable of Tool
-        The tools, in the order of the panel. The first is in use until another one is chosen.
+    *groups : sequence of Tool
+        The tools in the order of the tool rail, which separates the groups. The first tool is in use until
+        another one is chosen.
 
     Attributes
     ----------
+    groups : tuple of sequence of Tool
+        The groups.
     by_name : dict of str to Tool
         The tools by their names.
     current : Tool
         The tool in use.
     """
 
-    def __init__(self, tools: Iterable[ToolT]) -> None:
-        self.by_name = {tool.name: tool for tool in tools}
+    def __init__(self, *groups: Sequence[ToolT]) -> None:
+        self.groups = groups
+        self.by_name = {tool.name: tool for group in groups for tool in group}
         self.current: ToolT = next(iter(self.by_name.values()))

@@ -55,9 +55,9 @@ class Layout(NamedTuple):
     scale : float
         The requested scale, or the largest one at which everything fits into the window.
     bar : Box
-        The top bar; its height is 0 in windows without one.
+        The top bar.
     rail : Box
-        The tool rail to the left of the arena; its width is 0 in windows without one.
+        The tool rail to the left of the arena.
     arena, chart, time_slider, status : Box
         The time slider is below the chart.
     panel : Box
@@ -95,7 +95,6 @@ def build_layout(
     panel: bool = True,
     legend_rows: int = 1,
     plot: bool = True,
-    toolbars: bool = True,
 ) -> Layout:
     """Lay out a window.
 
@@ -114,8 +113,6 @@ def build_layout(
         Number of rows of the shared legend.
     plot : bool
         Whether chart and time slider are shown.
-    toolbars : bool
-        Whether the top bar and the tool rail are shown.
 
     Returns
     -------
@@ -123,7 +120,7 @@ def build_layout(
     """
     width, height = size
     scale = min(scale, find_max_scale(size))
-    panel_width = slider_height = chart_height = legend_height = bar_height = rail_width = 0
+    panel_width = slider_height = chart_height = legend_height = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
     # In small windows, the chart takes at most a third of the height.
@@ -132,9 +129,8 @@ def build_layout(
         chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
     if panes > 1:
         legend_height = round((_LEGEND_MARGIN_PX + LEGEND_ROW_PX * legend_rows) * scale)
-    if toolbars:
-        bar_height = round(BAR_HEIGHT_PX * scale)
-        rail_width = round(RAIL_WIDTH_PX * scale)
+    bar_height = round(BAR_HEIGHT_PX * scale)
+    rail_width = round(RAIL_WIDTH_PX * scale)
     left_width = width - panel_width
     status_height = round(STATUS_HEIGHT_PX * scale)
     arena_height = max(height - bar_height - status_height - slider_height - chart_height, 1)

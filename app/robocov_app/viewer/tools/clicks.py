@@ -35,7 +35,6 @@ class AddRobotTool(ViewerTool):
 
     name = "robot"
     title = "Add robot"
-    button_text = "Add"
     key = "a"
     hint = "click where a robot should join"
 
