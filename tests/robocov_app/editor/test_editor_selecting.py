@@ -11,6 +11,8 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, Wall
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.handles import find_handle, list_handles, list_vertex_owners
+from robocov_app.toolkit.commands.menu import Menu
+from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 
 SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -275,3 +277,62 @@ def test_small_objects_are_dragged_instead_of_their_vertices(tmp_path: Path) -> 
         (moved,) = driver.shapes
         assert moved.polygon.area == pytest.approx(0.16, abs=1e-3)
         assert moved.vertices[0] == pytest.approx((25, 25), abs=0.3)
+
+
+def get_ink(driver: EditorDriver, point: tuple[float, float]) -> tuple[int, ...]:
+    x, y = map(round, driver.find_pixel(point))
+    return tuple(driver.copy_frame()[y, x].tolist())
+
+
+def test_the_object_under_the_cursor_has_an_outline(driver: EditorDriver) -> None:
+    edge = (2.0, 3.0)
+    driver.move_to((9, 5))
+    plain = get_ink(driver, edge)
+    driver.move_to((3, 3))
+    assert get_ink(driver, edge) != plain
+    driver.move_to((9, 5))
+    assert get_ink(driver, edge) == plain
+
+
+def test_shift_moves_objects_along_multiples_of_45_degrees(driver: EditorDriver) -> None:
+    driver.select(0)
+    driver.hold_keys("shift")
+    driver.drag_at((3, 3), (3.5, 3.6), (4.2, 4.0))
+    driver.hold_keys()
+    (x, y) = driver.shapes[0].vertices[0]
+    assert x > 2.5
+    assert x - 2 == pytest.approx(y - 2, abs=1e-3)
+
+
+def open_menu(driver: EditorDriver, point: tuple[float, float]) -> list[str]:
+    """Right-click a position, m, and return the names of the commands in the menu."""
+    driver.click_at(point, button=3)
+    menu = driver.editor.dialogs.current
+    assert isinstance(menu, Menu)
+    driver.window.draw()
+    return [command.name for command in menu.rows if command is not None]
+
+
+def test_the_menu_of_a_wall_changes_its_width(driver: EditorDriver) -> None:
+    assert "wall:width" not in open_menu(driver, (3, 3))
+    driver.press_key("escape")
+    point = WALL.points[0]
+    assert {"duplicate", "delete", "wider", "narrower", "wall:width"} <= set(open_menu(driver, point))
+    driver.click(*driver.window.dialogs.ui.widgets["option:wider"].rect.center)
+    assert driver.shapes[2].width == pytest.approx(1.25 * WALL.width, abs=1e-3)
+    open_menu(driver, point)
+    driver.click(*driver.window.dialogs.ui.widgets["option:wall:width"].rect.center)
+    driver.type("0.4")
+    driver.press_key("return")
+    assert driver.shapes[2].width == 0.4
+
+
+def test_menus_fit_into_the_smallest_window(tmp_path: Path) -> None:
+    shapes = [SQUARE, PILLAR, WALL, PolygonObstacle(((1, 1), (9, 9), (9, 1), (1, 9)))]
+    with open_editor(tmp_path, sheet(*shapes), size=MIN_SIZE_PX) as driver:
+        driver.select(0, 1, 2, 3)
+        assert len(open_menu(driver, (3, 3))) > 15
+        window = driver.window.screen.get_rect()
+        rects = [widget.rect for widget in driver.window.dialogs.ui.widgets.values()]
+        assert all(window.contains(rect) for rect in rects)
+        assert all(rect.height > 10 for rect in rects)

@@ -16,7 +16,8 @@ from robocov_app.editor.model import require
 from robocov_app.toolkit.tools.geometry import compute_bearing, compute_cos_sin
 
 Box: TypeAlias = tuple[float, float, float, float]  # minimum x and y, maximum x and y, m
-SHIFT_ANGLE_DEG = 15.0  # while Shift is held, lines snap to multiples of this angle
+SHIFT_ANGLE_DEG = 45.0  # while Shift is held, lines and moves have a multiple of this angle
+SHIFT_ROTATION_DEG = 15.0  # while Shift is held, rotations are a multiple of this angle
 DECIMALS = 4  # decimal places of lengths in files, m: tenths of a millimeter
 distance = math.dist
 

@@ -93,7 +93,7 @@ class Drag:
 
 
 class MoveDrag(Drag):
-    """Moves objects. Alt makes copies, Shift constrains the angle, Ctrl disables snapping."""
+    """Moves objects. Alt makes copies, Shift keeps a multiple of 45°, Ctrl disables snapping."""
 
     cursor_shape: CursorShape | None = "move"
 
@@ -209,7 +209,7 @@ class VertexDrag(Drag):
 
 
 class RotateDrag(Drag):
-    """Rotates objects about the center of their bounding box, with Shift in steps, with Ctrl freely."""
+    """Rotates objects about the center of their bounding box, in steps of 15° with Shift, freely with Ctrl."""
 
     def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
@@ -223,7 +223,7 @@ class RotateDrag(Drag):
         # Between -180 and 180 degrees.
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
         if event.shift:
-            degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)
+            degrees = geometry.SHIFT_ROTATION_DEG * round(degrees / geometry.SHIFT_ROTATION_DEG)
         elif not event.ctrl:
             degrees = snap_angle(degrees, self.context.snap_angle)
         self._rotate(degrees)

@@ -55,6 +55,8 @@ class SelectTool(EditorTool):
         self._handle: Handle | None = None  # the handle that was pressed
         # Whether a click narrows the selection, because the press was on a selected object.
         self._narrows = False
+        # Objects that a click with Shift removes from the selection; a drag moves them instead.
+        self._removed = Selection()
 
     @property
     def is_busy(self) -> bool:
@@ -66,6 +68,7 @@ class SelectTool(EditorTool):
         self.pressed = event
         self.drag = None
         self._narrows = False
+        self._removed = Selection()
         self._handle = self._find_handle(context, event)
         if self._handle is None:
             self._press_object(context, event)
@@ -92,7 +95,9 @@ class SelectTool(EditorTool):
         if selected is not None and not event.shift:
             owner = selected
         pressed = Selection.of(owner).with_groups(context.sketch)
-        if event.shift:
+        if event.shift and owner in context.selection.owners:
+            self._removed = pressed
+        elif event.shift:
             context.select(context.selection.without_vertices().toggle(pressed))
         elif selected is None or context.selection.vertices:
             context.select(pressed)
@@ -135,6 +140,8 @@ class SelectTool(EditorTool):
         if drag is not None:
             drag.update(event)
             drag.end()
+        elif self._removed:
+            context.select(context.selection.without_vertices().toggle(self._removed))
         elif pressed is not None and self._handle is None and not event.shift:
             self._click(context, pressed)
 

@@ -43,6 +43,8 @@ class EditorWindowActions(WindowActions):
         Opens the map in the viewer.
     edit_name : callable
         Puts the text cursor into the field for the name.
+    edit_width : callable
+        Puts the text cursor into the field for the width of a wall.
     open_menu : callable
         Opens the context menu.
     hold_pan : callable
@@ -51,6 +53,7 @@ class EditorWindowActions(WindowActions):
 
     start_play_mode: Action
     edit_name: Action
+    edit_width: Action
     open_menu: Action
     hold_pan: Action
 
@@ -114,7 +117,7 @@ def list_commands(
         _build_edit_group(editor, window),
         _build_arrange_group(editor),
         _build_combine_group(editor),
-        _build_vertex_group(editor),
+        _build_vertex_group(editor, window),
         _build_grid_group(editor),
         _build_view_group(editor, canvas, window),
         _build_robot_group(editor),
@@ -254,7 +257,7 @@ def _build_combine_group(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _build_vertex_group(editor: Editor) -> EditorCommandGroup:
+def _build_vertex_group(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
     """Build the group of commands that edit vertices, walls, outlines and the paths of obstacles."""
     bevel = partial(actions.trim_corners, editor, vertices.bevel_corners)
     round_corners = partial(actions.trim_corners, editor, vertices.round_corners)
@@ -276,6 +279,7 @@ def _build_vertex_group(editor: Editor) -> EditorCommandGroup:
     group.add_edit("path:none", "Remove an obstacle's path", paths.remove_path, "alt+o")
     group.add("wider", "Wider walls", widen, "]", repeats=True)
     group.add("narrower", "Narrower walls", narrow, "[", repeats=True)
+    group.add("wall:width", "Width of the wall…", window.edit_width)
     return group
 
 

@@ -45,20 +45,30 @@ def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
     selection = editor.selection
     count = len(selection.items & editor.sketch.index_by_key.keys())
     groups = [["cut", "copy", "duplicate", "delete"]]
+    groups.append(_list_width_commands(editor))
     if len(selection.owners) == 1 and not selection.boundary:
         groups.append(["name", "fit:selection"])
     groups.append(["rotate:left", "rotate:right", "mirror:x", "mirror:y"])
     if count > 1:
+        # A menu must fit into the window, so the panel has the commands that align objects.
         groups.append(["unite", "subtract", "intersect", "divide"])
-        align = ["align:left", "align:bottom"]
-        if count > 2:
-            align += ["distribute:x", "distribute:y"]
-        groups.append(align)
         groups.append(["group", "lock", "hide"])
     else:
         groups.append(["lock", "hide"])
     groups.append(_list_shape_commands(editor))
     return groups
+
+
+def _list_width_commands(editor: Editor) -> list[str]:
+    """Return the commands for the width of selected walls; a width can be typed for a single wall."""
+    index_by_key = editor.sketch.index_by_key
+    shapes = [editor.sketch.get_item(key).shape for key in editor.selection.items if key in index_by_key]
+    if not any(isinstance(shape, WallObstacle) for shape in shapes):
+        return []
+    commands = ["wider", "narrower"]
+    if len(editor.selection.owners) == 1:
+        commands.append("wall:width")
+    return commands
 
 
 def _list_shape_commands(editor: Editor) -> list[str]:

@@ -9,6 +9,7 @@ import pygame
 from robocov.environment import Point
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
+from robocov_app.editor.model import require
 from robocov_app.editor.model.hit_test import find_owners
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Selection
@@ -21,7 +22,7 @@ from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
-from robocov_app.editor.ui.panel import EditorPanel
+from robocov_app.editor.ui.panel import EditorPanel, find_object_kind
 from robocov_app.editor.ui.play_mode import PlayWindow, build_play_change, open_play_window
 from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import edit_typed_value
@@ -151,6 +152,7 @@ class EditorWindow(CommandWindow):
             start_play_mode=self.start_play_mode,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
+            edit_width=self._edit_width,
             open_menu=lambda: self.open_menu(self.pointer.pixel),
             hold_pan=lambda: self.pointer.hold_pan(),
             show_next_tab=lambda: self.panel.show_next_tab(),
@@ -335,11 +337,18 @@ class EditorWindow(CommandWindow):
 
     def _edit_name(self) -> None:
         """Put the text cursor into the name of the selected object or, if there is none, of the map."""
-        tab = "map"
-        field = "title"
         if len(self.editor.selection.owners) == 1:
-            tab = "object"
-            field = "name"
+            self._edit_field("object", "name")
+        else:
+            self._edit_field("map", "title")
+
+    def _edit_width(self) -> None:
+        """Put the text cursor into the field for the width of the selected wall."""
+        require(find_object_kind(self.editor) == "wall", "select one wall first")
+        self._edit_field("object", "width")
+
+    def _edit_field(self, tab: str, field: str) -> None:
+        """Put the text cursor into a field of a page of the panel."""
         self.editor.shows_panel = True
         self._arrange()
         self.panel.show_tab(tab)
