@@ -1,6 +1,6 @@
 """The page that compares results of the benchmark: tables and Pareto plots for each track."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.ratings import Rating, format_number
+from robocov_app.benchmark.results import shares_maps_by_messages
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
@@ -144,7 +145,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         overview=_build_overview(labels, tracks),
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
-        notes=ratings.NOTES,
+        notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
         method=list(dict.fromkeys(sentence for result in results for sentence in result["method"])),
         entries=_build_entries_table(results, labels),
     )
@@ -427,6 +428,21 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
         if not front or points[k][1] < points[front[-1]][1]:
             front.append(k)
     return front
+
+
+def _describe_entries_without_messages(
+    results: Sequence[Mapping[str, Any]], labels: Sequence[str]
+) -> Iterator[str]:
+    """Yield a note on the entries that were made before robots shared maps by messages, if there are any."""
+    pairs = zip(results, labels, strict=True)
+    concerned = [label for result, label in pairs if not shares_maps_by_messages(result)]
+    if concerned:
+        yield (
+            f"{', '.join(concerned)}: made with an earlier version, in which robots read the current maps of "
+            "all robots in communication range, without messages. Loss, latency, message rate and bandwidth "
+            "had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each changed "
+            "cell of a map, 28 for each reported position of another robot (number, position, time)."
+        )
 
 
 def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:

@@ -3,6 +3,7 @@
 import gzip
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
@@ -34,6 +35,10 @@ FIGURES = (
     "stuck_robots",
 )
 """Figures of a run that a row contains in addition to its effort and its gaps."""
+_RESULTS_VERSION_PATTERN = re.compile(r"\(results (\d+)\)")
+"""Version of the results in the version of robocov, see `robocov_app.sweep.worker.list_result_versions`."""
+_FIRST_VERSION_WITH_MESSAGES = 5
+"""Version of the results from which on the built-in controllers share maps by messages."""
 Row: TypeAlias = dict[str, Any]
 """One run of a result: its track, map and seed, and its figures or its error."""
 
@@ -144,6 +149,27 @@ def describe_method() -> list[str]:
         "control period, or at the message rate, and the messages of the controller, such as shared maps.",
         "deciding_s: processor time of the controller alone, all robots; it depends on the machine.",
     ]
+
+
+def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
+    """Return whether robots used nothing but messages to share maps, or shared none.
+
+    Parameters
+    ----------
+    result : Mapping
+        As returned by `read_result`.
+
+    Returns
+    -------
+    bool
+        False for entries of built-in controllers with the information "shared map" that were made before
+        these sent messages.
+    """
+    entry = result["entry"]
+    if entry["information"] != "shared map" or entry["source_sha256"]:
+        return True
+    version = _RESULTS_VERSION_PATTERN.search(str(result["versions"].get("robocov", "")))
+    return version is None or int(version[1]) >= _FIRST_VERSION_WITH_MESSAGES
 
 
 def read_result(path: Path) -> dict[str, Any]:

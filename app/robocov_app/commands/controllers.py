@@ -18,11 +18,20 @@ from robocov_app.terminal.output import create_console, print_answer
 _HINT = (
     "A controller of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
 )
+_INFORMATION_NOTES = {
+    "own": "",
+    "shared map": "   (shares maps by messages)",
+    "whole map": "   (informed: whole map)",
+}
+"""What is printed next to the name of a controller, by the information that it uses."""
 
 
 @dataclass
 class Arguments(JsonOption):
     """List the controllers, with units, defaults and ranges of their gains.
+
+    Robots of controllers that share maps do so by messages, which conditions such as --loss, --delay and
+    --bandwidth of `robocov run` affect.
 
     In JSON, the paper's controller has "flagship": true. Controllers with the best results on the benchmark,
     given what their robots may know, have "recommended": true.
@@ -59,8 +68,7 @@ def _print_controller(console: Console, row: dict[str, Any], gains: Iterable[Gai
         notes += "   (the paper's controller)"
     if row["recommended"]:
         notes += "   (recommended)"
-    if row["information"] != "own":
-        notes += f"   (informed: {row['information']})"
+    notes += _INFORMATION_NOTES[row["information"]]
     name = (escape_controls(row["name"]), "bold")
     console.print(Text.assemble(name, escape_controls(f"   {row['label']}{notes}")))
     console.print(Text(escape_controls(f"  {row['summary']}")))

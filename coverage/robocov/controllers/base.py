@@ -15,8 +15,11 @@ from robocov.voronoi.delaunay import Mesh
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
 """Information that a controller uses: the measurements of each robot and the positions of its neighbors
-("own"); in addition maps, and the last known positions of other robots, that neighbors send each other
-("shared map"); or the whole map from the start ("whole map")."""
+("own"); in addition what robots send each other in messages, for example scans, last known positions of
+other robots, or estimates of the density ("shared map"); or the whole map from the start ("whole map").
+
+Messages arrive in the next step at the earliest. The conditions delay, lose and limit them, see
+`robocov.conditions.communication`. The docstring of a controller describes its messages and their sizes."""
 
 TIME_TOLERANCE_S = 1e-9
 """Margin of comparisons of times: a sum of time steps may be a little less than a multiple of them."""

@@ -191,6 +191,17 @@ def test_the_page_rejects_gaps_that_do_not_follow_from_costs(
     assert "rows[0]: gap: expected" in message
 
 
+def test_entries_without_messages_are_named() -> None:
+    results = load_bundled_results()
+    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
+    adaptive = next(result for result in results if result["entry"]["controller"] == "adaptive")
+    earlier = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 4)"}}
+    current = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 5)"}}
+    note = "Adaptive: made with an earlier version"
+    assert note in build_page([rapf, earlier], "Test")
+    assert "made with an earlier version" not in build_page([rapf, current], "Test")
+
+
 def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: Path) -> None:
     results = load_bundled_results()
     rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
