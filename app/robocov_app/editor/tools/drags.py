@@ -209,7 +209,7 @@ class VertexDrag(Drag):
 
 
 class RotateDrag(Drag):
-    """Rotates objects about the center of their bounding box, in steps of 15° with Shift, freely with Ctrl."""
+    """Rotates objects about the center of their box, with Shift in steps of 15°, with Ctrl freely."""
 
     def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
