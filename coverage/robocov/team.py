@@ -272,6 +272,11 @@ class Team:
         return bool((self.max_speed != self.max_speed[0]).any())
 
     @property
+    def min_radius(self) -> float:
+        """Radius of the smallest robot, m."""
+        return float(self.radius.min())
+
+    @property
     def is_unicycle(self) -> BoolArray:
         """Mask of the robots that are unicycles and have to turn, (n,) bool."""
         return np.asarray(self.track_width > 0.0)

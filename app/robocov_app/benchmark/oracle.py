@@ -176,4 +176,4 @@ def find_waypoints(planner: GeodesicPlanner, position: Array, goal: Array) -> Ar
 
 @lru_cache(maxsize=4)
 def _get_planner(environment: Environment, clearance: float) -> GeodesicPlanner:
-    return GeodesicPlanner(environment, clearance, _LATTICE)
+    return GeodesicPlanner(environment, clearance, _LATTICE, radius=0.0)

@@ -107,9 +107,9 @@ class GeodesicLloyd(WholeMapController):
         return Decision(forces=forces, goals=plan.goals, terms={"attraction": forces}, memory=memory)
 
     def _get_planner(self, team: Team) -> GeodesicPlanner:
-        """Return the planner for the largest robot of the team."""
+        """Return the planner for a team. Its paths fit the largest robot."""
         clearance = float(team.radius.max()) + self.clearance
-        return _get_planner(self.get_environment(), clearance, int(self.lattice))
+        return _get_planner(self.get_environment(), clearance, int(self.lattice), team.min_radius)
 
 
 class GeodesicPlanner:
@@ -122,6 +122,8 @@ class GeodesicPlanner:
         Distance that the centers of robots keep from walls.
     lattice : int
         Number of cells of the lattice of the cost along a side of the region.
+    radius : float, m
+        Radius of the smallest robot, for the cost.
 
     Attributes
     ----------
@@ -133,7 +135,7 @@ class GeodesicPlanner:
         Shortest paths in that space.
     """
 
-    def __init__(self, environment: Environment, clearance: float, lattice: int) -> None:
+    def __init__(self, environment: Environment, clearance: float, lattice: int, radius: float) -> None:
         configuration_space = build_configuration_space(environment, clearance)
         walls = environment.region.polygon.difference(configuration_space)
         obstacles = tuple(
@@ -141,7 +143,7 @@ class GeodesicPlanner:
         )
         boundary = tuple((x, y) for x, y in environment.region.vertices.tolist())
         enlarged = Environment(environment.name, boundary, obstacles)
-        self.cost = CoverageCost(environment, lattice)
+        self.cost = CoverageCost(environment, lattice, radius=radius)
         self.paths = Geodesics(enlarged)
         self.configuration_space: MultiPolygon = enlarged.free
         shapely.prepare(self.configuration_space)

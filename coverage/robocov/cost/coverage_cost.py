@@ -20,7 +20,7 @@ from robocov.cost.corner_views import (
 from robocov.cost.lattice import MAX_LATTICE, build_lattice
 from robocov.cost.result import CoverageResult
 from robocov.cost.site_paths import NO_ROBOT, CostMap, Search, SitePaths, find_site_paths
-from robocov.defaults import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_LATTICE, DEFAULT_RADIUS_M
 from robocov.density.polygon_masses import compute_square_means
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, quote, require_number, to_floats
@@ -38,22 +38,33 @@ class CoverageCost:
     exact; only the mean over the sites is an approximation of the integral. If the environment has a
     density φ, each site is weighted by the exact mean of φ over its cell.
 
+    Paths are those of a point, except that no path leads through a gap that is narrower than a robot. What
+    lies behind such a gap counts as uncovered. The path of a disc is longer than that of a point by less than
+    its radius times the angle of each turn.
+
     Parameters
     ----------
     environment : Environment
         The map, with its obstacles and its density.
     lattice : int
         Number of cells along a side.
+    radius : float, m
+        Radius of the smallest robot of the team, see `Environment.close_gaps`. With 0, robots are points and
+        paths lead through all gaps, as in the paper.
     progress : callable, optional
         Called with the completed fraction of the preparation. It may raise an exception to stop.
     geodesics : Geodesics, optional
-        The shortest paths of the same environment, if they have been computed already.
+        The shortest paths of the same environment for the same radius, if they have been computed already.
 
     Attributes
     ----------
     environment : Environment
+    closed_environment : Environment
+        The environment with closed gaps; the same object if there is none.
     lattice : int
+    radius : float, m
     geodesics : Geodesics
+        The shortest paths of the closed environment.
     sites : Sites
     points : (m, 2) array, m
         Positions of the sites.
@@ -69,7 +80,8 @@ class CoverageCost:
     Raises
     ------
     ParameterError
-        If `lattice` is not a whole number from 1 to 4096, or so coarse that no site is free.
+        If `lattice` is not a whole number from 1 to 4096, or so coarse that no site is free, or if `radius`
+        is below 0.
 
     See Also
     --------
@@ -100,14 +112,17 @@ class CoverageCost:
         environment: Environment,
         lattice: int = DEFAULT_LATTICE,
         *,
+        radius: float = DEFAULT_RADIUS_M,
         progress: Callable[[float], None] | None = None,
         geodesics: Geodesics | None = None,
     ) -> None:
         require_environment(environment)
+        self.closed_environment = environment.close_gaps(radius)
+        self.radius = float(radius)
         self.lattice = int(require_number("lattice", lattice, 1, MAX_LATTICE, whole=True))
         if geodesics is None:
             heartbeat = None if progress is None else partial(progress, 0.0)
-            geodesics = Geodesics(environment, heartbeat)
+            geodesics = Geodesics(self.closed_environment, heartbeat)
         self.geodesics = geodesics
         self.corners = freeze(geodesics.corners)
         self.sites, tiles = build_lattice(geodesics, self.lattice)
@@ -123,10 +138,11 @@ class CoverageCost:
         )
         views = build_corner_views(len(tiles.boxes), indices, lengths)
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
-        self._component_areas = np.array([component.area for component in environment.free.geoms])
+        components = self.closed_environment.free.geoms
+        self._component_areas = np.array([component.area for component in components])
         # A first guess, which `_find_paths` doubles whenever the wall index turns out to be too small.
         self._index_entries_per_robot = 2 * SOURCE_BINS
-        self._set_density(environment)
+        self._set_density(environment, self.closed_environment)
 
     def with_density(self, environment: Environment) -> CoverageCost:
         """Return the coverage cost of an environment that differs only in its density.
@@ -142,13 +158,17 @@ class CoverageCost:
             It shares all other data with this one.
         """
         twin = copy(self)
-        twin._set_density(environment)
+        closed_environment = environment
+        if self.closed_environment is not self.environment:
+            closed_environment = self.closed_environment.with_density(environment.density)
+        twin._set_density(environment, closed_environment)
         return twin
 
-    def _set_density(self, environment: Environment) -> None:
+    def _set_density(self, environment: Environment, closed_environment: Environment) -> None:
         """Use the density of an environment: compute the weights of the sites."""
         self.environment = environment
-        self._component_masses = environment.free_masses
+        self.closed_environment = closed_environment
+        self._component_masses = closed_environment.free_masses
         self._mass = float(self._component_masses.sum())
         self.weights: Array | None = None
         density = environment.density

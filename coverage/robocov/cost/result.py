@@ -27,7 +27,7 @@ class CoverageResult(Drawable):
         Equation (22), with φ as in (4): `mean_distance` times the integral of φ over these components, which
         is their area if there is no density. With `speeds`, `mean_time` times that integral, in m² s.
     uncovered_area : float, m²
-        Area of the components without a robot.
+        Area of the components without a robot. Gaps that are narrower than a robot separate components.
     distances : (m,) array, m
         Distance to the owner; inf if there is none.
     owner : (m,) int array

@@ -92,7 +92,9 @@ class TimeVaryingCost:
             if len(self._cost_by_map) >= _MAX_CACHED_MAPS:
                 oldest = next(iter(self._cost_by_map))
                 del self._cost_by_map[oldest]
-            self._cost_by_map[key] = CoverageCost(current, self._cost.lattice, progress=self._progress)
+            self._cost_by_map[key] = CoverageCost(
+                current, self._cost.lattice, radius=self._cost.radius, progress=self._progress
+            )
         return self._cost_by_map[key]
 
     def find_available_robots(

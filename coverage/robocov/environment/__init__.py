@@ -4,10 +4,12 @@
 - `obstacles`, `obstacle_paths`: shapes that are solid, and how they move
 - `starts`, `packing`: where teams start, and how many robots fit there
 - `passages`: narrow gaps of the free space
+- `closed_gaps`: thin bars across the gaps through which a robot does not fit
 - `polygons`: robust operations on polygons
 """
 
 from robocov.arrays import Point, Ring
+from robocov.environment.closed_gaps import compute_center_areas
 from robocov.environment.environment import Environment, require_environment
 from robocov.environment.obstacle_paths import (
     REPEATS,
@@ -59,6 +61,7 @@ __all__ = [
     "StartSpec",
     "UniformStart",
     "WallObstacle",
+    "compute_center_areas",
     "compute_start_clearance",
     "compute_start_spacing",
     "compute_swept_area",

@@ -15,14 +15,17 @@ from robocov.arrays import Array, Ring, freeze
 from robocov.density import Density
 from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
-from robocov.environment.obstacles import Obstacle, shift_obstacle
+from robocov.environment.closed_gaps import build_bars
+from robocov.environment.obstacles import Obstacle, PolygonObstacle, shift_obstacle
 from robocov.environment.polygons import GRID_M, extract_polygons, unite_shapes
 from robocov.environment.starts import Start, StartSpec, UniformStart
-from robocov.errors import StartError, describe_unknown_name, format_count, require_type
+from robocov.errors import StartError, describe_unknown_name, format_count, require_number, require_type
 from robocov.observation.region import Region
 
 _DISPLACEMENT_DIGITS = 9
 """Displacements are rounded to the nanometer, so that an obstacle returns to exactly the same position."""
+_MAX_RADIUS_M = 1e6
+"""Maximum radius of a disc whose gaps are closed; keeps widths finite."""
 _GEOMETRY_PROPERTIES = ("region", "boundary_polygon", "free", "blocked")
 """Cached properties that do not depend on the density."""
 
@@ -191,6 +194,57 @@ class Environment(Drawable):
             if name in vars(self):
                 vars(environment)[name] = vars(self)[name]
         return environment
+
+    def close_gaps(self, radius: float) -> Environment:
+        """Close the gaps through which a disc does not fit.
+
+        Two points in wide parts of the free space are connected in the result exactly if a disc of this
+        radius can move from one to the other. Niches and acute corners that are too narrow for the disc stay
+        open. Moving obstacles are closed off where they are at time zero; for other times, use `at` first.
+
+        Parameters
+        ----------
+        radius : float, m
+            Radius of the disc. With 0, all gaps stay open.
+
+        Returns
+        -------
+        Environment
+            The map with a thin obstacle across each closed gap, and without moving obstacles. It is the same
+            object if there is no gap to close.
+
+        Raises
+        ------
+        ParameterError
+            If the radius is not a finite number of at least 0.
+
+        See Also
+        --------
+        CoverageCost : Does not count paths through these gaps.
+
+        Notes
+        -----
+        Each bar is a triangle of 3 µm height across the narrowest place of a gap. Gaps that are narrower than
+        the disc by less than 2 µm stay open.
+
+        Examples
+        --------
+        >>> import robocov as rc
+        >>> hall = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
+        >>> wall = rc.WallObstacle(((5.0, 0.1), (5.0, 6.0)), width=0.2)
+        >>> cracked = rc.Environment("cracked", hall, (wall,))
+        >>> [len(cracked.close_gaps(radius).free.geoms) for radius in (0.0, 0.04, 0.1)]
+        [1, 1, 2]
+        """
+        require_number("radius", radius, 0.0, _MAX_RADIUS_M, "m")
+        bars = build_bars(self.free, radius)
+        if not bars:
+            return self
+        obstacles = [replace(obstacle, path=None) for obstacle in self.obstacles]
+        for bar in bars:
+            vertices = tuple((x, y) for x, y in shapely.get_coordinates(bar.exterior)[:-1].tolist())
+            obstacles.append(PolygonObstacle(vertices, name="closed gap"))
+        return replace(self, obstacles=tuple(obstacles))
 
     def has_same_geometry(self, other: Environment) -> bool:
         """Return whether another map has the same boundary and obstacles.

@@ -73,7 +73,7 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     >>> find_narrowest_gap(MultiPolygon([shapely.orient_polygons(rooms)])).width
     0.8
     """
-    search = _PassageSearch(free)
+    search = PassageSearch(_close_cracks(free))
     diagonal = math.dist(search.free.bounds[:2], search.free.bounds[2:])
     narrowest: Gap | None = None
     low = _MAX_CRACK_M / 2
@@ -104,15 +104,15 @@ def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
     tuple of Gap
         The narrowest first. One passage may have several gaps, for example at all corners of a door.
     """
-    search = _PassageSearch(free)
+    search = PassageSearch(_close_cracks(free))
     gaps: set[Gap] = set()
     for corners in search.split_corners():
         gaps.update(search.list_gaps(corners, _MAX_CRACK_M / 2, width))
     return tuple(sorted(gaps, key=lambda gap: (gap.width, gap.between)))
 
 
-class _Candidates(NamedTuple):
-    """Pairs of a corner p and the nearest point q of an edge that may face it.
+class FacingPoints(NamedTuple):
+    """Pairs of a corner p and the nearest point q of an edge.
 
     Attributes
     ----------
@@ -128,9 +128,18 @@ class _Candidates(NamedTuple):
     q: Array
     width: Array
 
-    def select(self, rows: IntArray | BoolArray) -> _Candidates:
-        """Return the pairs in the given rows."""
-        return _Candidates(
+    def select(self, rows: IntArray | BoolArray) -> FacingPoints:
+        """Return the pairs in the given rows.
+
+        Parameters
+        ----------
+        rows : (r,) int array or (k,) bool array
+
+        Returns
+        -------
+        FacingPoints
+        """
+        return FacingPoints(
             corner=self.corner[rows],
             edge=self.edge[rows],
             p=self.p[rows],
@@ -139,17 +148,28 @@ class _Candidates(NamedTuple):
         )
 
 
-class _PassageSearch:
+class PassageSearch:
     """Search for passages between the edges of a free space, which lies to the left of each edge.
 
     As a disc grows, it can reach the same points along the same routes until its diameter exceeds the width
     of a gap. At a gap, two wall points face each other, and the disc whose diameter is the segment between
     them contains no other wall point. At least one of the two points is a reflex corner, which juts into the
     free space.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        Counter-clockwise polygons.
+
+    Attributes
+    ----------
+    free : MultiPolygon, m
+    edge_starts, edge_ends : (k, 2) arrays, m
+        Ends of each edge.
     """
 
     def __init__(self, free: MultiPolygon) -> None:
-        self.free = _close_cracks(free)
+        self.free = free
         self._boundary = self.free.boundary
         shapely.prepare(self._boundary)
         shapely.prepare(self.free)
@@ -158,66 +178,91 @@ class _PassageSearch:
         sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
         # The ring, the start and the end of each edge.
         self._ring = np.repeat(np.arange(len(rings)), sizes)
-        self._start = np.concatenate([np.empty((0, 2)), *rings])
-        self._end = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
+        self.edge_starts = np.concatenate([np.empty((0, 2)), *rings])
+        self.edge_ends = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
         # The edges of ring r are `_first[r]` to `_stop[r] - 1`.
         self._stop = np.cumsum(sizes)
         self._first = self._stop - sizes
         # The edge that ends where each edge starts.
-        self._previous = np.arange(len(self._start)) - 1
+        self._previous = np.arange(len(self.edge_starts)) - 1
         self._previous[self._first] = self._stop - 1
-        turns = _cross(self._start - self._start[self._previous], self._end - self._start)
+        turns = _cross(self.edge_starts - self.edge_starts[self._previous], self.edge_ends - self.edge_starts)
         self._reflex_corners = np.flatnonzero(turns < 0)
         # The index only needs bounding boxes, which can be built in one call.
-        low = np.minimum(self._start, self._end)
-        high = np.maximum(self._start, self._end)
+        low = np.minimum(self.edge_starts, self.edge_ends)
+        high = np.maximum(self.edge_starts, self.edge_ends)
         self._tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def split_corners(self) -> list[IntArray]:
-        """Return the reflex corners in groups of bounded size."""
+        """Return the reflex corners in groups of bounded size.
+
+        Returns
+        -------
+        list of (c,) int arrays
+            Indices of the edges that start at the corners.
+        """
         group_count = math.ceil(len(self._reflex_corners) / _CORNERS_AT_ONCE)
         return np.array_split(self._reflex_corners, max(group_count, 1))
 
     def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
         """Yield the passages at some corners whose width is between `low` and `high`, the narrowest first."""
+        for facing in self.find_facing_points(corners, low, high):
+            for k in range(len(facing.width)):
+                width = float(facing.width[k])
+                if self._is_passage(facing.corner[k], facing.edge[k], facing.q[k], width):
+                    # Adding zero turns minus zero into zero.
+                    ends = np.round([facing.p[k], facing.q[k]], _DIGITS) + 0.0
+                    first, second = sorted((x, y) for x, y in ends.tolist())
+                    yield Gap(round(width, _DIGITS), (first, second))
+
+    def find_facing_points(self, corners: IntArray, low: float, high: float) -> Iterator[FacingPoints]:
+        """Find pairs of wall points that face each other across free space.
+
+        The disc whose diameter is the segment between the points contains no other wall point.
+
+        Parameters
+        ----------
+        corners : (c,) int array
+            Reflex corners, as returned by `split_corners`.
+        low, high : float, m
+            The distance between the points is between these limits.
+
+        Yields
+        ------
+        FacingPoints
+            Groups of bounded size, the closest pairs first. Two facing corners are found from both of them.
+        """
         candidates = self._find_candidates(corners, low, high)
         batch_count = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
         for rows in np.array_split(np.arange(len(candidates.width)), batch_count):
             batch = candidates.select(rows)
-            is_empty = self._has_empty_disc(batch)
-            for k in np.flatnonzero(is_empty).tolist():
-                width = float(batch.width[k])
-                if self._is_passage(batch.corner[k], batch.edge[k], batch.q[k], width):
-                    # Adding zero turns minus zero into zero.
-                    ends = np.round([batch.p[k], batch.q[k]], _DIGITS) + 0.0
-                    first, second = sorted((x, y) for x, y in ends.tolist())
-                    yield Gap(round(width, _DIGITS), (first, second))
+            yield batch.select(self._has_empty_disc(batch))
 
-    def _find_candidates(self, corners: IntArray, low: float, high: float) -> _Candidates:
+    def _find_candidates(self, corners: IntArray, low: float, high: float) -> FacingPoints:
         """Return pairs of a corner and an edge whose distance is between two limits, sorted by distance."""
-        box_low = self._start[corners] - high
-        box_high = self._start[corners] + high
+        box_low = self.edge_starts[corners] - high
+        box_high = self.edge_starts[corners] + high
         boxes = shapely.box(box_low[:, 0], box_low[:, 1], box_high[:, 0], box_high[:, 1])
         row, edge = self._tree.query(boxes)
         corner = corners[row]
-        p = self._start[corner]
-        edge_start = self._start[edge]
-        along = self._end[edge] - edge_start
+        p = self.edge_starts[corner]
+        edge_start = self.edge_starts[edge]
+        along = self.edge_ends[edge] - edge_start
         fraction = _dot(p - edge_start, along) / _dot(along, along)
         q = edge_start + np.clip(fraction, 0.0, 1.0)[:, None] * along
         offset = q - p
         width = compute_lengths(offset)
         is_candidate = (width > low) & (width < high)
         # The disc must not contain part of the two edges that meet at the corner.
-        for other_end in (self._start[self._previous[corner]], self._end[corner]):
+        for other_end in (self.edge_starts[self._previous[corner]], self.edge_ends[corner]):
             side = other_end - p
             side_length = compute_lengths(side)
             is_candidate &= _dot(side, offset) <= _COSINE_TOLERANCE * width * side_length
         rows = np.flatnonzero(is_candidate)
         rows = rows[np.argsort(width[rows], kind="stable")]
-        return _Candidates(corner, edge, p, q, width).select(rows)
+        return FacingPoints(corner, edge, p, q, width).select(rows)
 
-    def _has_empty_disc(self, candidates: _Candidates) -> BoolArray:
+    def _has_empty_disc(self, candidates: FacingPoints) -> BoolArray:
         """Return whether the disc whose diameter is the segment of each pair is in the free space, (k,)."""
         middles = shapely.points((candidates.p + candidates.q) / 2)
         radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
@@ -235,7 +280,7 @@ class _PassageSearch:
         if ring != self._ring[edge]:
             return True
         first = self._first[ring]
-        points = np.roll(self._start[first : self._stop[ring]], first - corner, axis=0)
+        points = np.roll(self.edge_starts[first : self._stop[ring]], first - corner, axis=0)
         cut = (edge - corner) % len(points) + 1
         near_side = np.vstack([points[:cut], q])
         far_side = np.vstack([q, points[cut:], points[:1]])

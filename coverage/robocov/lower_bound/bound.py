@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.cost import CoverageCost
 from robocov.defaults import DEFAULT_RADIUS_M
-from robocov.environment import GRID_M, Environment
+from robocov.environment import GRID_M, Environment, compute_center_areas
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS, Geodesics
@@ -138,7 +137,8 @@ def compute_lower_bound(
 
     The bound holds for as many robots as there are positions, anywhere in the free space where a disc of the
     given radius fits. If the free space has several components, it covers only those that contain positions:
-    it bounds the cost of these components for all placements in them. Robots may overlap each other.
+    it bounds the cost of these components for all placements in them. Gaps that are narrower than a robot
+    separate components; see `CoverageCost`. Robots may overlap each other.
 
     Parameters
     ----------
@@ -189,7 +189,10 @@ def compute_lower_bound(
     require_number("precision", precision, MIN_PRECISION, 1.0)
     report = progress or (lambda fraction: None)
     cost = CoverageCost(
-        environment, lattice, progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction)
+        environment,
+        lattice,
+        radius=radius,
+        progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction),
     )
     dual = _Dual.build(cost, np.asarray(positions, dtype=float), radius)
     best = _search_best_prices(dual, precision, report)
@@ -197,7 +200,7 @@ def compute_lower_bound(
     mean_distance = max(best.bound, 0.0) / dual.total_weight
     all_prices = np.full(len(cost.points), np.nan)
     all_prices[dual.site_numbers] = best.prices
-    mass = float(environment.free_masses[dual.is_covered].sum())
+    mass = float(cost.closed_environment.free_masses[dual.is_covered].sum())
     return LowerBound(
         mean_distance=mean_distance,
         value=mean_distance * mass,
@@ -333,8 +336,7 @@ class _Dual:
         is_covered = np.asarray(is_inside.any(axis=0))
         site_numbers = np.flatnonzero(result.owner >= 0)
         site_data = _build_site_data(cost, site_numbers)
-        components = np.array(cost.environment.free.geoms)[is_covered]
-        configuration_space = _build_configuration_space(components, radius)
+        configuration_space = _build_configuration_space(cost, is_covered, radius)
         max_prices, initial_prices = _compute_initial_prices(geodesics, robots, site_data.sites)
         stride = _choose_candidate_stride(len(site_numbers), len(positions))
         dual = cls(
@@ -538,14 +540,17 @@ def _choose_candidate_stride(site_count: int, robot_count: int) -> int:
     return max(1, int(math.sqrt(site_count / min_candidates)))
 
 
-def _build_configuration_space(components: NDArray[np.object_], radius: float) -> shapely.Geometry:
-    """Return the region of the given components in which the center of a robot may lie, in meters.
+def _build_configuration_space(cost: CoverageCost, is_covered: BoolArray, radius: float) -> shapely.Geometry:
+    """Return the region of the covered components in which the center of a robot may lie, in meters.
 
     The region may be slightly too large but is never too small, so the bound holds for every placement.
     """
     # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which makes
     # the area larger.
-    area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
+    areas = compute_center_areas(
+        cost.environment.free, cost.closed_environment.free, _EROSION * radius, edges_per_quarter=2
+    )
+    area = shapely.union_all(areas[is_covered])
     if area.is_empty:
         raise ParameterError(
             f"radius: expected a disc that fits in the free space around the positions, got {radius:g} m"

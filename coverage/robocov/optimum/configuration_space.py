@@ -9,7 +9,12 @@ from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray, compute_lengths
-from robocov.environment import compute_start_clearance, compute_start_spacing, find_nearest_inside
+from robocov.environment import (
+    compute_center_areas,
+    compute_start_clearance,
+    compute_start_spacing,
+    find_nearest_inside,
+)
 from robocov.potential import compute_spread_directions
 
 _EDGES_PER_QUARTER = 32
@@ -35,6 +40,9 @@ class ConfigurationSpace:
     free : shapely.MultiPolygon, m
         The free space, one polygon for each component.
     radius : float, m
+    closed : shapely.MultiPolygon, optional, m
+        The free space with closed gaps, if a component may consist of several parts between which a robot
+        cannot move. By default no gap is closed.
 
     Attributes
     ----------
@@ -43,7 +51,8 @@ class ConfigurationSpace:
     spacing : float, m
         Minimum distance between the centers of two robots.
     components : tuple of shapely geometries, m
-        For each component of the free space, the area where the center of a robot can be, which may be empty.
+        For each component of the closed free space, the area where the center of a robot can be, which may
+        be empty.
 
     Examples
     --------
@@ -52,12 +61,16 @@ class ConfigurationSpace:
     array([[1.02, 2.  ]])
     """
 
-    def __init__(self, free: MultiPolygon, radius: float) -> None:
+    def __init__(self, free: MultiPolygon, radius: float, closed: MultiPolygon | None = None) -> None:
         self.clearance = compute_start_clearance(radius)
         self.spacing = compute_start_spacing(radius)
-        self.components: tuple[BaseGeometry, ...] = tuple(
-            component.buffer(-self.clearance, quad_segs=_EDGES_PER_QUARTER) for component in free.geoms
+        areas = compute_center_areas(
+            free,
+            free if closed is None else closed,
+            clearance=self.clearance,
+            edges_per_quarter=_EDGES_PER_QUARTER,
         )
+        self.components: tuple[BaseGeometry, ...] = tuple(areas)
         shapely.prepare(list(self.components))
 
     def find_nearest(self, positions: Array, component: IntArray) -> Array | None:

@@ -180,8 +180,8 @@ def find_optimum(
 
     If the free space has several components, the robots first cover as much area as possible by occupying the
     largest components, and then minimize the cost there. (The cost alone would be lowest with all robots in
-    the smallest room.) Components that are too small for a robot, or contain no site of the lattice, are
-    ignored.
+    the smallest room.) Gaps that are narrower than a robot separate components; see `CoverageCost`.
+    Components that are too small for a robot, or contain no site of the lattice, are ignored.
 
     Examples
     --------
@@ -194,9 +194,12 @@ def find_optimum(
     _check_parameters(robots, restarts, seed, radius)
     report = progress or (lambda fraction: None)
     cost = CoverageCost(
-        environment, lattice, progress=lambda fraction: report(_PROGRESS_AFTER_COST * fraction)
+        environment,
+        lattice,
+        radius=radius,
+        progress=lambda fraction: report(_PROGRESS_AFTER_COST * fraction),
     )
-    search = _Search(environment, cost, robots, float(radius))
+    search = _Search(cost, robots)
     report(_PROGRESS_AFTER_TABLE)
     outcomes = []
     for restart in range(restarts):
@@ -271,10 +274,12 @@ class _Search:
         Distances from groups of sites to the candidates, times the weights of the groups.
     """
 
-    def __init__(self, environment: Environment, cost: CoverageCost, robot_count: int, radius: float) -> None:
+    def __init__(self, cost: CoverageCost, robot_count: int) -> None:
         self.cost = cost
         self.robot_count = robot_count
-        self.space = ConfigurationSpace(environment.free, radius)
+        self.space = ConfigurationSpace(
+            cost.environment.free, cost.radius, closed=cost.closed_environment.free
+        )
         _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
         # A site on the border of two components belongs to the first one.
         site_component = is_inside.argmax(axis=1)
@@ -288,8 +293,8 @@ class _Search:
         if len(self.component) < robot_count:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
-                f"robots: expected at most about {capacity}, as many as fit with radius {radius:g} m in map "
-                f"{environment.name!r}, got {robot_count}"
+                f"robots: expected at most about {capacity}, as many as fit with radius {cost.radius:g} m in "
+                f"map {cost.environment.name!r}, got {robot_count}"
             )
         self.candidates = np.concatenate(candidates)
         groups = self._group_sites(site_component, np.isin(site_component, covered))

@@ -168,7 +168,7 @@ def compare(
     if isinstance(controllers, str) or len(controllers) == 0:
         raise ParameterError(f"controllers: expected a list of controllers, got {quote(controllers)}")
     scenario = Scenario(environment, controllers[0], **options)
-    cost = CoverageCost(scenario.environment, lattice=lattice)
+    cost = CoverageCost(scenario.environment, lattice=lattice, radius=scenario.team.min_radius)
     records: dict[str, Record] = {}
     histories: dict[str, CostHistory] = {}
     for controller in controllers:

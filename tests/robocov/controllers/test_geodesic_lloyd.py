@@ -45,7 +45,7 @@ def observe(positions: np.ndarray, region: Region) -> Observations:
 def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, exponent: float) -> None:
     """The claim of the papers, for robots without inertia and the cost with d^s."""
     environment = generate_map(seed % 20, kind=kind)
-    planner = GeodesicPlanner(environment, 0.13, 32)
+    planner = GeodesicPlanner(environment, 0.13, 32, radius=0.1)
     starts = environment.start("uniform").sample(4, seed=seed)
     positions = find_nearest_inside(planner.configuration_space, starts)
     costs = [np.nanmean(planner.cost(positions).distances ** exponent)]
@@ -108,13 +108,13 @@ def test_without_obstacles_a_robot_moves_to_the_median_or_the_centroid(exponent:
 
 def test_paths_lead_through_the_door() -> None:
     """The first way-point is at the end of the wall, as far from it as a robot keeps."""
-    planner = GeodesicPlanner(DOOR, 0.13, 48)
+    planner = GeodesicPlanner(DOOR, 0.13, 48, radius=0.1)
     path = planner.paths.find_path(np.array([2.0, 1.0]), np.array([8.0, 1.0]))
     assert np.hypot(*(path[1] - [4.9, 8.0])) == pytest.approx(0.13, abs=0.02)
 
 
 def test_goals_on_the_own_side_of_a_wall_are_approached_straight() -> None:
-    planner = GeodesicPlanner(DOOR, 0.13, 48)
+    planner = GeodesicPlanner(DOOR, 0.13, 48, radius=0.1)
     plan = planner.plan(observe(np.array([[2.0, 1.0], [1.0, 2.0]]), DOOR.region), 2.0)
     assert (plan.goals[:, 0] < 4.9).all()
     np.testing.assert_array_equal(plan.waypoints, plan.goals)

@@ -134,7 +134,7 @@ def test_the_result_is_not_worse_than_its_seeds_or_lloyds_iteration_from_them(na
     lattice = 16
     restarts = 6
     best = find_optimum(environment, 5, lattice=lattice, restarts=restarts, seed=3)
-    search = _Search(environment, CoverageCost(environment, lattice), 5, 0.1)
+    search = _Search(CoverageCost(environment, lattice), 5)
     lloyd_costs = []
     for restart in range(restarts):
         seeds = seed_sources(search.table, 5, np.random.default_rng([3, restart]))
@@ -212,7 +212,7 @@ def test_all_rooms_stay_covered_although_the_mean_would_be_lower_without(monkeyp
         return np.argsort(table.sum(axis=0))[::-1][:count]
 
     monkeypatch.setattr("robocov.optimum.search.seed_sources", seed_in_small_room)
-    search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
+    search = _Search(CoverageCost(halves, 32), 3)
     seeds = search.candidates[seed_in_small_room(search.table, 3, None)]
     best = find_optimum(halves, 3, lattice=32, restarts=1)
     assert (seeds[:, 0] > 9.2).all()
@@ -223,7 +223,7 @@ def test_all_rooms_stay_covered_although_the_mean_would_be_lower_without(monkeyp
 @pytest.mark.parametrize("name", ["museum", "trap"])
 def test_the_table_approximates_the_exact_sums_over_all_sites(name):
     environment = load_map(name)
-    search = _Search(environment, CoverageCost(environment, 64), 6, 0.1)
+    search = _Search(CoverageCost(environment, 64), 6)
     assert 300 < len(search.table) < 1100 < len(search.cost.points)
     selection = np.random.default_rng(0).choice(len(search.candidates), 40, replace=False)
     exact = [search.cost(search.candidates[k][None]).mean_distance for k in selection]
@@ -233,7 +233,7 @@ def test_the_table_approximates_the_exact_sums_over_all_sites(name):
 
 def test_candidates_fill_the_room():
     environment = load_map("museum")
-    search = _Search(environment, CoverageCost(environment, 32), 6, 0.1)
+    search = _Search(CoverageCost(environment, 32), 6)
     assert 500 < len(search.candidates) < 900
     (component,) = search.space.components
     assert shapely.covers(component, shapely.points(search.candidates)).all()

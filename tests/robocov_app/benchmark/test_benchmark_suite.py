@@ -86,7 +86,7 @@ def test_quick_has_one_map_of_each_family() -> None:
 
 
 def test_the_oracle_assigns_as_brute_force_does() -> None:
-    planner = GeodesicPlanner(WALLED, 0.13, 8)
+    planner = GeodesicPlanner(WALLED, 0.13, 8, radius=0.1)
     rng = np.random.default_rng(0)
     for _ in range(5):
         places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
