@@ -51,7 +51,8 @@ Watch: TypeAlias = Callable[[Snapshot], object]
 """Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
 _RESULTS_VERSION = 5
-"""To be increased whenever the same inputs give other results. 5: robots share maps by messages."""
+"""To be increased whenever the same inputs give other results. 5: robots share maps by
+messages, and the cost counts no paths through gaps that are narrower than a robot."""
 
 
 @cache
