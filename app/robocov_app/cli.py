@@ -31,7 +31,7 @@ TRACEBACK_VARIABLE = "ROBOCOV_TRACEBACK"
 _MAX_ERROR_CHARS = 1000
 """Maximum length of an error message; longer ones are shortened."""
 _EXAMPLES = (
-    ("robocov demo", "the interactive window; robocov demo --tour plays a lesson of eleven chapters"),
+    ("robocov demo", "the interactive window; with --tour, a lesson of eleven chapters"),
     ("robocov run rooms --video --out first-run", "six robots cover six rooms; figures and a video"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a controller of your own"),

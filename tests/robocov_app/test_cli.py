@@ -68,6 +68,13 @@ def test_controllers_lists_gains_with_units_and_recommends_some(
     assert "atlas   Atlas   (recommended)" in out
 
 
+def test_controllers_lists_only_the_given_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = answer(capsys, "controllers", "lloyd", "rapf")["controllers"]
+    assert [row["name"] for row in rows] == ["lloyd", "rapf"]
+    assert main(["controllers", "loyd"]) == 2
+    assert "unknown controller 'loyd': did you mean 'lloyd'?" in capsys.readouterr().err
+
+
 def test_schema_is_a_json_schema(capsys: pytest.CaptureFixture[str]) -> None:
     import jsonschema
 

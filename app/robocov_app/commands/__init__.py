@@ -23,7 +23,7 @@ class Subcommand(NamedTuple):
 
 COMMANDS = {
     "demo": Subcommand(
-        "demo", "open the interactive window: watch, edit, compare, go back in time", uses_kernels=True
+        "demo", "open the interactive window: watch, edit, compare, rewind", uses_kernels=True
     ),
     "run": Subcommand(
         "run", "simulate one run; save numbers, figures and a video in a folder", uses_kernels=True
@@ -32,7 +32,7 @@ COMMANDS = {
         "compare", "run several controllers from the same starting positions", uses_kernels=True
     ),
     "sweep": Subcommand(
-        "sweep", "run a parameter study in parallel; resumable; one table of all runs", uses_kernels=True
+        "sweep", "run a parameter study in parallel; one table of all runs", uses_kernels=True
     ),
     "replay": Subcommand(
         "replay", "replay a saved run or comparison, in the window or as a video", uses_kernels=True
@@ -58,7 +58,7 @@ COMMANDS = {
     ),
     "bench": Subcommand("bench", "measure speed, as ratios to yardsticks in the same run"),
     "import": Subcommand("maps.import_map", "convert a foreign map file to a map of robocov"),
-    "export": Subcommand("maps.export_map", "write a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
+    "export": Subcommand("maps.export_map", "export a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
     "lesson": Subcommand("lesson", "check a lesson for the window: its format, and that chapters end"),
     "schema": Subcommand("maps.schema", "print the JSON Schema of map files"),
     "completion": Subcommand("completion", "print a script for completion in the shell"),

@@ -71,7 +71,7 @@ class Arguments(FigureOptions):
     Example: robocov bench step
     """
 
-    part: Annotated[tyro.conf.Positional[PartName], tyro.conf.arg(metavar="PART")] = "all"
+    part: Annotated[tyro.conf.Positional[PartName], tyro.conf.arg(metavar="[PART]")] = "all"
     """Part to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
     """Fewer cases and rounds: about ten seconds."""

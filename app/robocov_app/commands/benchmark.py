@@ -28,14 +28,20 @@ _OPTIONS_BY_ACTION = {
 class Arguments(JsonOption):
     """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best placements known.
 
-    The action `run` executes the runs, resumes after any interruption, and writes DIR/result.json, which is
-    small. The action `verify DIR` repeats a sample of its runs, bit for bit, calls the controller for single
-    robots in separate processes, and runs it on new maps. The action `page DIR ... --out FILE.html` compares
-    results with those of the built-in controllers, which the package contains; without DIR it shows these
-    alone. The action `suite` lists tracks and maps, and `references` computes missing best placements of the
-    suite. The controller `oracle` knows them.
+    The first argument is an action:
 
-    Example: robocov benchmark --controller mine.py:Mine --quick --out mine
+      run         (the default) execute the runs, and write DIR/result.json, which is small; after any
+                  interruption, the same command resumes
+      page        compare the results in DIR ... with those of the built-in controllers, which the package
+                  contains; without DIR, show these alone
+      verify      repeat a sample of the runs in DIR, bit for bit, call the controller for single robots in
+                  separate processes, and run it on new maps
+      suite       list the tracks and maps
+      references  compute missing best placements of the suite
+
+    The controller `oracle` knows the best placements and moves straight to them.
+
+    Example: robocov benchmark --controller mine.py:MyController --quick --out mine
     """
 
     action: Annotated[

@@ -33,9 +33,11 @@ class Arguments(RunOptions):
 
     The folder contains a run's folder for each controller, figures of the trajectories and costs side by side
     as PNG and SVG, comparison.csv and comparison.json, and on request frames and a video.
-    --set k_rep=1 applies to every controller with such a gain, --set rapf.k_rep=1 to one.
 
-    Example: robocov compare office --controllers rapf rpf lloyd --video --out office
+    --set k_rep=1 applies to every controller with such a gain, --set rapf.k_rep=1 to one. Controllers in
+    files are named by their class, as in --set MyController.k_rep=1.
+
+    Example: robocov compare office --controllers rapf rpf lloyd --out office
     """
 
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf", "rpf", "lloyd")

@@ -46,8 +46,11 @@ _MAP_ARGUMENTS = {"map", "files"}
 class Arguments:
     """Print a shell script that completes commands, options, controllers and maps.
 
-    Add a line to the startup file of your shell: eval "$(robocov completion bash)" to ~/.bashrc,
-    eval "$(robocov completion zsh)" to ~/.zshrc, robocov completion fish | source to config.fish.
+    Add a line to the startup file of your shell:
+
+      ~/.bashrc    eval "$(robocov completion bash)"
+      ~/.zshrc     eval "$(robocov completion zsh)"
+      config.fish  robocov completion fish | source
 
     Example: robocov completion bash
     """

@@ -2,13 +2,20 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
+import tyro
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from robocov.controllers import RECOMMENDED_CONTROLLERS, get_gains, get_information, list_controller_classes
+from robocov.controllers import (
+    RECOMMENDED_CONTROLLERS,
+    get_gains,
+    get_information,
+    list_controller_classes,
+    load_controller_class,
+)
 from robocov.controllers.gains import Gain, Option, format_value
 from robocov.defaults import DEFAULT_CONTROLLER
 from robocov.text import escape_controls
@@ -28,7 +35,7 @@ _INFORMATION_NOTES = {
 
 @dataclass
 class Arguments(JsonOption):
-    """List the controllers, with units, defaults and ranges of their gains.
+    """List controllers, with units, defaults and ranges of their gains.
 
     Robots of controllers that share maps do so by messages, which conditions such as --loss, --delay and
     --bandwidth of `robocov run` affect.
@@ -36,15 +43,22 @@ class Arguments(JsonOption):
     In JSON, the paper's controller has "flagship": true. Controllers with the best results on the benchmark,
     given what their robots may know, have "recommended": true.
 
-    Example: robocov controllers --json
+    Example: robocov controllers rapf atlas
     """
+
+    names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="[NAME ...]")] = ()
+    """Controllers to list, by default all; also mine.py:MyController."""
 
 
 def command(options: Arguments) -> None:
     """Run `robocov controllers`."""
+    if options.names:
+        controller_classes = {name: load_controller_class(name) for name in options.names}
+    else:
+        controller_classes = list_controller_classes()
     console = create_console()
     rows = []
-    for name, controller_class in list_controller_classes().items():
+    for name, controller_class in controller_classes.items():
         gains = get_gains(controller_class).values()
         row = {
             "name": name,

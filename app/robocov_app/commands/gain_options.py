@@ -16,7 +16,7 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
         Names of the controllers.
     gains : mapping of str to object
         A key such as ``k_rep`` applies to all controllers that have the gain; ``rapf.k_rep`` applies to one,
-        and takes precedence.
+        and takes precedence. A controller ``mine.py:Mine`` may be called ``Mine``.
 
     Returns
     -------
@@ -33,6 +33,7 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
     # Keys for a single controller (with a dot) come last, so that they overwrite those for all.
     for key, value in sorted(gains.items(), key=lambda item: "." in item[0]):
         owner, _, gain = key.rpartition(".")
+        owner = _complete_name(owner, controllers)
         if owner and owner not in known:
             raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known)}")
         candidates = [owner] if owner else controllers
@@ -43,3 +44,12 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
             if name in candidates and gain in known[name]:
                 values[gain] = value
     return selected
+
+
+def _complete_name(name: str, controllers: Sequence[str]) -> str:
+    """Return the complete name of a controller in a file, given the name of its class.
+
+    A name is returned unchanged if no class or several classes have it.
+    """
+    matches = [controller for controller in controllers if controller.endswith(f":{name}")]
+    return matches[0] if name and len(matches) == 1 else name

@@ -123,11 +123,14 @@ class WindowOptions(WebOptions):
     scale: float | None = None
     """Scale of text and lines, such as 2 for a high-density screen (default: fitted to the screen)."""
     folder: Path = Path()
-    """Default folder of screenshots, videos, runs and maps."""
+    """Default folder of screenshots, videos, runs and maps; only --serve creates it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         parse_window_size(self.size)
+        if not self.serve and not self.folder.is_dir():
+            problem = "not a folder" if self.folder.exists() else "folder not found"
+            raise ParameterError(f"--folder: {self.folder}: {problem}; choose an existing one")
         if self.scale is not None:
             require_number("--scale", self.scale, 0.5, 4.0)
 

@@ -30,7 +30,7 @@ class Arguments(JsonOption, WebOptions):
     another controller or a new wall. A run of a controller outside robocov is shown from its record; the
     controller is only loaded if --controller names it.
 
-    Example: robocov replay rooms-rapf --video --film-speed 1 --show distances --out rooms-film
+    Example: robocov replay rooms-rapf --video --show distances --out film
     """
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]

@@ -33,7 +33,7 @@ class Arguments(RunOptions):
     MAP may also be a session that was saved in the window, such as story.robocov: it is simulated again with
     all edits.
 
-    Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
+    Example: robocov run rooms --robots 8 --set k_rep=0.5 --video --out eight
     """
 
     controller: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_CONTROLLER

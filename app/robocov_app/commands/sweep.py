@@ -28,13 +28,21 @@ FAILED = 1
 class Arguments(JsonOption):
     """Run a parameter study in parallel: every combination of the values in a study file, each once.
 
-    The folder contains results.csv, with one row per run, and a folder for each run.
-    After any interruption, the same command resumes the sweep. Runs with damaged files, of other versions, or
-    of changed code of your controllers are run again. For the same map and seed, all controllers start from
-    the same positions. The exit status is 1 if runs have failed.
+    The folder contains results.csv, with one row per run, and a folder for each run. For the same map and
+    seed, all controllers start from the same positions.
 
-    A study file: maps = ["rooms", "mine.json"], controllers = ["rapf", "rpf"], seeds = 20, and under
-    [gains.rapf] k_rep = [0.1, 1.0]; robots, starts, duration and [team] as the options of robocov run.
+    After any interruption, the same command resumes the sweep. Runs with damaged files, of other versions, or
+    of changed code of your controllers are executed again. The exit status is 1 if runs have failed.
+
+    A study file contains, for example:
+
+      maps = ["rooms", "mine.json"]
+      controllers = ["rapf", "rpf"]
+      seeds = 20
+      [gains.rapf]
+      k_rep = [0.1, 1.0]
+
+    The keys robots, starts, duration and those of [team] correspond to the options of robocov run.
 
     Example: robocov sweep study.toml --out study --dry-run
     """

@@ -4,6 +4,8 @@ import contextlib
 import io
 import json
 import re
+import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
@@ -12,6 +14,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 import tyro
 
 from robocov.errors import InputError, ParameterError, quote, require_number
+from robocov_app.terminal.help_text import HelpBuffer, insert_description
 
 T = TypeVar("T")
 
@@ -115,12 +118,20 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
     """
     words = merge_repeated_options(kind, words)
     complaint = io.StringIO()
+    help_text = HelpBuffer(sys.stdout)
     try:
-        with contextlib.redirect_stderr(complaint):
-            config = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
-            return tyro.cli(_arrange_help(kind), prog=f"robocov {command}", args=words, config=config)
+        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(help_text):
+            return tyro.cli(
+                _arrange_help(kind),
+                prog=f"robocov {command}",
+                description="",
+                args=words,
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+            )
     except SystemExit as error:
         if not error.code:
+            width = shutil.get_terminal_size().columns
+            sys.stdout.write(insert_description(help_text.getvalue(), kind.__doc__ or "", width))
             raise
         problem = _add_suggestion(summarize_complaint(complaint.getvalue()), kind, command)
         raise InputError(f"{problem} (robocov {command} -h explains)") from None
@@ -267,7 +278,7 @@ def _make_help_settings(option: Any) -> Any:
 
 def _format_default(label: str) -> str:
     """Return the hint about a default value in the help; empty for values such as None."""
-    if label in ("", "None", "False"):
+    if label in ("", "''", "None", "False"):
         return ""
     if "." in label:
         with contextlib.suppress(ValueError):

@@ -115,7 +115,9 @@ class Adaptive(BaseController):
     information = "shared map"
 
     estimate: str = choice("basis", ("basis", "gp"), "how the density is learned")
-    basis: float = gain(8.0, "functions", "along a side of the region", low=2.0, high=20.0, whole=True)
+    basis: float = gain(
+        8.0, "functions", "number of functions along a side of the region", low=2.0, high=20.0, whole=True
+    )
     prior: float = gain(1.0, "1", "density everywhere before the first measurement", low=1e-3)
     least: float = gain(0.05, "1", "minimum of the estimated density", low=1e-6)
     learning: float = gain(3.0, "1/s²", "γ, rate at which measurements are learned")
@@ -127,7 +129,7 @@ class Adaptive(BaseController):
         "correlation length of the process, relative to the longer side of the region",
         low=0.01,
     )
-    explore: float = gain(0.0, "σ", "number of standard deviations that are added", high=100.0)
+    explore: float = gain(0.0, "σ", "number of standard deviations added to the estimate", high=100.0)
     period: float = gain(0.2, "s", "time from one estimate to the next", low=0.01, high=60.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()

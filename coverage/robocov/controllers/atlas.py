@@ -231,16 +231,26 @@ class Atlas(BaseController):
     is_staggered: ClassVar[bool] = True
     """Whether robots plan at different times."""
 
-    period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
+    period: float = gain(1.0, "s", "time between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "fraction of the cost that a relocation must save", high=1.0)
-    nearby: float = gain(0.003, "1", "the same for a relocation within the robot's own cell", high=1.0)
+    nearby: float = gain(
+        0.003, "1", "fraction of the cost that a move within its own cell must save", high=1.0
+    )
     rest: float = gain(0.002, "1", "fraction of its own cell's cost that a new goal must save", high=1.0)
-    stake: float = gain(0.004, "1", "fraction of the cost at stake for a viewpoint", high=1.0)
+    stake: float = gain(0.004, "1", "fraction of the cost that must be at stake for a viewpoint", high=1.0)
     patience: float = gain(
-        0.12, "1", "path to viewpoints, in diameters of the region, that doubles it", low=1e-3, high=1e4
+        0.12,
+        "1",
+        "path length to viewpoints that doubles the stake, in diameters of the region",
+        low=1e-3,
+        high=1e4,
     )
     settling: float = gain(
-        0.5, "1", "path, in diameters, that doubles the required savings", low=1e-3, high=1e6
+        0.5,
+        "1",
+        "path length that doubles the required savings, in diameters of the region",
+        low=1e-3,
+        high=1e6,
     )
     clearance: float = gain(0.03, "m", "gap between robots and walls along routes", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)

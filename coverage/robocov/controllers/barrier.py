@@ -91,7 +91,11 @@ class Barrier(BaseController):
     safe_gap: float = gain(0.05, "m", "minimum distance between surfaces: D_s minus the radii", high=100.0)
     gamma: float = gain(20.0, "s/m²", "rate at which h may decrease, as gamma h³", low=1e-3)
     braking: float = gain(
-        0.8, "a_max", "alpha, the fraction of the acceleration that is counted on", low=0.05, high=1.0
+        0.8,
+        "a_max",
+        "α, fraction of the maximum acceleration assumed available for braking",
+        low=0.05,
+        high=1.0,
     )
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()

@@ -253,12 +253,12 @@ class Boosting(BaseController):
     )
     # British spelling here, because files of runs contain this name.
     boost: str = choice("phi", ("phi", "p", "neighbours"), "boosting function")
-    kappa: float = gain(1.0, "1", "κ, its factor; for neighbours in m^(1+γ)")
-    gamma: float = gain(2.0, "1", "γ, its exponent", high=20.0)
+    kappa: float = gain(1.0, "1", "κ, factor of the boosting function; for neighbours in m^(1+γ)")
+    gamma: float = gain(2.0, "1", "γ, exponent of the boosting function", high=20.0)
     boosts: float = gain(3.0, "times", "maximum number of boosts of a robot", whole=True, high=1e3)
     patience: float = gain(8.0, "s", "maximum duration of a boost")
     k_grad: float = gain(0.3, "1/s", "desired speed per meter of the gradient", high=100.0)
-    jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
+    jump: float = gain(0.3, "m", "minimum jump of the measured distance at an occlusion", low=0.01)
     clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
     response_time: float = response_time_gain()
 

@@ -76,10 +76,14 @@ class Diffeomorphism(WholeMapController):
     summary = "Lloyd's algorithm in a convex chart of the known map (Caicedo-Núñez and Žefran 2008)"
 
     shrink: float = gain(1e4, "1", "stiffness of obstacles relative to the free space", low=1.0, high=1e6)
-    lattice: float = gain(64.0, "cells", "of the mesh along a side", low=4.0, high=512.0, whole=True)
+    lattice: float = gain(
+        64.0, "cells", "number of cells of the mesh along a side", low=4.0, high=512.0, whole=True
+    )
     clearance: float = gain(0.03, "m", "gap between robots and walls along paths", high=10.0)
-    period: float = gain(0.2, "s", "between two plans", high=60.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per meter to the centroid, in the map", high=100.0)
+    period: float = gain(0.2, "s", "time between two plans", high=60.0)
+    k_prop: float = gain(
+        2.0, "1/s", "desired speed per meter of distance to the centroid, in the chart", high=100.0
+    )
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> DiffeomorphismMemory:

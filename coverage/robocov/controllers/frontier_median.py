@@ -55,8 +55,10 @@ class FrontierMedian(SharedMapController):
     label = "Frontiers, then k-median"
     summary = "explores by frontiers (Yamauchi 1997, Burgard et al. 2005), then moves to the map's k-median"
 
-    period: float = gain(1.0, "s", "between two plans", low=0.05, high=60.0)
-    beta: float = gain(0.05, "1/m", "β, utility of a meter of path length", high=1e3)
+    period: float = gain(1.0, "s", "time between two plans", low=0.05, high=60.0)
+    beta: float = gain(
+        0.05, "1/m", "β, cost of a meter of path relative to the utility of a frontier", high=1e3
+    )
     shortest: float = gain(0.15, "m", "minimum length of a frontier that is explored", high=100.0)
     threshold: float = gain(0.01, "1", "fraction of the cost that another placement must save", high=1.0)
 

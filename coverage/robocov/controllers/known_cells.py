@@ -13,7 +13,7 @@ def cells_choice() -> Any:
     return choice(
         "distance",
         ("distance", "time"),
-        "owner of a point: the nearest robot, or the one that reaches it first at its own maximum speed",
+        "owner of a point: the nearest robot, or the first to reach it at its own speed",
     )
 
 

@@ -274,7 +274,7 @@ class Howard(BaseController):
     scanning = Scanning(rays=72, period=0.1)
 
     k_robots: float = gain(3.0, "N m²", "charge of the other robots")
-    k_obs: float = gain(1.0, "N m²", "charge of the obstacles, over a full turn of rays")
+    k_obs: float = gain(1.0, "N m²", "charge of the obstacles, summed over all rays")
     friction: float = gain(2.0, "N s/m", "ν, which replaces the robots' own viscosity", high=20.0)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
@@ -347,7 +347,7 @@ class Poduri(BaseController):
     k_cover: float = gain(10.0, "N m²", "strength of F_cover")
     eta: float = gain(0.9, "R_c", "distance at which the two forces are equal", low=0.1, high=0.99)
     k_obs: float = gain(0.1, "N m³", "strength of the repulsion from the closest obstacle point")
-    rho_obs: float = gain(2.0, "m", "range of that repulsion", low=0.01, high=1e4)
+    rho_obs: float = gain(2.0, "m", "range of the repulsion from obstacles", low=0.01, high=1e4)
 
     @property
     def _min_degree(self) -> float:
@@ -497,9 +497,11 @@ class Dispersion(BaseController):
     scanning = Scanning(rays=36, period=0.1)
 
     reach: float = gain(5.0, "m", "distance up to which a robot moves away from others", low=0.01, high=1e4)
-    k_disperse: float = gain(1.0, "1/s", "desired speed per meter that another robot is too near")
+    k_disperse: float = gain(1.0, "1/s", "desired speed per meter by which another robot is too close")
     explore_speed: float = gain(0.0, "m/s", "speed of a robot without others in reach", high=1e3)
-    clearance: float = gain(0.2, "m", "from the center of a robot to the surface of others", high=1e3)
+    clearance: float = gain(
+        0.2, "m", "minimum distance from the center of a robot to other surfaces", high=1e3
+    )
     k_avoid: float = gain(2.0, "1/s", "maximum approach speed per meter beyond the clearance", high=60.0)
     response_time: float = response_time_gain()
 

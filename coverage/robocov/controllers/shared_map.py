@@ -204,7 +204,7 @@ class SharedMapController(BaseController):
     information: ClassVar[Information] = "shared map"
     scanning = Scanning(rays=240, period=0.5)
 
-    period: float = gain(2.0, "s", "between two plans", low=0.05, high=60.0)
+    period: float = gain(2.0, "s", "time between two plans", low=0.05, high=60.0)
     nodes: float = gain(
         1600.0, "nodes", "maximum number of nodes of the planning lattice", low=16.0, high=1e5, whole=True
     )

@@ -192,14 +192,16 @@ class TangentBug(BaseController):
     memory_type = TangentBugMemory
 
     clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
-    jump: float = gain(0.5, "m", "minimum step of the depth in view at the end of an obstacle", low=0.01)
+    jump: float = gain(0.5, "m", "minimum jump of the measured distance at the end of an obstacle", low=0.01)
     detour: float | None = gain(
         4.0,
         "distances",
-        "maximum path along a boundary, in distances to the goal; null: once around",
+        "maximum path along a boundary, in distances to the goal; null for once around",
         optional=True,
     )
-    moved: float = gain(0.25, "m", "move of a goal given up after which it is tried again", high=1e4)
+    moved: float = gain(
+        0.25, "m", "distance that an unreachable goal must move before it is tried again", high=1e4
+    )
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()

@@ -84,9 +84,9 @@ class Visibility(BaseController):
     memory_type = VisibilityMemory
 
     k_area: float = gain(
-        0.1, "1/s", "desired speed per square meter of area in view and meter of motion", high=100.0
+        0.1, "1/s", "desired speed per square meter of visible area gained per meter", high=100.0
     )
-    jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
+    jump: float = gain(0.3, "m", "minimum jump of the measured distance at an occlusion", low=0.01)
     clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
     response_time: float = response_time_gain()
 

@@ -23,9 +23,9 @@ from robocov.observation import Cells
 
 TARGETS = ("centroid", "sensing", "median")
 """The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, as in the coverage cost (22)."""
-TARGET_HELP = "the goal of a robot in its cell: the optimum for r², for 1/(r²+h²), or for r"
+TARGET_HELP = "goal of a robot in its cell: the optimum for r², 1/(r²+h²), or r"
 """Description of the controllers' parameter `target`."""
-HEIGHT_HELP = "height h of the sensor in (14), for the target sensing; points much farther away count little"
+HEIGHT_HELP = "height h of the sensor in (14), for target=sensing"
 """Description of the controllers' parameter `height`."""
 
 _MAX_ITERATIONS = 80

@@ -1,9 +1,23 @@
+from pathlib import Path
+
 import pytest
 
 from robocov.errors import ParameterError
 from robocov_app.commands.gain_options import select_gains
 
 NAMES = ("rapf", "rpf", "lloyd")
+CONTROLLER = """
+from dataclasses import dataclass
+import robocov as rc
+
+
+@dataclass(frozen=True)
+class Mine:
+    pull: float = rc.gain(1.0, "N/m", "attraction to the centroid")
+
+    def force(self, own):
+        return self.pull * (own.centroid - own.position)
+"""
 
 
 def test_a_gain_applies_to_every_controller_that_has_it() -> None:
@@ -14,6 +28,24 @@ def test_a_gain_applies_to_every_controller_that_has_it() -> None:
 def test_a_gain_of_one_controller_takes_precedence(order: tuple[str, str]) -> None:
     given = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
     assert select_gains(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
+
+
+def test_a_controller_in_a_file_may_be_named_by_its_class(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(CONTROLLER)
+    names = ("rapf", f"{file}:Mine")
+    assert select_gains(names, {"Mine.pull": 2}) == [{}, {"pull": 2}]
+    assert select_gains(names, {f"{file}:Mine.pull": 2}) == [{}, {"pull": 2}]
+
+
+def test_the_name_of_several_classes_is_not_enough(tmp_path: Path) -> None:
+    names = []
+    for stem in ("first", "second"):
+        file = tmp_path / f"{stem}.py"
+        file.write_text(CONTROLLER)
+        names.append(f"{file}:Mine")
+    with pytest.raises(ParameterError, match=r"--set Mine\.pull: unknown controller 'Mine'"):
+        select_gains(names, {"Mine.pull": 2})
 
 
 @pytest.mark.parametrize(

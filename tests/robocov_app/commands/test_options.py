@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.commands import cost, demo, optimum
+from robocov_app.commands import cost, demo, edit, optimum
 from robocov_app.commands.options import RunOptions, VideoOptions
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.viewer.costs.costs import Costs
@@ -50,6 +52,21 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
 def test_values_out_of_range_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match=r"wanted|expected"):
         RunOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [demo.Arguments, edit.Arguments])
+def test_the_folder_of_a_window_must_exist(kind: type, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(
+        ParameterError, match=r"^--folder: .*missing: folder not found; choose an existing one$"
+    ):
+        kind(folder=tmp_path / "missing")
+    with pytest.raises(ParameterError, match=r"^--folder: .*file: not a folder"):
+        kind(folder=tmp_path / "file")
+
+
+def test_the_folder_of_a_served_window_is_created_later(tmp_path: Path) -> None:
+    assert demo.Arguments(serve=True, folder=tmp_path / "new").folder == tmp_path / "new"
 
 
 @pytest.mark.parametrize(

@@ -44,14 +44,13 @@ class Arguments(FigureOptions):
     """Generate random maps from a seed; the same options give the same map.
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
-    free space is connected, no passage is narrower than the gap, and the starts are corner, centre and
+    free space is connected, no passage is narrower than --gap, and the starts are corner, centre and
     uniform. Without --out the map is printed.
 
-    --count writes the maps of consecutive seeds to a folder.
-    --study writes the random maps of robocov paper to a folder, with its starts.
-    --plot draws the maps on one sheet.
+    --count writes the maps of consecutive seeds to a folder, --study the random maps of robocov paper with
+    their starts. --plot draws all maps on one sheet.
 
-    Example: robocov generate --kind rooms --seed 3 --obstacles 8 --area 0.2 --gap 0.6 --out map.json
+    Example: robocov generate --kind rooms --seed 3 --gap 0.8 --out map.json
     """
 
     kind: KindName = "polygons"

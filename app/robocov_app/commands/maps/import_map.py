@@ -49,7 +49,7 @@ class Arguments(JsonOption):
     """Map file to write; by default the name of FILE with .json, in the current folder."""
     format: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Format of FILE; by default detected."""
-    preview: Annotated[Path | None, tyro.conf.arg(metavar="PICTURE")] = None
+    preview: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Figure (.png, .svg or .pdf) of the foreign map next to the converted one."""
     overwrite: bool = False
     """Replace existing files."""
