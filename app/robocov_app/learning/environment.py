@@ -66,7 +66,7 @@ def draw_episode(
     options = options or {}
     environment = sampler.draw(rng)
     if "map" in options:
-        # The map of the sampler was drawn all the same, and the new one takes another random number.
+        # The given map replaces the one that was drawn. Its seed is a further random number.
         environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))
     random_values = _RandomValues.draw(rng, environment)
     scenario = _build_scenario(task, environment, random_values, options)

@@ -28,7 +28,7 @@ from robocov_app.web.connections import (
     respond_with_page,
 )
 from robocov_app.web.files import TransferError, list_saved, read_saved
-from robocov_app.web.relay import relay_messages
+from robocov_app.web.visitor_relay import relay_messages
 from robocov_app.web.visitors import VisitorFolders, create_id, is_signed, read_id, sign
 from robocov_app.web.window_process import (
     ENDING_TIMEOUT_S,

@@ -226,7 +226,7 @@ def test_clicking_again_selects_the_object_below(tmp_path: Path) -> None:
 
 def test_many_objects_are_dragged_as_an_image_with_the_same_result(tmp_path: Path) -> None:
     from robocov_app.editor.edits import transform
-    from robocov_app.editor.tools.drags import MANY_POINTS
+    from robocov_app.editor.tools.selection_drags import MANY_POINTS
 
     ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(MANY_POINTS + 10))
     with open_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as driver:

@@ -19,7 +19,8 @@ from robocov.mapfile import parse_map
 from robocov.mapfile.check import check_map
 from robocov_app.formats import IMPORTERS, ImportReport, ReadOptions, Shaping, build_environment, import_map
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.geometry.conversion.cleaning import measure_deviation, remove_hairs
+from robocov_app.formats.geometry.conversion.cleaning import remove_hairs
+from robocov_app.formats.geometry.conversion.deviation import measure_deviation
 from robocov_app.formats.geometry.polygons import round_polygons, tidy_ring
 from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_default_snap
 

@@ -7,8 +7,15 @@ from robocov_app.editor.model.hit_test import find_edge, find_owners
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, RotateDrag, ScaleDrag, VertexDrag
 from robocov_app.editor.tools.handles import Handle, find_handle
+from robocov_app.editor.tools.selection_drags import (
+    BoxDrag,
+    Drag,
+    MoveDrag,
+    RotateDrag,
+    ScaleDrag,
+    VertexDrag,
+)
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 from robocov_app.toolkit.tools.tool import CursorShape

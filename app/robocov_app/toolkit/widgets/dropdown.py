@@ -7,7 +7,13 @@ from pygame import Rect
 
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_visible
-from robocov_app.toolkit.widgets.open_list import LIST_EDGE_PX, LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
+from robocov_app.toolkit.widgets.open_list import (
+    LIST_EDGE_PX,
+    LIST_ROW_PX,
+    MAX_LIST_HEIGHT_PX,
+    ListResponse,
+    OpenList,
+)
 from robocov_app.toolkit.widgets.page import Page, Widget
 
 # Lengths in pixels at scale 1.
@@ -57,6 +63,32 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
     if picked == value:
         return None
     return picked
+
+
+def handle_list_event(page: Page, event: pygame.event.Event) -> bool:
+    """Pass an event to the open list of a drop-down menu; the focus leaves the menu when the list closes.
+
+    Parameters
+    ----------
+    page : Page
+    event : pygame.event.Event
+
+    Returns
+    -------
+    bool
+        Whether the list has handled the event; False if no list is open.
+    """
+    if page.open_list is None:
+        return False
+    page.needs_redraw = True
+    response = page.open_list.handle_event(event)
+    if response is ListResponse.CLOSED:
+        page.stop_typing()
+    elif response is ListResponse.PICKED:
+        page.focus = None
+        page.run()  # In this run, the menu reads the picked option.
+        page.open_list = None
+    return response is not ListResponse.IGNORED
 
 
 def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:

@@ -2,7 +2,7 @@
 
 import pygame
 
-from robocov_app.toolkit.widgets.open_list import ListResponse
+from robocov_app.toolkit.widgets.dropdown import handle_list_event
 from robocov_app.toolkit.widgets.page import Page
 from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, is_function_key
 
@@ -67,7 +67,7 @@ class PageEvents:
         if event.button != 1:
             return page.is_pointer_inside()
         page.tool_tip.restart()
-        if self._pass_to_list(event):
+        if handle_list_event(self._page, event):
             return True
         if page.focus is not None and not self._is_focused_widget_at(event.pos):
             page.stop_typing()
@@ -78,7 +78,7 @@ class PageEvents:
     def _handle_release(self, event: pygame.event.Event) -> bool:
         page = self._page
         page.pointer = event.pos
-        if self._pass_to_list(event):
+        if handle_list_event(self._page, event):
             return True
         was_held = page.active is not None
         self._run_for(event)
@@ -86,7 +86,7 @@ class PageEvents:
         return was_held or page.is_pointer_inside()
 
     def _handle_wheel(self, event: pygame.event.Event) -> bool:
-        if self._pass_to_list(event):
+        if handle_list_event(self._page, event):
             return True
         self._run_for(event)
         return self._page.active is not None or self._page.is_pointer_inside()
@@ -95,7 +95,7 @@ class PageEvents:
         """Handle a key press while a widget has the focus: Tab, Escape, or a key for that widget."""
         page = self._page
         page.tool_tip.restart()
-        if self._pass_to_list(event):
+        if handle_list_event(self._page, event):
             return True
         name = get_key_name(event)
         if page.focus is None or (page.edit is not None and is_function_key(name)):
@@ -113,7 +113,7 @@ class PageEvents:
 
     def _handle_text(self, event: pygame.event.Event) -> bool:
         page = self._page
-        if self._pass_to_list(event):
+        if handle_list_event(self._page, event):
             return True
         if page.edit is None:
             return False
@@ -133,21 +133,6 @@ class PageEvents:
     def _run_for(self, event: pygame.event.Event) -> None:
         self._page.needs_redraw = True
         self._page.run(event)
-
-    def _pass_to_list(self, event: pygame.event.Event) -> bool:
-        """Pass an event to the open list; return whether the list has handled it."""
-        page = self._page
-        if page.open_list is None:
-            return False
-        page.needs_redraw = True
-        response = page.open_list.handle_event(event)
-        if response is ListResponse.CLOSED:
-            page.stop_typing()
-        elif response is ListResponse.PICKED:
-            page.focus = None
-            page.run()  # In this run, the menu reads the picked option.
-            page.open_list = None
-        return response is not ListResponse.IGNORED
 
     def _move_focus(self, step: int) -> None:
         page = self._page

@@ -205,6 +205,8 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
         attributes = [values[is_corner] for values in (is_west, is_north, is_double, north_east)]
         strips.append((column, row + low, *attributes))
     column, row, is_west, is_north, is_double, north_east = map(np.concatenate, zip(*strips, strict=True))
+    # A double corner becomes two corners at the same point, one of each free cell. The first has the side to
+    # the west, the second the side to the east, and each has the vertical side of the same cell.
     repeats = 1 + is_double
     is_second = concatenate_ranges(np.zeros_like(row), repeats) == 1
     is_double = is_double.repeat(repeats)

@@ -1,4 +1,4 @@
-"""Removal of hairs from a free space, and the difference between two free spaces.
+"""Removal of hairs from a free space, and of slivers next to its boundary.
 
 A hair is a slit in the free space, or a spur of it, that is thinner than the resolution of the coordinates
 but longer than walls may move. Rounding would silently close it, and the report would say that a wall moved
@@ -10,20 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, STRtree
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID_M
-from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
-_DIGITS = 9
-"""Decimals of distances in meters; smaller differences are rounding errors."""
+_MIN_HALF_WIDTH_M = 1e-3 * GRID_M
+"""Thinner polygons are due to rounding."""
 _OVERLAP_M = 2 * GRID_M
 """Distance by which the area that is filled or removed extends beyond a hair."""
-_MAX_SAMPLES = 4_000
-"""Approximate number of points along walls at which distances are measured."""
 
 
 class Cleaned(NamedTuple):
@@ -41,21 +38,6 @@ class Cleaned(NamedTuple):
     free: MultiPolygon
     number: int = 0
     area: float = 0.0
-
-
-class Deviation(NamedTuple):
-    """Difference of two free spaces.
-
-    Attributes
-    ----------
-    area : float, m²
-        Area that is free in only one of them.
-    distance : float, m
-        Largest distance by which walls have moved.
-    """
-
-    area: float
-    distance: float
 
 
 def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
@@ -85,36 +67,19 @@ def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
     return Cleaned(cleaned, len(slits) + len(spurs), area)
 
 
-def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
-    """Measure the area that differs between two free spaces, and the distance between their walls.
+def remove_slivers(solid: list[Polygon], solid_before: BaseGeometry, tolerance: float) -> list[Polygon]:
+    """Remove slivers between a boundary and the free space next to it.
 
-    The latter is the Hausdorff distance, measured at the vertices and at points along long edges.
-
-    Parameters
-    ----------
-    before, after : MultiPolygon, m
-
-    Returns
-    -------
-    Deviation
+    Slivers arise where simplification moved the boundary and the outline of the free space apart: they are
+    thinner than the tolerance, and were not solid before.
     """
-    distance = 0.0
-    for first, second in ((before, after), (after, before)):
-        points = shapely.points(_sample_walls(first))
-        walls = STRtree(shapely.linestrings(extract_sides(second)))
-        _, distances = walls.query_nearest(points, return_distance=True, all_matches=False)
-        distance = max(distance, float(distances.max()))
-    area = float(shapely.symmetric_difference(before, after).area)
-    return Deviation(area, round(distance, _DIGITS))
-
-
-def _sample_walls(area: MultiPolygon) -> Array:
-    """Return points on the walls of an area, (n, 2) m: its vertices, and points along long edges."""
-    vertices = shapely.get_coordinates(area)
-    spare = _MAX_SAMPLES - len(vertices)
-    if spare > 0:
-        vertices = shapely.get_coordinates(shapely.segmentize(area, 2 * area.length / spare))
-    return np.asarray(np.unique(vertices, axis=0))
+    if not solid or tolerance == 0.0:
+        return solid
+    parts = np.array(solid, dtype=object)
+    is_thin = shapely.is_empty(shapely.buffer(parts, -tolerance, quad_segs=2))
+    area_before = shapely.area(shapely.intersection(parts[is_thin], solid_before))
+    is_new = area_before < shapely.area(parts[is_thin]) / 2
+    return list(np.delete(parts, np.flatnonzero(is_thin)[is_new]))
 
 
 def _select_long(geometry: BaseGeometry, length: float) -> Array:
@@ -122,7 +87,7 @@ def _select_long(geometry: BaseGeometry, length: float) -> Array:
     pieces = np.array(to_multipolygon(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
     # Area over perimeter is half the width of a thin polygon.
-    is_rounding = shapely.area(pieces) < 1e-3 * GRID_M * shapely.length(pieces)
+    is_rounding = shapely.area(pieces) < _MIN_HALF_WIDTH_M * shapely.length(pieces)
     return np.asarray(pieces[(np.hypot(right - x, top - y) > length) & ~is_rounding])
 
 

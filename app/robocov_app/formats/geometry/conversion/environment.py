@@ -10,13 +10,9 @@ from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex_count
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cells.corners import sharpen_corners
-from robocov_app.formats.geometry.conversion.cleaning import (
-    Cleaned,
-    Deviation,
-    measure_deviation,
-    remove_hairs,
-)
+from robocov_app.formats.geometry.conversion.cleaning import Cleaned, remove_hairs
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion, Shaping
+from robocov_app.formats.geometry.conversion.deviation import Deviation, measure_deviation
 from robocov_app.formats.geometry.conversion.free_parts import PartSelection, drop_specks, select_parts
 from robocov_app.formats.geometry.conversion.map_layout import (
     MapLayout,

@@ -11,8 +11,9 @@ from robocov.environment import GRID_M, PolygonObstacle, Ring, WallObstacle
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.formats.foreign_map import Primitive
-from robocov_app.formats.geometry.conversion.cleaning import Deviation, measure_deviation
+from robocov_app.formats.geometry.conversion.cleaning import remove_slivers
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
+from robocov_app.formats.geometry.conversion.deviation import Deviation, measure_deviation
 from robocov_app.formats.geometry.polygons import (
     buffer_with_mitres,
     fill_holes,
@@ -93,7 +94,7 @@ def build_layout(
         digits=conversion.digits,
     )
     if outer is not None:
-        solid = _remove_slivers(solid, shapely.difference(outer, read), simplified.tolerance)
+        solid = remove_slivers(solid, shapely.difference(outer, read), simplified.tolerance)
     return MapLayout(boundary, solid, [], measure_deviation(before, free))
 
 
@@ -190,18 +191,3 @@ def _fill_notches(outline: Polygon, conversion: Conversion) -> Polygon:
     covered = shapely.union_all([wall.polygon for wall in walls]).buffer(2 * tolerance)
     notches = notches[shapely.covers(covered, notches)]
     return fill_holes(round_polygons(unite([outline, *notches.tolist()]), conversion.digits))
-
-
-def _remove_slivers(solid: list[Polygon], solid_before: BaseGeometry, tolerance: float) -> list[Polygon]:
-    """Remove slivers between a boundary and the free space next to it.
-
-    Slivers arise where simplification moved the boundary and the outline of the free space apart: they are
-    thinner than the tolerance, and were not solid before.
-    """
-    if not solid or tolerance == 0.0:
-        return solid
-    parts = np.array(solid, dtype=object)
-    is_thin = shapely.is_empty(shapely.buffer(parts, -tolerance, quad_segs=2))
-    area_before = shapely.area(shapely.intersection(parts[is_thin], solid_before))
-    is_new = area_before < shapely.area(parts[is_thin]) / 2
-    return list(np.delete(parts, np.flatnonzero(is_thin)[is_new]))

@@ -19,8 +19,8 @@ from robocov.environment import (
 )
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.foreign_map import Primitive
-from robocov_app.formats.geometry.conversion.cleaning import measure_deviation
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
+from robocov_app.formats.geometry.conversion.deviation import measure_deviation
 from robocov_app.formats.geometry.conversion.map_layout import MapLayout
 from robocov_app.formats.geometry.conversion.starts import find_rooms
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2

@@ -17,6 +17,13 @@ from robocov_app.formats.geometry.simplification.narrow_gaps import count_ray_cr
 _MAX_SQUARES = 1024
 """Maximum number of squares of each size in the search for the roomiest point."""
 _MAX_RAY_CROSSINGS = 5_000_000
+_MIN_ROOM_AREA_RADII2 = 0.25
+"""Smaller regions, in squared radii of the robot, are not rooms."""
+_MIN_START_TOLERANCE_M = 0.01
+_START_STEPS_PER_SIDE = 500
+"""The tolerance for the center of a start is the side of a square of the same area, divided by this."""
+_STEPS_PER_CLEARANCE = 50
+"""The tolerance in the search for a position with enough clearance is the clearance divided by this."""
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
 _MAX_DISC_RADIUS_M = 2.0
 _MIN_DISC_RADIUS_M = 0.02
@@ -37,7 +44,8 @@ def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
         The regions; a robot cannot move from one to another.
     """
     inner = free.buffer(-radius, quad_segs=4)
-    return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
+    min_area = _MIN_ROOM_AREA_RADII2 * radius * radius
+    return [part for part in shapely.get_parts(inner).tolist() if part.area > min_area]
 
 
 def find_roomiest_point(
@@ -113,7 +121,7 @@ def require_room(parts: list[Polygon], conversion: Conversion) -> None:
     for part in parts:
         # No point of a part is farther from its walls than the radius of the disc of the same area.
         if math.sqrt(part.area / math.pi) > widest:
-            _, distance = find_roomiest_point(part, clearance / 50, clearance)
+            _, distance = find_roomiest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
             widest = max(widest, distance)
         if widest >= clearance:
             return
@@ -129,7 +137,8 @@ def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartS
     """Build the starts of a map: a disc around the roomiest point, anywhere, and the robots of the file."""
     part = free.geoms[0]
     # A finer tolerance would hardly move the start.
-    (x, y), distance = find_roomiest_point(part, max(0.01, math.sqrt(part.area) / 500))
+    tolerance = max(_MIN_START_TOLERANCE_M, math.sqrt(part.area) / _START_STEPS_PER_SIDE)
+    (x, y), distance = find_roomiest_point(part, tolerance)
     # The disc contains the centers of robots, so it keeps the clearance of a robot from the walls.
     radius = min(distance - conversion.clearance, _MAX_DISC_RADIUS_M)
     uniform = UniformStart()

@@ -21,6 +21,8 @@ _MAX_LINE_FRACTION = 0.25
 """Maximum fraction of the pixels that the lines of a plan cover."""
 _LINE_WIDTH_FRACTION = 0.05
 """Maximum width of a line, as a fraction of the shorter side of a picture."""
+_MAX_DARK_BRIGHTNESS = 0.5
+"""Colors are dark if their brightness, from 0 to 1, is below this."""
 _SOFT_EDGE_PX = 2
 """Width of the soft edge between two colors, in pixels."""
 _DEFAULT_THRESHOLD = 0.5
@@ -91,18 +93,17 @@ def _free_soft_edges(
     declared = [
         sum(color) / (3 * 255) for color, role in options.build_color_key().entries if role != "solid"
     ]
-    if not declared or min(declared) >= 0.5:
+    if not declared or min(declared) >= _MAX_DARK_BRIGHTNESS:
         return
-    mixed = (
-        (cells == BLOCKED) & (roles == RoleCode.NONE) & (picture.level > min(declared) * picture.max_level)
-    )
-    around = np.ones((3, 3), dtype=bool)
+    has_no_role = roles == RoleCode.NONE
     is_declared = (roles == RoleCode.FREE) | (roles == RoleCode.IGNORE)
-    mixed &= ndimage.binary_dilation(is_declared, around, iterations=_SOFT_EDGE_PX)
-    mixed &= ndimage.binary_dilation(
-        (cells == FREE) & (roles == RoleCode.NONE), around, iterations=_SOFT_EDGE_PX
-    )
-    cells[mixed] = FREE
+    is_light_paint = (cells == FREE) & has_no_role
+    is_brighter = picture.level > min(declared) * picture.max_level
+    around = np.ones((3, 3), dtype=bool)
+    is_soft_edge = (cells == BLOCKED) & has_no_role & is_brighter
+    for is_neighbor in (is_declared, is_light_paint):
+        is_soft_edge &= ndimage.binary_dilation(is_neighbor, around, iterations=_SOFT_EDGE_PX)
+    cells[is_soft_edge] = FREE
 
 
 def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:

@@ -11,7 +11,7 @@ from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
 from robocov_app.formats.raster.tmx.grids import Window
 from robocov_app.formats.raster.tmx.layers import Layer
-from robocov_app.formats.raster.tmx.objects import RECTANGLE, ObjectShape, flip_points, parse_object
+from robocov_app.formats.raster.tmx.object_shapes import RECTANGLE, ObjectShape, flip_points, parse_object
 from robocov_app.formats.raster.tmx.solidity import is_declared_solid, is_robot_name
 from robocov_app.formats.raster.tmx.tile_data import ID_MASK, GlobalIDs
 from robocov_app.formats.raster.tmx.tilesets import Tile

@@ -208,6 +208,7 @@ class _Pen:
             points, counts = flatten_beziers(control, tolerance, self._max_points)
             curves.append(_FlatCurves(rows[:, 0].real.astype(np.intp), points, counts))
         if self._arcs:
+            # Complex rows, whose columns are the attributes of `_Arc`.
             rows = np.array(self._arcs)
             centers, u, v = [rows[:, k : k + 1].copy().view(float) for k in (1, 2, 3)]
             points, counts = flatten_arcs(
