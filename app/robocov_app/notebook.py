@@ -251,7 +251,7 @@ def plot_result(
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (robots,)))
     facts = f"{format_count(robots, 'robot')}, {get_cost_name(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < MIN_FIGURE_LATTICE:
-        finer_cost = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
+        finer_cost = build_cost(environment, MIN_FIGURE_LATTICE, radius=result.radius, quiet=True)
         sites = finer_cost.sites
         result = finer_cost(result.positions)
     field = DistanceField(FieldLattice(sites), result)
@@ -372,7 +372,7 @@ def _compute_history(record: Record) -> CostHistory | None:
     duration = float(record.time[-1] - record.time[0])
     rate = min(MAX_COST_SAMPLES / duration, MAX_COST_RATE_HZ) if duration > 0.0 else 0.0
     try:
-        cost = build_cost(record.environment, DEFAULT_LATTICE, quiet=True)
+        cost = build_cost(record.environment, DEFAULT_LATTICE, radius=record.team.min_radius, quiet=True)
         return compute_cost_history(record, cost, rate)
     except RobocovError:
         # The lattice may have no free site, or a robot may be in an obstacle.

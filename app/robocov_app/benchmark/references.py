@@ -132,7 +132,8 @@ def _build_reference(environment: Environment, placement: ReferencePlacement) ->
     """Build the entry of a reference placement in the suite's file, still without a lower bound."""
     # The cost is computed at the rounded positions, so that it can be recomputed from the file.
     positions = np.round(placement.positions, _POSITION_DIGITS)
-    result = CoverageCost(environment, suite.LATTICE)(positions)
+    cost = CoverageCost(environment, suite.LATTICE, radius=suite.ROBOT_RADIUS_M)
+    result = cost(positions)
     return {
         "mean_distance_m": result.mean_distance,
         "uncovered_area_m2": result.uncovered_area,

@@ -10,6 +10,7 @@ import tyro
 
 from robocov.arrays import Array
 from robocov.cost import CoverageCost, CoverageResult
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
 from robocov.files.writing import replace_file, resolve_target
@@ -22,6 +23,8 @@ from robocov_app.terminal.output import print_answer
 
 _MAX_COORDINATE_M = 1e300
 """Limit of coordinates, which keeps computations with them finite."""
+_MAX_RADIUS_M = 1e3
+"""Maximum radius of a robot, as in a team."""
 
 
 @dataclass
@@ -37,6 +40,8 @@ class Arguments(FigureOptions):
     """JSON file with a list of [x, y] in meters, one for each robot."""
     speeds: Annotated[tuple[float, ...], tyro.conf.arg(metavar="SPEED ...")] = ()
     """Speed of each robot, or one for all, m/s; sites then belong to the first robot to arrive."""
+    radius: float = DEFAULT_RADIUS_M
+    """Radius of the smallest robot, m. What lies behind a narrower gap is uncovered; 0 for points."""
     lattice: int = 128
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
@@ -44,6 +49,7 @@ class Arguments(FigureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_number("--radius", self.radius, 0.0, _MAX_RADIUS_M, "m")
         require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE, whole=True)
         if self.sites is not None:
             resolve_target(self.sites)
@@ -54,7 +60,7 @@ def command(options: Arguments) -> None:
     environment = load_map(options.map)
     positions = _read_positions(options.positions)
     speeds = _build_speeds(options.speeds, len(positions))
-    cost = build_cost(environment, options.lattice, quiet=options.json)
+    cost = build_cost(environment, options.lattice, radius=options.radius, quiet=options.json)
     try:
         result = cost(positions)
         timed_result = None
@@ -76,6 +82,7 @@ def command(options: Arguments) -> None:
             title="Coverage cost",
             theme=options.theme,
             speeds=speeds,
+            radius=options.radius or DEFAULT_RADIUS_M,
         )
     answer = _build_answer(environment, cost, result, timed_result)
     print_answer(options, answer, *_describe_result(environment, cost, result, timed_result))

@@ -178,7 +178,7 @@ def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> l
     """
     if not problem.saved_runs:
         return []
-    cost = build_cost(problem.environment, options.lattice, quiet=options.json)
+    cost = build_cost(problem.environment, options.lattice, radius=problem.radius, quiet=options.json)
     gaps = []
     for saved in problem.saved_runs:
         if len(saved.record.team) != problem.robots:
@@ -204,7 +204,7 @@ def _save_figure(options: Arguments, path: Path, problem: _Problem, best: Optimu
     environment = problem.environment
     save_distance_figure(
         path,
-        build_cost(environment, MIN_FIGURE_LATTICE, quiet=True),
+        build_cost(environment, MIN_FIGURE_LATTICE, radius=problem.radius, quiet=True),
         best.positions,
         f"{get_cost_name(environment)} {best.mean_distance:.3f} m",
         title="Best positions found",

@@ -189,7 +189,10 @@ class EpisodeEnv:
         self.render_mode = render_mode
         self._theme = theme
         self._size = (int(size[0]), int(size[1]))
-        self._sampler = MapSampler(self.task.maps, self.task.lattice) if sampler is None else sampler
+        if sampler is None:
+            radius = self.task.whole_team.min_radius
+            sampler = MapSampler(self.task.maps, self.task.lattice, radius)
+        self._sampler = sampler
         self.episode: Episode | None = None
         self._painter: Painter | None = None
         self._window: Any = None

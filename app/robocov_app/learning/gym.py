@@ -209,7 +209,8 @@ class CoverageVectorEnv(SyncVectorEnv):
         **changes: Any,
     ) -> None:
         self.task = change_task(task, changes)
-        sampler = MapSampler(self.task.maps, self.task.lattice)
+        radius = self.task.whole_team.min_radius
+        sampler = MapSampler(self.task.maps, self.task.lattice, radius)
         make = partial(CoverageEnv, self.task, sampler=sampler, render_mode=render_mode)
         super().__init__([make] * num_envs, autoreset_mode=autoreset_mode)
         self._environments = cast("list[CoverageEnv]", self.envs)

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from robocov.cost import CoverageCost
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
 from robocov.mapfile import load_map
@@ -81,6 +82,8 @@ class MapSampler:
         Sources of maps, all equally likely.
     lattice : int
         Number of sites along each side of the lattice of the costs.
+    radius : float, m
+        Radius of the smallest robot; see `CoverageCost`.
 
     Raises
     ------
@@ -90,7 +93,12 @@ class MapSampler:
         If a map cannot be read.
     """
 
-    def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
+    def __init__(
+        self,
+        maps: MapSource | Sequence[MapSource],
+        lattice: int,
+        radius: float = DEFAULT_RADIUS_M,
+    ) -> None:
         if isinstance(maps, Sequence) and not isinstance(maps, str):
             self._sources = [_resolve_source(source, f"maps[{k}]") for k, source in enumerate(maps)]
         else:
@@ -98,6 +106,7 @@ class MapSampler:
         if not self._sources:
             raise ParameterError("maps: expected at least one, got none")
         self._lattice = lattice
+        self._radius = radius
         self._costs: dict[Environment, CoverageCost] = {}
 
     @property
@@ -115,7 +124,9 @@ class MapSampler:
 
     def get_cost(self, environment: Environment) -> CoverageCost:
         """Return the coverage cost of a map, from the cache if possible."""
-        cost = self._costs.pop(environment, None) or CoverageCost(environment, self._lattice)
+        cost = self._costs.pop(environment, None)
+        if cost is None:
+            cost = CoverageCost(environment, self._lattice, radius=self._radius)
         # The dictionary is in order of use, so the first entry is the least recently used one.
         self._costs[environment] = cost
         if len(self._costs) > _MAX_STORED_COSTS:

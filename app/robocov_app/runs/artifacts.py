@@ -72,7 +72,12 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     # The folder is created first, so that an unusable one is reported before the long computations.
     with create_result(out, "run", overwrite=settings.overwrite) as result:
         compile_kernels()
-        cost = build_cost(scenario.environment, settings.lattice, quiet=settings.hide_progress)
+        cost = build_cost(
+            scenario.environment,
+            settings.lattice,
+            radius=scenario.team.min_radius,
+            quiet=settings.hide_progress,
+        )
         with Interruption() as interruption:
             run = execute_scenario(scenario, cost, result, "", settings, interruption)
             save_figures([run], cost, result.staging, settings)
@@ -106,10 +111,11 @@ def execute_comparison(
         If a run fails, or the folder cannot be written.
     """
     environment = next(iter(scenarios.values())).environment
+    min_radius = min(scenario.team.min_radius for scenario in scenarios.values())
     runs: dict[str, Run] = {}
     with create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result:
         compile_kernels()
-        cost = build_cost(environment, settings.lattice, quiet=settings.hide_progress)
+        cost = build_cost(environment, settings.lattice, radius=min_radius, quiet=settings.hide_progress)
         with Interruption() as interruption:
             start_comparison(result.staging, list(scenarios))
             for subfolder, scenario in scenarios.items():
@@ -330,7 +336,7 @@ def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[Dista
         record = run.record
         if record.environment != environment:
             environment = record.environment
-            cost = build_cost(environment, cost.lattice, quiet=True)
+            cost = build_cost(environment, cost.lattice, radius=cost.radius, quiet=True)
         varying_cost = TimeVaryingCost(cost)
         time = float(record.time[-1])
         positions = record.positions[-1]

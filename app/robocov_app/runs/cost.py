@@ -21,7 +21,12 @@ MIN_VIDEO_LATTICE = 128
 
 
 def build_cost(
-    environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
+    environment: Environment,
+    lattice: int,
+    *,
+    radius: float = DEFAULT_RADIUS_M,
+    quiet: bool = False,
+    geodesics: Geodesics | None = None,
 ) -> CoverageCost:
     """Build the coverage cost of a map, and show progress if it takes more than a second.
 
@@ -30,17 +35,19 @@ def build_cost(
     environment : Environment
     lattice : int
         Number of sites along each side of the map.
+    radius : float, m
+        Radius of the smallest robot; see `CoverageCost`.
     quiet : bool
         Whether to hide progress.
     geodesics : Geodesics or None
-        Shortest paths of the map, if they have been computed already.
+        Shortest paths of the map for this radius, if they have been computed already.
 
     Returns
     -------
     CoverageCost
     """
     with show_late_progress("shortest paths", quiet=quiet) as update:
-        return CoverageCost(environment, lattice, progress=update, geodesics=geodesics)
+        return CoverageCost(environment, lattice, radius=radius, progress=update, geodesics=geodesics)
 
 
 def refine_cost_for_figures(
@@ -65,7 +72,7 @@ def refine_cost_for_figures(
         lattice = MIN_FIGURE_LATTICE
     if cost.lattice >= lattice or count_vertices(environment) > MANY_VERTICES:
         return cost
-    return build_cost(environment, lattice, quiet=True, geodesics=cost.geodesics)
+    return build_cost(environment, lattice, radius=cost.radius, quiet=True, geodesics=cost.geodesics)
 
 
 def save_distance_figure(

@@ -141,7 +141,8 @@ def _build_fields(
         return None
     environment = runs[0].record.environment
     if cost is None:
-        cost = build_cost(environment, MIN_VIDEO_LATTICE, quiet=quiet)
+        min_radius = min(run.record.team.min_radius for run in runs)
+        cost = build_cost(environment, MIN_VIDEO_LATTICE, radius=min_radius, quiet=quiet)
     cost = refine_cost_for_figures(environment, cost, MIN_VIDEO_LATTICE)
     varying_cost = TimeVaryingCost(cost)
     largest_distance = 0.0

@@ -26,6 +26,7 @@ from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Channel
 from robocov_app.runs.cost_table import build_cost_table
 from robocov_app.sweep.controller_files import source_to_json
+from robocov_app.sweep.parameters import build_swept_team
 from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 
@@ -250,9 +251,10 @@ class CommunicationMeter:
 
 def prepare_cost(task: Task) -> CoverageCost:
     """Return the coverage cost for the map of a task; those for the latest maps are kept in memory."""
-    return _build_cost(task.document, task.map, task.lattice)
+    team = build_swept_team(task.robots, task.team)
+    return _build_cost(task.document, task.map, task.lattice, team.min_radius)
 
 
 @lru_cache(MAX_CACHED_MAPS)
-def _build_cost(document: str, name: str, lattice: int) -> CoverageCost:
-    return CoverageCost(parse_map(document, name), lattice)
+def _build_cost(document: str, name: str, lattice: int, radius: float) -> CoverageCost:
+    return CoverageCost(parse_map(document, name), lattice, radius=radius)

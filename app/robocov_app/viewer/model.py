@@ -57,6 +57,7 @@ class ViewerModel(WindowModel):
         self.controllers = list(dict.fromkeys([*CONTROLLERS, *controllers]))
         self.settled_change: Node | None = None
         self._cost_map: Environment | None = None
+        self._cost_radius = 0.0
         self.update_cost_map()
 
     @property
@@ -97,12 +98,17 @@ class ViewerModel(WindowModel):
         return simplify_message(str(error))
 
     def update_cost_map(self) -> None:
-        """Start to prepare the cost on the displayed map if the map has changed."""
-        environment = self.session.displayed.environment
+        """Start to prepare the cost on the displayed map if the map or the smallest robot has changed."""
+        displayed = self.session.displayed
+        environment = displayed.environment
+        panes = self.session.timeline.panes
+        radius = min(displayed.get_setup(pane).team.min_radius for pane in panes)
+        has_changed = environment is not self._cost_map or radius != self._cost_radius
         # While the density is being painted, it changes too often to prepare the cost.
-        if environment is not self._cost_map and not self.tool.is_painting:
+        if has_changed and not self.tool.is_painting:
             self._cost_map = environment
-            self.costs.set_environment(environment)
+            self._cost_radius = radius
+            self.costs.set_environment(environment, radius)
 
     def show_session(self, session: Session) -> None:
         """Show another session."""

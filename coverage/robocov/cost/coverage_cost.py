@@ -353,6 +353,7 @@ class CoverageCost:
             weights=self.weights,
             speeds=speeds,
             mean_time=mean_time,
+            radius=self.radius,
         )
 
     def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:

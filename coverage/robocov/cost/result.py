@@ -9,6 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray, compute_lengths
 from robocov.cost.lattice import Sites
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import format_count
@@ -52,6 +53,8 @@ class CoverageResult(Drawable):
         If given, each site belongs to the robot that arrives first instead of the nearest one.
     mean_time : float or None, s
         With `speeds`, the mean time until the first robot arrives at a site.
+    radius : float, m
+        Radius of the smallest robot; no path leads through narrower gaps.
 
     See Also
     --------
@@ -86,6 +89,7 @@ class CoverageResult(Drawable):
     weights: Array | None = None
     speeds: Array | None = None
     mean_time: float | None = None
+    radius: float = DEFAULT_RADIUS_M
 
     def __repr__(self) -> str:
         robots = format_count(len(self.positions), "robot")

@@ -64,7 +64,9 @@ def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference 
     radius = float(record.team.radius.max())
     cache = ArrayCache.open_default()
     map_text = json.dumps(to_json(environment), sort_keys=True)
-    key = ArrayCache.compute_key("optimum", __version__, map_text, robots, radius, lattice, RESTARTS)
+    key = ArrayCache.compute_key(
+        "optimum for discs", __version__, map_text, robots, radius, lattice, RESTARTS
+    )
     arrays = None if cache is None else cache.load(key)
     if arrays is not None:
         return Reference(*arrays["reference"].tolist())

@@ -116,7 +116,12 @@ class _BranchWriter:
         for setup, name, record in zip(part.setups.values(), names, records, strict=True):
             run_folder = target / name if is_comparison else target
             record.save(run_folder)
-            cost = build_cost(setup.environment, self.settings.lattice, quiet=True)
+            cost = build_cost(
+                setup.environment,
+                self.settings.lattice,
+                radius=record.team.min_radius,
+                quiet=True,
+            )
             runs[name] = self._evaluate(record, cost)
             save_numbers(runs[name], run_folder, self.settings.lattice)
             costs.append(cost)

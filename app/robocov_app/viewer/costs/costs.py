@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
-from robocov.defaults import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_LATTICE, DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
@@ -84,6 +84,8 @@ class CostRequest:
         Maximum speeds of the robots, for the mean time.
     is_for_curve : bool
         Whether the answer is only added to a curve, and is not displayed as the latest cost of its pane.
+    radius : float
+        Radius of the smallest robot, m; see `CoverageCost`.
     """
 
     number: int
@@ -94,6 +96,7 @@ class CostRequest:
     point: Array | None = None
     speeds: Array | None = None
     is_for_curve: bool = False
+    radius: float = DEFAULT_RADIUS_M
 
 
 class Costs:
@@ -133,10 +136,18 @@ class Costs:
         self._queued: dict[int, CostRequest] = {}
         self._pending_pane: int | None = None  # None if the pending answer is no longer wanted
 
-    def set_environment(self, environment: Environment) -> None:
-        """Start to prepare the computation of costs on another map."""
+    def set_environment(self, environment: Environment, radius: float = DEFAULT_RADIUS_M) -> None:
+        """Start to prepare the computation of costs on another map, or for another size of robots.
+
+        Parameters
+        ----------
+        environment : Environment
+            The map.
+        radius : float
+            Radius of the smallest robot, m.
+        """
         self._map_number += 1
-        self._map_request = CostRequest(self._map_number, environment, self.lattice)
+        self._map_request = CostRequest(self._map_number, environment, self.lattice, radius=radius)
         self.known = {}
         self._queued = {}
         self._prepare_map()
@@ -354,12 +365,15 @@ class CostService:
         is_reusable = (
             before is not None
             and before.lattice == request.lattice
+            and before.radius == request.radius
             and before.environment.has_same_geometry(environment)
         )
         if before is not None and is_reusable:
             self._cost = before.with_density(environment)
         else:
-            self._cost = CoverageCost(environment, request.lattice, progress=report_progress)
+            self._cost = CoverageCost(
+                environment, request.lattice, radius=request.radius, progress=report_progress
+            )
         self._varying_cost = TimeVaryingCost(self._cost, progress=stop_for_newer_map)
 
 
