@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,8 +64,10 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
 
+    # The window of a visitor is behind a server that has its own link.
+    is_relayed = parent_process() is not None
     with (
-        WebDisplay(options.host, options.port, folder) as display,
+        WebDisplay(options.host, options.port, folder, is_relayed=is_relayed) as display,
         confine_files(folder),
         ending_on_signals(),
     ):

@@ -248,8 +248,9 @@ class PageConnection:
             "may_control": page.may_control,
         }
         if not self._is_controlling:
-            # Only the controlling page may see the clipboard.
+            # Only the controlling page may see the clipboard, and downloads what its user saves.
             state.pop("copied", None)
+            state.pop("offer", None)
         if state != page.sent_state:
             page.sent_state = state
             await self._send(json.dumps(state))

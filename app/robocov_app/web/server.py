@@ -83,6 +83,8 @@ class WebDisplay:
         Port to listen at; 0 for any free port.
     folder : Path
         Folder for saved and uploaded files.
+    is_relayed : bool
+        Whether pages are connected through another server, so that the links of this one are of no use.
 
     Attributes
     ----------
@@ -102,7 +104,9 @@ class WebDisplay:
     watch_link: str
     fps = SERVED_FPS
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path()) -> None:
+    def __init__(
+        self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path(), *, is_relayed: bool = False
+    ) -> None:
         """Prepare the server; it starts when the context is entered."""
         self.host = host
         self.port = port
@@ -122,6 +126,8 @@ class WebDisplay:
             file_executor=self._file_executor,
         )
         self.saved_files: tuple[str, ...] = ()
+        self._is_relayed = is_relayed
+        self._offer: dict[str, Any] = {"number": 0, "name": ""}
         self._status = ""
         self._files_listed_at = 0.0
         self._created_at = time()
@@ -156,6 +162,18 @@ class WebDisplay:
         self._status = window.status_text
         self.shared.window_input.post(window)
 
+    @property
+    def share_link(self) -> str:
+        """Address at which others can watch the window; empty if there is none."""
+        if self._is_relayed:
+            return ""
+        return self.watch_link
+
+    def offer_file(self, name: str) -> None:
+        """Let the page in control download a file of the folder."""
+        self._offer = {"number": self._offer["number"] + 1, "name": name}
+        self._files_listed_at = 0.0
+
     def send(self, surface: pygame.Surface, cursor: int = pygame.SYSTEM_CURSOR_ARROW) -> None:
         """Send the frame and the state of the window to the pages, if they have changed."""
         delivery = self.shared.delivery
@@ -175,6 +193,7 @@ class WebDisplay:
             "status": self._status,
             "saved": self.saved_files,
             "copied": self.clipboard.get()[:MAX_COPIED_CHARACTERS],
+            "offer": self._offer,
         }
         if state != self.shared.state:
             self.shared.state = state

@@ -316,6 +316,27 @@ def test_only_who_controls_sees_the_clipboard(display):
         assert "copied" not in told
 
 
+def test_the_page_in_control_downloads_a_file_that_is_offered(tmp_path):
+    with WebDisplay(folder=tmp_path) as display:
+        (tmp_path / "hall-copy-1.robocov").write_text("{}")
+        display.offer_file("hall-copy-1.robocov")
+        display.send(pygame.Surface((20, 20), 0, 32))
+        cookie = cookie_of(display)
+        with socket_of(display, Cookie=cookie) as teacher, watcher_of(display) as pupil:
+            while "offer" not in (told := told_to(teacher)):
+                pass
+            assert told["offer"] == {"number": 1, "name": "hall-copy-1.robocov"}
+            assert told["saved"] == ["hall-copy-1.robocov"]
+            assert "offer" not in told_to(pupil)
+
+
+def test_a_link_to_watch_is_shared_unless_another_server_stands_before_it():
+    with WebDisplay() as display:
+        assert display.share_link == display.watch_link
+    with WebDisplay(is_relayed=True) as display:
+        assert display.share_link == ""
+
+
 def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
     with WebDisplay(folder=tmp_path) as display:
         cookie = cookie_of(display)

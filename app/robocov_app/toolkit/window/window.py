@@ -51,6 +51,13 @@ class Remote(Protocol):
 
     fps: int
 
+    @property
+    def share_link(self) -> str:
+        """Address at which others can watch the window; empty if there is none."""
+
+    def offer_file(self, name: str) -> None:
+        """Let the user in control download a file of the window's folder."""
+
     def wait(self, seconds: float) -> None:
         """Wait until a message arrives, at most for the given time."""
 

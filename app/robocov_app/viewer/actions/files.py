@@ -11,7 +11,7 @@ from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.model import ViewerModel
-from robocov_app.viewer.session.files.session_file import SUFFIX, load_session
+from robocov_app.viewer.session.files.session_file import SUFFIX, load_session, save_session
 from robocov_app.viewer.session.files.workspace import (
     SessionWorkspace,
     describe_draft,
@@ -147,6 +147,25 @@ class FileActions:
         saved = self.workspace.save(self.folder, self.view, path)
         self._add_recent(saved)
         self._viewer.show_message(f"session saved: {saved}")
+
+    def save_copy(self) -> Path:
+        """Save a copy of the session to a new file, and return its path; the session keeps its own file.
+
+        Raises
+        ------
+        ParameterError
+            If the session cannot be recomputed from its edits.
+        OutputError
+            If the file cannot be written.
+        """
+        timeline = self._viewer.session.timeline
+        timeline.require_reproducible()
+        timeline.cache_present()
+        own_path = self.workspace.path
+        stem = self._viewer.session.displayed.environment.name.lower() if own_path is None else own_path.stem
+        target = find_free_path(self.folder, f"{stem or 'session'}-copy", SUFFIX)
+        save_session(target, timeline.document, *timeline.destination, self.view)
+        return target
 
     def open_file(self, path: Path) -> None:
         """Open a file that contains a session or a map.

@@ -9,6 +9,7 @@ from robocov_app.toolkit.tools.viewport import PAN_STEP_PX, ZOOM_STEP
 from robocov_app.toolkit.window.command_window import Action, WindowActions
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.sharing.share import ShareActions
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class ViewerWindowActions(WindowActions):
         Opens the dialog that lists and enters branches.
     toggle_layer_menu : callable
         Opens or closes the menu of all layers.
+    open_share_menu : callable
+        Opens the menu of what can be shared.
     toggle_lesson : callable
         Starts the lesson, leaves it, or returns to it.
     quit : callable
@@ -43,15 +46,19 @@ class ViewerWindowActions(WindowActions):
     open_file: Action
     list_branches: Action
     toggle_layer_menu: Action
+    open_share_menu: Action
     toggle_lesson: Action
     quit: Action
 
 
-def list_window_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindowActions) -> list[Command]:
+def list_window_commands(
+    canvas: ViewerCanvas, chart: Chart, share: ShareActions, actions: ViewerWindowActions
+) -> list[Command]:
     """Return the commands that need a window."""
     return [
         *_list_view_commands(canvas, chart, actions),
         *_list_file_commands(actions),
+        *_list_share_commands(share, actions),
         *_list_help_commands(actions),
     ]
 
@@ -85,6 +92,17 @@ def _list_file_commands(actions: ViewerWindowActions) -> list[Command]:
     group.add("video", "Start or stop a video", actions.toggle_recording, "f9")
     group.add("save:run", "Save run", actions.save_run, "ctrl+e")
     group.add("open:file", "Open a session or a map", actions.open_file, "ctrl+o")
+    return group.commands
+
+
+def _list_share_commands(share: ShareActions, actions: ViewerWindowActions) -> list[Command]:
+    """Return the commands of the share menu, and the one that opens it."""
+    group = CommandGroup("File")
+    group.add("share", "Share", actions.open_share_menu, "ctrl+shift+e")
+    group.add("share:command", "Copy as command", share.copy_command)
+    group.add("share:python", "Copy as Python", share.copy_python)
+    group.add("share:copy", "Save a copy", share.save_copy)
+    group.add("share:link", "Copy link", share.copy_link)
     return group.commands
 
 

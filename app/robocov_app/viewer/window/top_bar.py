@@ -97,11 +97,19 @@ class TopBar(CommandBar):
         return [restart, play, step, settle, build_space(SPACE_PX), *speed]
 
     def list_right_cells(self, ui: Ui) -> list[BarCell]:
-        """Return the cells of lesson, help, commands, theme and panel."""
+        """Return the cells of share, lesson, help, commands, theme and panel."""
+        share = self.build_wide_button(ui, "share", "Share", command="share")
         cells = super().list_right_cells(ui)
         if ui.width < NARROW_PX:
-            return cells
-        return [self.build_wide_button(ui, "lesson", "Lesson", command="tour"), *cells]
+            return [share, *cells]
+        return [share, self.build_wide_button(ui, "lesson", "Lesson", command="tour"), *cells]
+
+    def find_menu_position(self, command: str) -> tuple[int, int]:
+        """Return the pixel below the button of a command, where its menu opens."""
+        button = self.ui.find("button", command)
+        if button is None:
+            return self.ui.box.bottomleft
+        return button.rect.bottomleft
 
     # Cells
 

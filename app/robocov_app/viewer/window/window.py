@@ -11,6 +11,7 @@ from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.panel import WindowPart
@@ -31,6 +32,7 @@ from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.panel.robot_inspector import RobotInspector
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.run_saver import RunSaver
+from robocov_app.viewer.sharing.share import ShareActions
 from robocov_app.viewer.window.dialogs import (
     build_branch_dialog,
     build_file_dialog,
@@ -108,6 +110,8 @@ class ViewerWindow(CommandWindow):
         The video being recorded.
     run_saver : RunSaver
         Saves runs in other processes.
+    share : ShareActions
+        Shares the session as text, as a file or as a link.
     is_help_open : bool
         Whether the help page is shown.
     """
@@ -141,7 +145,8 @@ class ViewerWindow(CommandWindow):
         self.chart = Chart(viewer)
         self.lesson = LessonGuide(viewer, self.canvas.camera.fit, is_unattended=is_unattended)
         titles = {layer.name: layer.title for layer in build_standard_layers()}
-        window_commands = list_window_commands(self.canvas, self.chart, self._build_actions())
+        self.share = ShareActions(viewer, lambda: self.remote)
+        window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
@@ -179,6 +184,7 @@ class ViewerWindow(CommandWindow):
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
             toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),
+            open_share_menu=self.open_share_menu,
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
         )
@@ -392,6 +398,14 @@ class ViewerWindow(CommandWindow):
     def quit(self) -> None:
         """Close the window."""
         self.closed = True
+
+    def open_share_menu(self) -> None:
+        """Open the menu of what can be shared, below its button."""
+        names = ["share:command", "share:python", "share:copy"]
+        if self.share.has_link:
+            names.append("share:link")
+        rows = [self.commands[name] for name in names]
+        self.dialogs.ask(Menu(rows, self.top_bar.find_menu_position("share"), self.do))
 
     def save_run(self) -> str:
         """Save the run up to the present in a new folder; return a message."""

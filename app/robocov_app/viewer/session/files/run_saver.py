@@ -89,7 +89,7 @@ class RunSaver:
         save_session(file, timeline.document, timeline.head, timeline.step, {})
         command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
         command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
-        user_controllers = _list_user_controllers(timeline.document)
+        user_controllers = list_user_controllers(timeline.document)
         if user_controllers:
             command += ["--controller", ",".join(user_controllers)]
         try:
@@ -156,7 +156,7 @@ def _build_folder_stem(session: Session, map_name: str) -> str:
     return f"{stem}-{subject}"
 
 
-def _list_user_controllers(document: SessionDocument) -> list[str]:
+def list_user_controllers(document: SessionDocument) -> list[str]:
     """Return the names of all controllers of a document that are in users' files."""
     restart_names = []
     later_names = []

@@ -1,0 +1,87 @@
+"""Numbers in commands and in Python: as short as possible, but exact."""
+
+import json
+import math
+
+
+def format_number(value: float) -> str:
+    """Return the shortest text from which a number is read again; ``inf`` for infinity.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_number(2.0)
+    '2'
+    >>> format_number(0.30000000000000004)
+    '0.30000000000000004'
+    """
+    text = f"{value:g}"
+    if float(text) == value:
+        return text
+    return repr(float(value))
+
+
+def format_time(seconds: float) -> str:
+    """Return a multiple of the control period, s, without its rounding error.
+
+    Parameters
+    ----------
+    seconds : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_time(0.30000000000000004)
+    '0.3'
+    """
+    return f"{seconds:.12g}"
+
+
+def format_gain_value(value: float | str | None, *, is_json: bool) -> str:
+    """Return the value of a gain as in the option ``--set``, or else as in Python.
+
+    Parameters
+    ----------
+    value : float, str or None
+    is_json : bool
+
+    Returns
+    -------
+    str
+    """
+    if value is None:
+        return "null" if is_json else "None"
+    if isinstance(value, str):
+        return value if is_json else json.dumps(value)
+    return format_number(value)
+
+
+def format_python_number(value: float) -> str:
+    """Return a number as in Python.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_python_number(float("inf"))
+    'float("inf")'
+    """
+    if math.isinf(value):
+        return 'float("inf")'
+    return format_number(value)

@@ -1,0 +1,233 @@
+"""Sharing a session: texts that simulate the run of the window again, copies, and the menu."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from driven_window import Driver, open_viewer
+from sample_sessions import HALL, LLOYD, PILLAR, RAPF, advance_session
+
+from robocov.conditions import Conditions
+from robocov.mapfile import load_map
+from robocov.record import Record
+from robocov_app.cli import main
+from robocov_app.toolkit.commands.menu import Menu
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.files.session_file import load_session
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.sharing.share import ShareActions
+from robocov_app.viewer.sharing.values import format_number
+
+STEPS = 40
+ROOMS = load_map("rooms")
+GAINS = ControllerChoice("rapf", {"k_rep": 0.3, "attraction_limit": None})
+CONDITIONS = Conditions(loss=0.1, position_noise=0.01, delay=0.1, message_rate=20.0, seed=4)
+
+SESSIONS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "gains": {"controllers": (GAINS,), "robots": 5, "seed": 7},
+    "robots": {"properties": RobotProperties(max_speed=0.5, communication_range=4.0)},
+    "conditions": {"conditions": CONDITIONS, "seed": 4, "dt": 0.04},
+    "start": {"start": "uniform"},
+}
+
+
+def copy_text(driver: Driver, name: str) -> str:
+    """Choose an entry of the share menu, and return the text on the clipboard."""
+    driver.push_button("share")
+    menu = driver.window.dialogs.current
+    assert isinstance(menu, Menu)
+    ui = driver.window.dialogs.ui
+    assert ui is not None
+    option = ui.find("option", name)
+    assert option is not None
+    driver.click(*option.rect.center)
+    assert not driver.window.model.has_error_message, driver.window.model.message
+    return Clipboard().get()
+
+
+def run_command(text: str, folder: Path) -> list[np.ndarray]:
+    """Run a copied command, and return the last positions of its records, (n, 2) m each."""
+    finals: list[np.ndarray] = []
+    for number, line in enumerate(text.splitlines()):
+        program, *words = shlex.split(line)
+        assert program == "robocov"
+        out = folder / f"out-{number}"
+        if "--out" in words:
+            del words[words.index("--out") :][:2]
+        assert main([*words, "--out", str(out), "--no-pictures", "--lattice", "16"]) == 0
+        folders = sorted(path.parent for path in out.rglob("record.npz"))
+        finals += [Record.load(path).positions[-1] for path in folders]
+    return finals
+
+
+def run_python(text: str) -> list[np.ndarray]:
+    """Execute a copied script, and return the last positions of its records, (n, 2) m each."""
+    names: dict[str, Any] = {}
+    exec(text, names)
+    if "record" in names:
+        return [names["record"].positions[-1]]
+    return [record.positions[-1] for record in names["comparison"].records.values()]
+
+
+def get_positions(driver: Driver, pane: int = 0) -> np.ndarray:
+    """Return the positions of all robots, working or failed, (n, 2) m."""
+    return driver.session.displayed.get_snapshot(driver.session.timeline.panes[pane]).positions
+
+
+@pytest.mark.parametrize("name", SESSIONS)
+def test_the_command_and_the_script_repeat_the_run(name: str, tmp_path: Path) -> None:
+    options = {**SESSIONS[name]}
+    controllers = options.pop("controllers", (RAPF,))
+    with open_viewer(tmp_path, *controllers, environment=ROOMS, map_name="rooms", **options) as driver:
+        advance_session(driver.session, STEPS)
+        command = copy_text(driver, "share:command")
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+    assert command.startswith("robocov run rooms --controller rapf")
+    (by_command,) = run_command(command, tmp_path)
+    (by_script,) = run_python(script)
+    for found in (by_command, by_script):
+        assert np.array_equal(found, expected)
+
+
+def test_several_controllers_are_compared(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, GAINS, LLOYD, environment=ROOMS, map_name="rooms") as driver:
+        advance_session(driver.session, STEPS)
+        command = copy_text(driver, "share:command")
+        script = copy_text(driver, "share:python")
+        expected = [get_positions(driver, pane) for pane in (0, 1)]
+    assert command.startswith("robocov compare rooms --controllers rapf lloyd --set rapf.")
+    by_command = run_command(command, tmp_path)
+    # The folders of a comparison are sorted by name.
+    assert all(np.array_equal(*pair) for pair in zip(by_command, reversed(expected), strict=True))
+    assert all(np.array_equal(*pair) for pair in zip(run_python(script), expected, strict=True))
+
+
+def test_a_controller_that_is_compared_with_itself_has_a_command_for_each(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, GAINS, RAPF, environment=ROOMS, map_name="rooms") as driver:
+        advance_session(driver.session, STEPS)
+        command = copy_text(driver, "share:command")
+        expected = [get_positions(driver, pane) for pane in (0, 1)]
+    assert all(np.array_equal(*pair) for pair in zip(run_command(command, tmp_path), expected, strict=True))
+
+
+def test_changes_before_the_start_are_initial_conditions(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, RAPF, LLOYD, environment=ROOMS, map_name="rooms") as driver:
+        session = driver.session
+        session.set_controller(session.timeline.panes[0], GAINS)
+        session.set_properties(RobotProperties(max_speed=0.4))
+        session.remove_pane(session.timeline.panes[1])
+        advance_session(session, STEPS)
+        command = copy_text(driver, "share:command")
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+    assert "--max-speed 0.4" in command
+    assert "max_speed=0.4" in script
+    (found,) = run_command(command, tmp_path)
+    assert np.array_equal(found, expected)
+    (found,) = run_python(script)
+    assert np.array_equal(found, expected)
+
+
+def test_an_edited_map_is_saved_for_the_command(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        session = driver.session
+        session.edit_map(add_obstacle(HALL, PILLAR), "circle added")
+        advance_session(session, STEPS)
+        command = copy_text(driver, "share:command")
+        expected = get_positions(driver)
+        assert str(tmp_path / "hall-1.json") in driver.window.model.message
+    (found,) = run_command(command, tmp_path)
+    assert np.array_equal(found, expected)
+
+
+def test_later_edits_are_in_the_session_that_the_command_runs(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, environment=ROOMS, map_name="rooms") as driver:
+        advance_session(driver.session, STEPS)
+        driver.session.fail_robot(1)
+        advance_session(driver.session, STEPS)
+        command = copy_text(driver, "share:command")
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+        assert "without 1 later edit" in driver.window.model.message
+    assert command == f"robocov run {tmp_path / 'rooms-copy-1.robocov'}"
+    assert "# 0.7 s: robot 1 failed" in script
+    *_, last = run_command(command, tmp_path)
+    assert np.array_equal(last, expected)
+
+
+def test_robots_that_fail_are_in_the_session_that_the_command_runs(tmp_path: Path) -> None:
+    conditions = Conditions(failures=[(2, 0.2)], seed=0)
+    with open_viewer(tmp_path, environment=ROOMS, map_name="rooms", conditions=conditions) as driver:
+        advance_session(driver.session, STEPS)
+        command = copy_text(driver, "share:command")
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+    *_, last = run_command(command, tmp_path)
+    assert np.array_equal(last, expected)
+    assert "failures=[(2, 0.2)]" in script
+    assert len(run_python(script)[0]) == 3
+
+
+def test_robots_that_differ_are_in_the_script(tmp_path: Path) -> None:
+    properties = RobotProperties(values_by_robot={"max_speed": {2: 0.3}})
+    with open_viewer(tmp_path, environment=ROOMS, map_name="rooms", properties=properties) as driver:
+        advance_session(driver.session, STEPS)
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+    (found,) = run_python(script)
+    assert np.array_equal(found, expected)
+
+
+def test_a_copy_opens_this_session_which_keeps_its_own_file(driver: Driver, tmp_path: Path) -> None:
+    advance_session(driver.session, STEPS)
+    driver.window.do("save:session")
+    driver.session.fail_robot(1)
+    copy_text(driver, "share:copy")
+    assert driver.viewer.files.workspace.path == tmp_path / "hall-1.robocov"
+    assert driver.viewer.files.workspace.has_unsaved_edits
+    saved = load_session(tmp_path / "hall-1-copy-1.robocov")
+    assert saved.head.description == "robot 1 failed"
+
+
+def test_a_link_needs_a_server(driver: Driver) -> None:
+    driver.window.do("share:link")
+    assert driver.window.model.has_error_message
+    driver.push_button("share")
+    menu = driver.window.dialogs.current
+    assert isinstance(menu, Menu)
+    assert "share:link" not in [row.name for row in menu.rows if row is not None]
+
+
+class FakeRemote:
+    """A remote that notes what it is asked for."""
+
+    fps = 30
+    share_link = "http://127.0.0.1:8765/?token=watch"
+
+    def __init__(self) -> None:
+        self.offered: list[str] = []
+
+    def offer_file(self, name: str) -> None:
+        self.offered.append(name)
+
+
+def test_a_browser_gets_a_link_and_downloads_the_copy(driver: Driver) -> None:
+    remote = FakeRemote()
+    actions = ShareActions(driver.viewer, lambda: remote)
+    actions.copy_link()
+    assert Clipboard().get() == remote.share_link
+    actions.save_copy()
+    assert remote.offered == ["hall-copy-1.robocov"]
+
+
+@pytest.mark.parametrize("value", [2.0, 0.1, 0.1 + 0.2, 1e-7, 123456789.125, np.inf])
+def test_numbers_are_exact(value: float) -> None:
+    assert float(format_number(value)) == value
