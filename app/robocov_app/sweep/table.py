@@ -66,6 +66,7 @@ _METRIC_COLUMNS = (
     Column("components", "double", "", "connected components of the communication graph"),
     Column("algebraic_connectivity", "double", "", "of the communication graph"),
     Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null for a single robot"),
+    Column("sent_bytes_per_s", "double", "B/s", "size of a robot's messages per second, without positions"),
     Column(
         "near_final_s", "double", "s", "time after which the mean distance stays within 5 % of its last value"
     ),

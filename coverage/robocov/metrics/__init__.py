@@ -7,6 +7,7 @@
 - `summary`: the summary of a run in ``run.json``
 - `advice`: signs that the parameters of a run are unsuitable
 - `run_metrics`: areas, energy and connectivity over time
+- `communication`: the messages that robots send
 - `connectivity`, `visible_area`: the communication graph, and the area that a team sees
 - `results`: the results of a sweep, read from its folder
 """

@@ -11,6 +11,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
+from robocov.metrics.communication import compute_sent_rate
 from robocov.metrics.connectivity import measure_connectivity
 from robocov.metrics.cost_history import CostHistory
 from robocov.metrics.visible_area import compute_covered_areas
@@ -227,7 +228,7 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Compute the metrics at the end of a run, and the time after which the cost stayed near its final value.
+    """Compute the final metrics of a run, the time until its cost is near the final one, and the bytes sent.
 
     Parameters
     ----------
@@ -242,6 +243,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
     """
     return {
         **compute_run_metrics(record, rate=0.0).final(),
+        "sent_bytes_per_s": compute_sent_rate(record),
         "near_final_s": find_time_near_final(history),
     }
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from robocov.metrics.advice import advise
 from robocov.metrics.clearance import compute_clearances, count_contacts
+from robocov.metrics.communication import compute_sent_rate
 from robocov.metrics.cost_history import CostHistory, compute_mean_over_run
 from robocov.metrics.motion import compute_path_lengths, count_stuck_robots
 from robocov.metrics.settling import find_settling_time
@@ -28,7 +29,8 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     Returns
     -------
     dict
-        Results whose names end in their units, and ``notes``, a list of remarks, if there are any.
+        Results whose names end in their units, and ``notes``, a list of remarks, if there are any. The mean
+        size of the messages that a robot sends per second is included if there are any messages.
 
     See Also
     --------
@@ -61,6 +63,8 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
         "path_length_m": path_lengths.tolist(),
         "stuck_robots": count_stuck_robots(record.time, record.positions, record.goals),
     }
+    if record.sent_bytes is not None:
+        summary["sent_bytes_per_s"] = compute_sent_rate(record)
     notes = [*_describe_moved_joins(record), *advise(record, clearances)]
     if notes:
         summary["notes"] = notes

@@ -27,6 +27,8 @@ class Snapshot:
         Mask of the robots that have joined and have not failed. None: all.
     inbox : object
         The messages that the robots have received so far; None if communication is ideal.
+    sent_bytes : int
+        Size of the messages of the controller that the robots have sent before this step.
 
     See Also
     --------
@@ -52,6 +54,7 @@ class Snapshot:
     truth: Array | None = None
     working: BoolArray | None = None
     inbox: Any = None
+    sent_bytes: int = 0
 
     def __repr__(self) -> str:
         return f"<Snapshot at {self.time:.2f} s, {format_count(len(self.positions), 'robot')}>"

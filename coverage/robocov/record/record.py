@@ -27,7 +27,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.optional_imports import import_optional
 from robocov.record.package_versions import list_versions
-from robocov.record.record_arrays import ARRAYS, COLUMNS, STEERING, read_record_arrays
+from robocov.record.record_arrays import ARRAYS, COLUMNS, SENT_BYTES, STEERING, read_record_arrays
 from robocov.record.run_document import JoinEvent, RunDocument
 from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_steps
 from robocov.team import Team
@@ -76,6 +76,9 @@ class Record(Drawable):
         None if they are ideal.
     joined : tuple of JoinedRobot
         The robots that joined during the run, and the positions at which they joined.
+    sent_bytes : (T,) bytes, or None
+        Size of the messages of the controller that all robots have sent before each time step, received or
+        not. None if they have sent none. Positions are not included.
 
     See Also
     --------
@@ -117,6 +120,7 @@ class Record(Drawable):
     conditions: Conditions | None = None
     steering: Array | None = None
     joined: tuple[JoinedRobot, ...] = ()
+    sent_bytes: Array | None = None
 
     @cached_property
     def working(self) -> BoolArray:
@@ -157,7 +161,12 @@ class Record(Drawable):
     @property
     def arrays(self) -> tuple[str, ...]:
         """Names of the arrays of this record."""
-        return ARRAYS if self.steering is None else (*ARRAYS, STEERING)
+        names: tuple[str, ...] = ARRAYS
+        if self.steering is not None:
+            names = (*names, STEERING)
+        if self.sent_bytes is not None:
+            names = (*names, SENT_BYTES)
+        return names
 
     @property
     def has_travel_time_cells(self) -> bool:
@@ -314,7 +323,7 @@ class Record(Drawable):
             "robot": np.tile(np.arange(robot_count), step_count),
         }
         for array in self.arrays:
-            if array == "time":
+            if array not in COLUMNS:
                 continue
             values = getattr(self, array)
             for component, column in enumerate(COLUMNS[array]):

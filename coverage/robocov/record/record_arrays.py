@@ -15,6 +15,8 @@ ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points
 """Names of the arrays of every record."""
 STEERING = "steering"
 """Name of the additional array in records of unicycles."""
+SENT_BYTES = "sent_bytes"
+"""Name of the additional array in records of robots that send messages."""
 COLUMNS = {
     "positions": ("x_m", "y_m"),
     "velocities": ("vx_m_s", "vy_m_s"),
@@ -24,12 +26,19 @@ COLUMNS = {
     STEERING: ("heading_rad", "turning_rate_rad_s"),
 }
 """Names of the columns of data frames, by array."""
-_MAX_VALUES = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300, STEERING: 1e9}
-"""Maximum absolute values in s, m, m/s, N, rad and rad/s; the other arrays may contain nan."""
+_MAX_VALUES = {
+    "time": 1e9,
+    "positions": 1e7,
+    "velocities": 1e300,
+    "forces": 1e300,
+    STEERING: 1e9,
+    SENT_BYTES: 1e18,
+}
+"""Maximum absolute values in s, m, m/s, N, rad and rad/s, and bytes; the other arrays may contain nan."""
 
 
 def list_array_names(team: Team) -> tuple[str, ...]:
-    """Return the names of the arrays of a record.
+    """Return the names of the arrays that a record must have.
 
     Parameters
     ----------
@@ -65,6 +74,8 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     with path.open("rb") as file:
         saved = read_arrays(file, str(path))
     names = list_array_names(team)
+    if SENT_BYTES in saved:
+        names = (*names, SENT_BYTES)
     for name in names:
         if name not in saved:
             raise InputError(f"{path}: there is no array {name}")
@@ -78,11 +89,11 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
 
 
 def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robot_count: int) -> None:
-    is_time = name == "time"
-    shape = time_shape if is_time else (*time_shape, robot_count, 2)
+    is_per_step = name in ("time", SENT_BYTES)
+    shape = time_shape if is_per_step else (*time_shape, robot_count, 2)
     has_steps = len(time_shape) == 1 and time_shape != (0,)
     if array.dtype != np.float64 or array.shape != shape or not has_steps:
-        expected = "(T,)" if is_time else str(shape)
+        expected = "(T,)" if is_per_step else str(shape)
         raise InputError(
             f"{path}: {name}: expected shape {expected} of float64, got {array.shape} of {array.dtype}"
         )

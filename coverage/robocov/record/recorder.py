@@ -64,6 +64,7 @@ class Recorder:
                     f"controller {self.name!r}: {gain}: expected a finite number, got {quote(value)}"
                 )
         self._times: list[float] = []
+        self._sent_bytes: list[int] = []
         self._rows: dict[str, list[Array]] = {
             name: [] for name in list_array_names(self.team) if name != "time"
         }
@@ -79,6 +80,7 @@ class Recorder:
         if goals is None:
             goals = np.full_like(snapshot.seen.positions, np.nan)
         self._times.append(snapshot.seen.time)
+        self._sent_bytes.append(snapshot.sent_bytes)
         self._rows["positions"].append(snapshot.positions.copy())
         self._rows["velocities"].append(snapshot.seen.velocities.copy())
         self._rows["forces"].append(snapshot.decision.forces.copy())
@@ -100,6 +102,9 @@ class Recorder:
         Record
         """
         arrays = {name: np.array(rows) for name, rows in self._rows.items()}
+        sent_bytes = None
+        if any(self._sent_bytes):
+            sent_bytes = np.array(self._sent_bytes, dtype=np.float64)
         return Record(
             environment=self.environment,
             team=self.team,
@@ -118,6 +123,7 @@ class Recorder:
             conditions=self.conditions,
             steering=arrays.get(STEERING),
             joined=joined,
+            sent_bytes=sent_bytes,
         )
 
 

@@ -139,6 +139,7 @@ class SimulationBatch:
         self._memories: list[Any] = memories
         self._radio = Radio(Conditions(), self.team.communication_range, dt)
         self._inboxes: list[Inbox | None] = [None] * run_count
+        self._sent_bytes = np.zeros(run_count)
         self._start_step()
 
     def _start_step(self) -> None:
@@ -319,7 +320,10 @@ class SimulationBatch:
         working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
             positions = self._world.positions[self._rows[run]]
-            inboxes[run], _ = self._radio.send_messages(None, self._steps, run_messages, positions, working)
+            inboxes[run], sent_bytes = self._radio.send_messages(
+                None, self._steps, run_messages, positions, working
+            )
+            self._sent_bytes[run] += sent_bytes
         return inboxes
 
     def restart(self, run: int, starts: Array) -> None:
@@ -373,14 +377,19 @@ class SimulationBatch:
         steps = count_steps(duration, self.dt)
         recorder = Recorder(self.environment, self._joint_team, self.controller, self.dt, start=start)
         recorder.add(self._to_snapshot())
+        sent_bytes = [self._sent_bytes.copy()]
         for _ in range(steps):
             self.step()
             recorder.add(self._to_snapshot())
+            sent_bytes.append(self._sent_bytes.copy())
         joint_record = recorder.record()
-        return [
-            self._extract_record(joint_record, run, seed=None if seeds is None else seeds[run])
-            for run in range(len(self))
-        ]
+        records = []
+        for run, run_bytes in enumerate(np.transpose(sent_bytes)):
+            record = self._extract_record(joint_record, run, seed=None if seeds is None else seeds[run])
+            if run_bytes.any():
+                record = replace(record, sent_bytes=run_bytes.copy())
+            records.append(record)
+        return records
 
     def _to_snapshot(self) -> Snapshot:
         """Return a snapshot of all runs with everything that a record needs."""

@@ -287,7 +287,7 @@ class Simulation:
             decision = self._caller.decide(knowledge.observations, self.memory)
             self.decision_time += process_time() - start_time
             if self._perception is None:
-                self._snapshot = Snapshot(knowledge.observations, decision)
+                self._snapshot = Snapshot(knowledge.observations, decision, sent_bytes=self.sent_bytes)
             else:
                 self._snapshot = Snapshot(
                     knowledge.observations,
@@ -295,6 +295,7 @@ class Simulation:
                     truth=self.positions,
                     working=self.working,
                     inbox=knowledge.inbox,
+                    sent_bytes=self.sent_bytes,
                 )
         return self._snapshot
 
@@ -538,6 +539,7 @@ class Simulation:
             conditions=self.conditions if conditions is None else conditions,
         )
         twin.joined = self.joined
+        twin.sent_bytes = self.sent_bytes
         if len(new_team) == len(self.team):
             if conditions is None:
                 twin.inbox = self.inbox

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,16 @@ from hypothesis import strategies as st
 
 from robocov.conditions import Conditions
 from robocov.conditions.communication import MAX_PACKET_BYTES, POSITION_BYTES
+from robocov.controllers import Lloyd
 from robocov.controllers.individual import OwnView
+from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
+from robocov.metrics import compute_cost_history, summarize
+from robocov.metrics.communication import compute_sent_rate
 from robocov.observation import Decision, Message, Observations
 from robocov.observation.region import Region
+from robocov.record import Record
 from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
 
@@ -70,6 +76,31 @@ def test_messages_arrive_in_the_next_step_at_all_robots_in_range() -> None:
     assert list_heard(simulation, 1, 0) == [(0.1, 0.0), (0.2, 0.1)]
     assert simulation.memory[2] == []
     assert simulation.sent_bytes == 3 * 3 * 8
+
+
+def test_records_contain_the_bytes_sent_so_far() -> None:
+    record = simulate(steps=2).copy().run(1.0)
+    assert record.sent_bytes is not None
+    assert record.sent_bytes.tolist() == [24.0 * step for step in range(2, 13)]
+    assert compute_sent_rate(record) == pytest.approx(8 / DT)
+    assert compute_sent_rate(record.until(0.7)) == pytest.approx(8 / DT)
+    batch = SimulationBatch(HALL, Chatter(), [STARTS, STARTS], dt=DT)
+    for run_record in batch.run(1.0):
+        assert run_record.sent_bytes is not None
+        assert run_record.sent_bytes.tolist() == [24.0 * step for step in range(11)]
+
+
+def test_bytes_sent_are_saved(tmp_path: Path) -> None:
+    record = simulate(steps=0).run(1.0)
+    record.save(tmp_path)
+    loaded = Record.load(tmp_path)
+    np.testing.assert_array_equal(loaded.sent_bytes, record.sent_bytes)
+    history = compute_cost_history(record, CoverageCost(HALL, lattice=8))
+    assert summarize(record, history)["sent_bytes_per_s"] == pytest.approx(8 / DT)
+    silent = Simulation(HALL, Lloyd(), STARTS).run(1.0)
+    assert silent.sent_bytes is None
+    assert "sent_bytes_per_s" not in summarize(silent, history)
+    assert compute_sent_rate(silent) == 0.0
 
 
 @pytest.mark.parametrize(("delay", "steps"), [(0.0, 1), (0.1, 1), (0.2, 2), (0.25, 3)])

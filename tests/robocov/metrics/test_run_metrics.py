@@ -143,7 +143,7 @@ def test_the_cost_is_near_its_final_value_after_the_last_deviation(
 def test_final_metrics_have_a_figure_for_each_column(record: Record) -> None:
     figures = compute_final_metrics(record, build_history([2.0, 1.0, 1.0]))
     assert figures["near_final_s"] == 1.0
-    assert set(figures) == {*COLUMNS.values(), "near_final_s"} - {"time_s"}
+    assert set(figures) == {*COLUMNS.values(), "near_final_s", "sent_bytes_per_s"} - {"time_s"}
 
 
 @pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])

@@ -39,6 +39,7 @@ FIGURE_NAMES = (
     "path_length_m",
     "stuck_robots",
     "mean_time_s",
+    "sent_bytes_per_s",
 )
 """Figures that a report shows for a run. The names are those of columns in the table of a sweep."""
 

@@ -44,7 +44,8 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
     Parameters
     ----------
     result : ReportedResult
-        Result whose runs are shown. Mean times are a column only if some robots are faster than others.
+        Result whose runs are shown. Mean times are a column only if some robots are faster than others, and
+        the size of messages per second only if there are any.
     unsettled : str
         Text in the column of settling times for a team that did not settle.
 
@@ -61,6 +62,8 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
     ]
     if any(run.has_figure("mean_time_s") for run in result.completed_runs):
         columns.append(build_quartiles_column("Mean time, s", "mean_time_s", 3))
+    if any(run.figures.get("sent_bytes_per_s") for run in result.completed_runs):
+        columns.append(build_quartiles_column("Messages, B/s", "sent_bytes_per_s", 0))
     return columns
 
 
