@@ -10,6 +10,7 @@
 - `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
 - `atlas`, `frontier_median`, `greedy_submodular`, `voronoi_graph`: controllers that discover the map
 - `shared_map`, `teammates`, `localization`: common parts of the controllers that discover the map
+- `scan_exchange`: the messages from which robots with shared maps build their maps
 - `atlas_memory`: what robots with `Atlas` remember from one plan to the next
 - `known_cells`, `driving`, `route_following`: cells, velocities and forces, for several controllers
 """

@@ -103,15 +103,39 @@ class DiscoveredMap:
         DiscoveredMap
             This map itself if the scan adds nothing to it.
         """
+        return self.add_scans(position[None], distances[None], is_hit[None])
+
+    def add_scans(
+        self, positions: Array, distances: Array, is_hit: BoolArray, robot_radius: float | None = None
+    ) -> DiscoveredMap:
+        """Return the map updated by several scans, one after another; see `add_scan`.
+
+        Parameters
+        ----------
+        positions : (k, 2) array, m
+        distances : (k, rays) array, m
+        is_hit : (k, rays) bool array
+        robot_radius : float or None, m
+            Radius around each position within which cells become free, unless they are walls. None: they stay
+            as they are.
+
+        Returns
+        -------
+        DiscoveredMap
+            This map itself if the scans add nothing to it.
+        """
         state = self.state.copy()
+        grid = self.raster.grid
+        directions = compute_ray_directions(distances.shape[1])
         # No ray inside the region is longer than its diameter, and the map does not extend beyond it.
         lengths = np.minimum(distances, self.raster.region.diameter)
-        directions = compute_ray_directions(len(distances))
-        grid = self.raster.grid
-        _mark_passed_cells(state, grid, position, directions, lengths)
-        ends = _compute_ray_ends(grid, position, directions, lengths)
-        _mark_presumed_walls(state, grid, ends, is_hit)
-        _mark_hit_cells(state, grid, ends, is_hit)
+        for scan, position in enumerate(positions):
+            _mark_passed_cells(state, grid, position, directions, lengths[scan])
+            ends = _compute_ray_ends(grid, position, directions, lengths[scan])
+            _mark_presumed_walls(state, grid, ends, is_hit[scan])
+            _mark_hit_cells(state, grid, ends, is_hit[scan])
+            if robot_radius is not None:
+                _mark_robots(state, grid, positions[scan : scan + 1], robot_radius)
         return self._replace_state(state)
 
     def add_robots(self, positions: Array, radius: float) -> DiscoveredMap:

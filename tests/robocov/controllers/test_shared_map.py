@@ -10,6 +10,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, get_information, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
+from robocov.controllers.scan_exchange import ScanExchange
 from robocov.controllers.shared_map import Situation, assign_goals, list_hearing_groups, update_maps
 from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
@@ -242,7 +243,8 @@ def test_robots_move_to_a_voronoi_graph_that_has_fewer_vertices_than_there_are_r
     """Before a wall is seen, the graph of a convex region has only few vertices."""
     empty = Environment("empty", SQUARE)
     simulation = Simulation(empty, VoronoiGraphCoverage(), CORNER, Team.homogeneous(len(CORNER)))
-    simulation.step()
+    for _ in range(2):
+        simulation.step()
     goals = simulation.memory.plans[0].placement.goals
     distances = np.hypot(*(goals - CORNER).T)
     is_moving = distances > 1.0
@@ -279,8 +281,11 @@ def test_a_final_plan_is_computed_again_for_another_density() -> None:
         np.array([[1.0, 1.0]]), np.zeros((1, 2)), Neighbors(1), np.full((1, 2), np.nan), ROOMS.region
     )
     known_map = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, dtype=np.uint8))
-    memory = replace(controller.begin(ROOMS.region, Team.homogeneous(1)), maps=(known_map,))
-    first = controller.decide(seen, memory).memory
+    exchange = ScanExchange.start(known_map, 1, robot_radii=[None])
+    memory = replace(controller.begin(ROOMS.region, Team.homogeneous(1)), exchange=exchange)
+    blind = Scans(np.zeros((1, 8)), np.zeros((1, 8), dtype=bool))
+    memory = controller.decide(replace(seen, scans=blind), memory).memory
+    first = controller.decide(replace(seen, time=0.1), memory).memory
     later = replace(seen, time=5.0)
     same = controller.decide(later, first).memory
     assert same.plans[0].placement is first.plans[0].placement

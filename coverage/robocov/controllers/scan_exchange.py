@@ -1,0 +1,351 @@
+"""The exchange of scans by messages, from which each robot builds its map.
+
+Robots send three kinds of messages, all of them to every robot in communication range:
+
+- *Scans* (`NumberedScan`). A robot sends each of its own scans once, when it takes it: 542 bytes for 240
+  rays.
+- *Digests* (`Digest`). With each scan, a robot sends which scans it has, and whom it hears: 8 bytes, and 12
+  bytes and 1 bit for each robot of the team.
+- *Repairs*. A robot sends scans again, also those of third robots, that are missing in the digest of another
+  one: at most `MAX_REPAIRS` for each scan that it takes.
+
+Lost messages are thus repaired, scans reach robots out of range over several hops, and robots that meet again
+exchange what they have missed. A robot never sends more than the conditions allow; what cannot be sent before
+the next scan is dropped, and repaired later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import BoolArray
+from robocov.controllers.base import TIME_TOLERANCE_S
+from robocov.observation import Message, Observations, Scans
+from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.scan_log import Inventory, NumberedScan, ScanLog, number_scans
+
+MAX_REPAIRS = 16
+"""Maximum number of scans that a robot sends again for each scan that it takes."""
+
+_TIME_BYTES = 8
+_INVENTORY_BYTES = 12
+"""Size of the number of the first missing scan of a robot, and of the bits for 64 later ones."""
+_MAX_REPAIR_MEMORY_S = 30.0
+"""Time for which a robot remembers what it has sent again."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Digest:
+    """What a robot reports about the scans that it has. Immutable.
+
+    Attributes
+    ----------
+    time : float, s
+        Time at which it was sent.
+    inventory : Inventory
+    is_heard : (n,) bool array
+        Whether the robot hears each of the others.
+    """
+
+    time: float
+    inventory: Inventory
+    is_heard: BoolArray
+
+    @property
+    def size(self) -> int:
+        """Size of a message with the digest, bytes.
+
+        Examples
+        --------
+        >>> inventory = Inventory(np.zeros(6, dtype=np.intp), np.zeros((6, 64), dtype=bool))
+        >>> Digest(0.0, inventory, np.ones(6, dtype=bool)).size
+        81
+        """
+        robot_count = len(self.is_heard)
+        return _TIME_BYTES + _INVENTORY_BYTES * robot_count + -(-robot_count // 8)
+
+
+class ReceivedDigest(NamedTuple):
+    """The newest digest of another robot."""
+
+    digest: Digest
+    delay: float
+    """Time between sending and arrival, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotExchange:
+    """What one robot has of the exchange. Immutable."""
+
+    log: ScanLog
+    own_scan: NumberedScan | None = None
+    """Its newest scan, which enters the log one step later, like those of others at the earliest."""
+    own_inventory: Inventory | None = None
+    """The inventory in its newest digest."""
+    digests: Mapping[int, ReceivedDigest] = field(default_factory=dict)
+    """The newest digest of each robot from which one has arrived. Never changed in place."""
+    repair_times: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    """Times at which it sent scans again, by the numbers of robot and round. Never changed in place."""
+    outgoing: tuple[Message, ...] = ()
+    """Messages that it has not been able to send yet."""
+
+    def __deepcopy__(self, memo: object) -> RobotExchange:
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class ScanExchange:
+    """The exchange of scans in a team. Immutable; entry i belongs to robot i alone.
+
+    Attributes
+    ----------
+    robots : tuple of RobotExchange
+    round_count : int
+        Number of scans that each robot has taken.
+    """
+
+    robots: tuple[RobotExchange, ...]
+    round_count: int = 0
+
+    @classmethod
+    def start(
+        cls, unknown_map: DiscoveredMap, robot_count: int, robot_radii: Sequence[float | None]
+    ) -> ScanExchange:
+        """Return the exchange of robots that have no scans yet.
+
+        Parameters
+        ----------
+        unknown_map : DiscoveredMap
+        robot_count : int
+            Number of robots n.
+        robot_radii : sequence of float or None, m
+            The radius within which each robot takes cells around the positions in scans to be free; None if
+            it does not.
+
+        Returns
+        -------
+        ScanExchange
+        """
+        logs = {radius: ScanLog.build_empty(robot_count, unknown_map, radius) for radius in set(robot_radii)}
+        return cls(tuple(RobotExchange(logs[radius]) for radius in robot_radii))
+
+    @property
+    def maps(self) -> tuple[DiscoveredMap, ...]:
+        """The map of each robot after its last update."""
+        return tuple(state.log.known_map for state in self.robots)
+
+    @property
+    def has_scans(self) -> bool:
+        """Whether the robots have at least the first scan of their own."""
+        return all(len(state.log.rounds) > 0 for state in self.robots)
+
+    def receive(self, seen: Observations) -> ScanExchange:
+        """Return the exchange after the messages of a step have arrived.
+
+        Parameters
+        ----------
+        seen : Observations
+
+        Returns
+        -------
+        ScanExchange
+        """
+        has_own_scans = any(state.own_scan is not None for state in self.robots)
+        if not (seen.messages or has_own_scans):
+            return self
+        states = []
+        logs: dict[tuple[int, ...], ScanLog] = {}
+        for robot, state in enumerate(self.robots):
+            payloads = [message.payload for message in seen.get_messages(robot)]
+            scans = [payload for payload in payloads if isinstance(payload, NumberedScan)]
+            if state.own_scan is not None:
+                scans.append(state.own_scan)
+            if scans:
+                # Robots with the same log that receive the same scans share the next log.
+                scans.sort(key=attrgetter("number", "robot"))
+                key = (id(state.log), *map(id, scans))
+                if key not in logs:
+                    logs[key] = state.log.add(scans)
+                state = replace(state, log=logs[key], own_scan=None)
+            states.append(_add_digests(state, seen, robot))
+        return replace(self, robots=tuple(states))
+
+    def update_maps(self, robots: Sequence[int]) -> ScanExchange:
+        """Return the exchange with the maps of all scans that some robots have.
+
+        Robots with equal maps share one object, so that what is computed from it is computed only once.
+
+        Parameters
+        ----------
+        robots : sequence of int
+
+        Returns
+        -------
+        ScanExchange
+        """
+        states = list(self.robots)
+        updated_logs: dict[int, ScanLog] = {}
+        maps_by_content: dict[bytes, DiscoveredMap] = {}
+        for robot in robots:
+            log = states[robot].log
+            if id(log) not in updated_logs:
+                updated = log.update_map()
+                if updated.known_map is not log.known_map:
+                    content = updated.known_map.state.tobytes()
+                    shared_map = maps_by_content.setdefault(content, updated.known_map)
+                    updated = updated.share_map(shared_map)
+                updated_logs[id(log)] = updated
+            states[robot] = replace(states[robot], log=updated_logs[id(log)])
+        return replace(self, robots=tuple(states))
+
+    def add_scans(self, seen: Observations, scans: Scans) -> ScanExchange:
+        """Return the exchange with a new scan of each robot, and the messages that go with it.
+
+        Parameters
+        ----------
+        seen : Observations
+        scans : Scans
+            The scans in these observations.
+
+        Returns
+        -------
+        ScanExchange
+        """
+        own_scans = number_scans(scans, seen.positions, seen.region, number=self.round_count, time=seen.time)
+        robot_count = len(own_scans)
+        states = []
+        for robot, own_scan in enumerate(own_scans):
+            state = replace(self.robots[robot], own_scan=own_scan)
+            if robot_count > 1:
+                state = _prepare_messages(state, seen, robot, own_scan)
+            states.append(state)
+        return ScanExchange(tuple(states), self.round_count + 1)
+
+    def add_message(self, robot: int, message: Message) -> ScanExchange:
+        """Return the exchange with another message that a robot sends."""
+        states = list(self.robots)
+        states[robot] = replace(states[robot], outgoing=(*states[robot].outgoing, message))
+        return replace(self, robots=tuple(states))
+
+    def send(self, seen: Observations) -> tuple[ScanExchange, tuple[tuple[Message, ...], ...]]:
+        """Send as many of the messages as each robot may send in a step.
+
+        Parameters
+        ----------
+        seen : Observations
+
+        Returns
+        -------
+        exchange : ScanExchange
+            The exchange without these messages.
+        messages : tuple of tuple of Message
+            The messages of each robot; empty if no robot sends any.
+        """
+        if not any(state.outgoing for state in self.robots):
+            return self, ()
+        states = []
+        messages = []
+        for robot, state in enumerate(self.robots):
+            limit = np.inf if seen.send_limits is None else float(seen.send_limits[robot])
+            count = _count_sendable(state.outgoing, limit)
+            messages.append(state.outgoing[:count])
+            states.append(replace(state, outgoing=state.outgoing[count:]))
+        return replace(self, robots=tuple(states)), tuple(messages)
+
+
+def _add_digests(state: RobotExchange, seen: Observations, robot: int) -> RobotExchange:
+    """Return the state of a robot with the digests that have arrived in a step."""
+    digests = {
+        message.sender: ReceivedDigest(message.payload, seen.time - message.payload.time)
+        for message in seen.get_messages(robot)
+        if isinstance(message.payload, Digest)
+    }
+    if not digests:
+        return state
+    return replace(state, digests={**state.digests, **digests})
+
+
+def _prepare_messages(
+    state: RobotExchange, seen: Observations, robot: int, own_scan: NumberedScan
+) -> RobotExchange:
+    """Return the state of a robot with the messages that go with a new scan; older ones are dropped."""
+    neighbors = seen.neighbors.list_neighbors(robot).tolist()
+    is_heard = np.zeros(len(seen.positions), dtype=bool)
+    is_heard[neighbors] = True
+    digest = Digest(seen.time, state.log.inventory, is_heard)
+    repairs = _choose_repairs(state, robot, neighbors)
+    repair_times = state.repair_times
+    if repairs:
+        min_time = seen.time - _MAX_REPAIR_MEMORY_S
+        repair_times = {key: time for key, time in repair_times.items() if time >= min_time}
+        repair_times.update(dict.fromkeys(((scan.robot, scan.number) for scan in repairs), seen.time))
+    payloads: list[NumberedScan | Digest] = [own_scan, digest, *repairs]
+    outgoing = tuple(Message(payload, payload.size) for payload in payloads)
+    return replace(state, own_inventory=digest.inventory, outgoing=outgoing, repair_times=repair_times)
+
+
+def _choose_repairs(state: RobotExchange, robot: int, neighbors: Sequence[int]) -> list[NumberedScan]:
+    """Choose the scans that a robot sends again, because others need them: the oldest ones first."""
+    log = state.log
+    chosen: dict[tuple[int, int], NumberedScan] = {}
+    for neighbor in neighbors:
+        received = state.digests.get(neighbor)
+        if received is None or state.own_inventory is None:
+            continue
+        inventory = received.digest.inventory
+        if inventory.equals(state.own_inventory):
+            # The neighbor lacked nothing, and what this robot has received since then is too new.
+            continue
+        is_missing = inventory.find_missing(log.is_present)
+        for number, owner in np.argwhere(is_missing).tolist():
+            scan = log.get_scan(owner, number)
+            if _needs_repair(scan, state, received) and _is_responsible(scan, state, robot, received):
+                chosen[number, owner] = scan
+    return [chosen[key] for key in sorted(chosen)[:MAX_REPAIRS]]
+
+
+def _needs_repair(scan: NumberedScan, state: RobotExchange, received: ReceivedDigest) -> bool:
+    """Return whether a scan missing in a digest was lost: it was sent early enough to be in the digest."""
+    sent_time = state.repair_times.get((scan.robot, scan.number), scan.time)
+    return sent_time + received.delay <= received.digest.time + TIME_TOLERANCE_S
+
+
+def _is_responsible(scan: NumberedScan, state: RobotExchange, robot: int, received: ReceivedDigest) -> bool:
+    """Return whether a robot is the one that sends a scan again to the sender of a digest.
+
+    Of the robots that the sender hears and that have the scan, as far as known, it is the owner of the scan,
+    or else the next one by number.
+    """
+    robot_count = len(received.digest.is_heard)
+    for step in range(robot_count):
+        candidate = (scan.robot + step) % robot_count
+        if candidate == robot:
+            return True
+        if received.digest.is_heard[candidate] and _has_scan(candidate, scan, state):
+            return False
+    return False
+
+
+def _has_scan(candidate: int, scan: NumberedScan, state: RobotExchange) -> bool:
+    """Return whether another robot has a scan, as far as known: its own, or one in its newest digest."""
+    if candidate == scan.robot:
+        return True
+    received = state.digests.get(candidate)
+    return received is not None and received.digest.inventory.contains(scan)
+
+
+def _count_sendable(messages: Sequence[Message], limit: float) -> int:
+    """Return the number of messages that may be sent; one that is larger than the limit is sent alone."""
+    if limit <= 0.0:
+        return 0
+    total = 0
+    for count, message in enumerate(messages):
+        total += message.size
+        if total > limit:
+            return max(count, 1)
+    return len(messages)
