@@ -5,13 +5,14 @@
 - `gains`: gains as dataclass fields, with units and ranges
 - `registry`: controllers by name
 - `user_modules`: controllers in files of users
-- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers
-  without a map of the region
+- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`, `exploring_lloyd`:
+  controllers without a map of the region
 - `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
 - `atlas`, `frontier_median`, `greedy_submodular`, `voronoi_graph`: controllers that discover the map
 - `shared_map`, `teammates`, `localization`: common parts of the controllers that discover the map
 - `scan_exchange`: the messages from which robots with shared maps build their maps
 - `atlas_memory`: what robots with `Atlas` remember from one plan to the next
+- `density_exchange`, `sightings`: messages with measurements, and with last known positions
 - `known_cells`, `driving`, `route_following`: cells, velocities and forces, for several controllers
 """
 
@@ -21,6 +22,7 @@ from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, get_information, inform_controller
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
+from robocov.controllers.exploring_lloyd import ExploringLloyd
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.gains import get_gain_values, get_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
@@ -52,6 +54,7 @@ __all__ = [
     "Controller",
     "Diffeomorphism",
     "Dispersion",
+    "ExploringLloyd",
     "FrontierMedian",
     "GeodesicLloyd",
     "GreedySubmodular",

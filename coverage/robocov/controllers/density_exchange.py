@@ -204,7 +204,7 @@ class MeasurementExchange:
 def add_received_measurements(seen: Observations, measurements: Array) -> Array:
     """Add the measurements that arrive in a step to those that the robots know.
 
-    A robot keeps the measurement that it has in a square.
+    A robot keeps the measurement that it has in a square. Messages with other contents are ignored.
 
     Parameters
     ----------
@@ -222,9 +222,10 @@ def add_received_measurements(seen: Observations, measurements: Array) -> Array:
     measurements = measurements.copy()
     for robot, known in enumerate(measurements):
         for message in seen.get_messages(robot):
-            squares = message.payload.squares
-            is_new = np.isnan(known[squares])
-            known[squares[is_new]] = message.payload.values[is_new]
+            content = message.payload
+            if isinstance(content, Measurements):
+                is_new = np.isnan(known[content.squares])
+                known[content.squares[is_new]] = content.values[is_new]
     return measurements
 
 

@@ -19,6 +19,7 @@ from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
+from robocov.controllers.exploring_lloyd import ExploringLloyd
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.gains import instantiate_controller
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
@@ -38,7 +39,7 @@ CONTROLLERS: dict[str, type[Any]] = {
         # The default comparison comes first, in this order.
         *(Rapf, Rpf, Lloyd, Atlas),
         *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
-        *(Visibility, Boosting, Adaptive, Diffeomorphism),
+        *(Visibility, Boosting, Adaptive, ExploringLloyd, Diffeomorphism),
         *(FrontierMedian, GreedySubmodular, VoronoiGraphCoverage, AtlasShared),
     )
 }

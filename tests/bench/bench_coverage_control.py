@@ -1,0 +1,221 @@
+"""Coverage of an unknown density in the default setting of CoverageControl, beside its own controllers.
+
+    python tests/bench/bench_coverage_control.py --worlds 4
+
+CoverageControl (Agarwal et al. 2024, LPAC) is another simulator. By default, 32 robots start anywhere in a
+square of 1024 m without walls, and the density has 32 peaks. Robots move at up to 5 m/s, hear each other
+within 128 m, and sense the density in a square of 64 m around them; in robocov, they sense it in a disc with
+this diameter. The cost is the sum of the squared distances to the nearest robot, weighted by the density.
+
+The table contains the fraction of the initial cost that is left in the end. Both simulators run on the same
+worlds, from the same starts. The controllers of CoverageControl are run by its own library, which has to be
+installed: ``pip install coverage_control``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import math
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from robocov import Environment, Raster, Simulation, Team, UniformStart, make_controller
+from robocov.arrays import Array
+
+SIDE_M = 1024.0
+PIXELS = 1024
+"""Number of pixels along a side of a world."""
+RASTER_PIXELS = 256
+"""Number of pixels along a side of the density that robots of robocov sense."""
+ROBOTS = 32
+PEAKS = 32
+SIGMA_RANGE_M = (40.0, 50.0)
+MASS_RANGE = (6.0, 10.0)
+TRUNCATION = 2.0
+"""Distance from its center at which a peak ends, in standard deviations."""
+MAX_MEAN_DIFFERENCE = 1e-3
+"""Maximum mean difference between the densities of both simulators, which are 1 at most."""
+SENSING_RANGE_M = 32.0
+COMMUNICATION_RANGE_M = 128.0
+MAX_SPEED_M_S = 5.0
+THEIR_CONTROLLERS = {
+    "ClairvoyantCVT": "the density and all positions",
+    "CentralizedCVT": "what the whole team has sensed, and all positions",
+    "DecentralizedCVT": "what it has sensed itself, and positions within range",
+}
+"""Controllers of CoverageControl, with what a robot knows."""
+OUR_CONTROLLERS = {
+    "exploring-lloyd": "what robots have sensed and told each other",
+    "adaptive": "the same, but senses only at its position",
+    "atlas-shared": "the density, and positions that robots told each other",
+    "rapf": "the density, and positions within range",
+    "lloyd": "the density, and positions within range",
+}
+"""Controllers of robocov, with what a robot knows."""
+
+
+class Peak(NamedTuple):
+    """A circular Gaussian, cut off at `TRUNCATION` standard deviations."""
+
+    x: float
+    """m"""
+    y: float
+    """m"""
+    sigma: float
+    """Standard deviation, m."""
+    mass: float
+    """Integral of the density without the cut."""
+
+
+class World(NamedTuple):
+    """A world, and the starts of the robots."""
+
+    peaks: Sequence[Peak]
+    density: Array
+    """(PIXELS, PIXELS) Density by row (y) and column (x), at most 1."""
+    starts: Array
+    """(ROBOTS, 2) m"""
+
+
+def draw_world(seed: int) -> World:
+    """Draw a world by the default rules of CoverageControl."""
+    rng = np.random.default_rng(seed)
+    peaks = []
+    for _ in range(PEAKS):
+        x, y = rng.uniform(0.0, SIDE_M, 2)
+        peaks.append(Peak(x=x, y=y, sigma=rng.uniform(*SIGMA_RANGE_M), mass=rng.uniform(*MASS_RANGE)))
+    starts = rng.uniform(1.0, SIDE_M - 1.0, (ROBOTS, 2))
+    return World(peaks=peaks, density=compute_density(peaks), starts=starts)
+
+
+def compute_density(peaks: Sequence[Peak]) -> Array:
+    """Compute the mass of the peaks in each pixel, relative to the largest, (PIXELS, PIXELS)."""
+    edges = np.linspace(0.0, SIDE_M, PIXELS + 1)
+    centers = 0.5 * (edges[:-1] + edges[1:])
+    density = np.zeros((PIXELS, PIXELS))
+    for peak in peaks:
+        mass_x = np.diff(scipy.special.ndtr((edges - peak.x) / peak.sigma))
+        mass_y = np.diff(scipy.special.ndtr((edges - peak.y) / peak.sigma))
+        squared_distances = (centers - peak.x) ** 2 + (centers[:, None] - peak.y) ** 2
+        is_near = squared_distances <= (TRUNCATION * peak.sigma) ** 2
+        density += np.where(is_near, peak.mass * mass_x * mass_y[:, None], 0.0)
+    return density / density.max()
+
+
+def compute_cost(density: Array, positions: Array) -> float:
+    """Compute the sum of the squared distances to the nearest robot, weighted by the density."""
+    x, y = np.meshgrid(np.arange(PIXELS) + 0.5, np.arange(PIXELS) + 0.5)
+    pixel_side = SIDE_M / PIXELS
+    centers = pixel_side * np.column_stack([x.ravel(), y.ravel()])
+    distances, _ = scipy.spatial.KDTree(positions).query(centers)
+    return float(density.ravel() @ distances**2)
+
+
+def build_environment(world: World) -> Environment:
+    """Build the world as a map of robocov, with a coarser raster that has the same mass in each pixel."""
+    merged = PIXELS // RASTER_PIXELS
+    blocks = world.density.reshape(RASTER_PIXELS, merged, RASTER_PIXELS, merged)
+    raster = Raster(blocks.mean(axis=(1, 3)), extent=(0.0, 0.0, SIDE_M, SIDE_M), interpolation="cells")
+    square = ((0.0, 0.0), (SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M))
+    return Environment("world", square, density=raster, starts={"anywhere": UniformStart()})
+
+
+def run_ours(name: str, seed: int, *, duration: float, communication_range: float) -> float:
+    """Return the fraction of the initial cost that a controller of robocov leaves."""
+    world = draw_world(seed)
+    team = Team.homogeneous(
+        ROBOTS,
+        radius=1.0,
+        max_speed=MAX_SPEED_M_S,
+        max_acceleration=10.0,
+        sensing_range=SENSING_RANGE_M,
+        communication_range=communication_range,
+    )
+    simulation = Simulation(build_environment(world), make_controller(name), world.starts, team)
+    while simulation.time < duration:
+        simulation.step()
+    return compute_cost(world.density, simulation.positions) / compute_cost(world.density, world.starts)
+
+
+def run_theirs(name: str, seed: int, *, duration: float) -> float:
+    """Return the fraction of the initial cost that a controller of CoverageControl leaves."""
+    library = load_coverage_control()
+    parameters = library.Parameters()
+    world = draw_world(seed)
+    world_density = library.WorldIDF(parameters)
+    for peak in world.peaks:
+        center = np.array([peak.x, peak.y])
+        world_density.AddNormalDistribution(
+            library.BivariateNormalDistribution(center, peak.sigma, peak.mass)
+        )
+    world_density.GenerateMap()
+    # Its maps are indexed by x, then y, and have single precision.
+    differences = np.asarray(world_density.GetWorldMap()).T - world.density
+    if np.abs(differences).mean() > MAX_MEAN_DIFFERENCE:
+        raise SystemExit(f"world {seed}: the densities of robocov and of CoverageControl differ")
+    starts = library.PointVector(list(world.starts))
+    system = library.CoverageSystem(parameters, world_density, starts)
+    controller = getattr(library, name)(parameters, ROBOTS, system)
+    initial_cost = system.GetObjectiveValue()
+    for _ in range(round(duration / parameters.pTimeStep)):
+        controller.ComputeActions()
+        system.StepActions(controller.GetActions())
+    return float(system.GetObjectiveValue() / initial_cost)
+
+
+def load_coverage_control() -> Any:
+    """Load the compiled part of CoverageControl, which contains the simulator and its controllers.
+
+    Its Python package imports PyTorch Geometric even if only this part is used.
+    """
+    if "coverage_control" not in sys.modules:
+        spec = importlib.util.find_spec("coverage_control")
+        if spec is None or spec.submodule_search_locations is None:
+            raise SystemExit("CoverageControl is missing: pip install coverage_control, or use --ours")
+        package = ModuleType("coverage_control")
+        package.__path__ = [str(Path(folder)) for folder in spec.submodule_search_locations]
+        sys.modules["coverage_control"] = package
+    return importlib.import_module("coverage_control._core")
+
+
+def print_row(name: str, knowledge: str, fractions: Sequence[float]) -> None:
+    """Print a row of the table, as Markdown."""
+    each = ", ".join(f"{fraction:.2f}" for fraction in fractions)
+    print(f"| {name} | {knowledge} | {np.mean(fractions):.2f} | {each} |", flush=True)
+
+
+def main() -> None:
+    """Run the controllers, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--worlds", type=int, default=4, help="number of worlds")
+    parser.add_argument("--duration", type=float, default=120.0, help="duration of a run, s")
+    parser.add_argument("--controllers", nargs="+", default=list(OUR_CONTROLLERS), help="of robocov")
+    parser.add_argument("--ours", action="store_true", help="leave out the controllers of CoverageControl")
+    parser.add_argument("--workers", type=int, default=2, help="number of processes")
+    arguments = parser.parse_args()
+    seeds = range(arguments.worlds)
+    print("| controller | what a robot knows | mean | in each world |\n|---|---|---|---|")
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        if not arguments.ours:
+            for name, knowledge in THEIR_CONTROLLERS.items():
+                run = partial(run_theirs, name, duration=arguments.duration)
+                print_row(name, knowledge, list(pool.map(run, seeds)))
+        limited = partial(run_ours, duration=arguments.duration, communication_range=COMMUNICATION_RANGE_M)
+        for name in arguments.controllers:
+            fractions = list(pool.map(partial(limited, name), seeds))
+            print_row(f"`{name}`", OUR_CONTROLLERS.get(name, ""), fractions)
+        unlimited = partial(run_ours, "lloyd", duration=arguments.duration, communication_range=math.inf)
+        print_row("`lloyd`", "the density and all positions", list(pool.map(unlimited, seeds)))
+
+
+if __name__ == "__main__":
+    main()
