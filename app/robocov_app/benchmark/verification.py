@@ -47,7 +47,7 @@ NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
 """The probability of missing changed rows is reported for one row, and for this fraction of all rows."""
-_READING_SHARED_MAPS = ("atlas-shared", "frontier-median", "greedy-submodular", "voronoi-graph")
+_READING_SHARED_MAPS = ("atlas-shared",)
 """Controllers whose robots read the maps of others directly, without messages."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run and are not compared."""

@@ -14,6 +14,7 @@ import pytest
 from swept import HEAD, PULL
 
 from robocov.controllers import CONTROLLERS
+from robocov.controllers.base import Information
 from robocov.generator import GENERATORS
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.guarded_runs import _decide_again
@@ -25,7 +26,7 @@ from robocov_app.benchmark.isolation import (
     is_same_content,
 )
 from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
-from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import (
@@ -39,6 +40,7 @@ from robocov_app.sweep.worker import perform
 from robocov_app.terminal.interruption import Interruption
 
 MAP = "blocks-a"
+TRACKS = ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
 SMALL = VerificationOptions(sample=1, robots=1, new_maps=0)
 
 GLOBAL = """
@@ -131,7 +133,7 @@ IMPORTS = HEAD.partition("@dataclass")[0]
 
 @pytest.fixture(autouse=True)
 def _short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures"):
+    for name in TRACKS:
         track = suite.TRACKS[name]
         failures = tuple((robot, 0.5) for robot, _ in track.failures)
         changed = replace(track, duration=1.5, seeds=(0,), maps=(MAP,), failures=failures)
@@ -146,13 +148,29 @@ def build_task(controller: str, track: str) -> Task:
     return next(iter(generate_tasks(studies[track])))
 
 
-def isolate(controller: str, track: str, robot: int | None) -> str | None:
-    """Return how the decisions of a robot differ in a process of its own, without starting one."""
-    task = build_task(controller, track)
+def record(controller: str, track: str) -> Transcript:
+    """Run a controller, and return its observations and decisions."""
     transcript = Transcript()
-    outcome = perform(task, transcript.add)
+    outcome = perform(build_task(controller, track), transcript.add)
     assert outcome.error is None
-    information = CONTROLLERS[controller].information if controller in CONTROLLERS else "own"
+    return transcript
+
+
+def isolate(
+    controller: str, track: str, robot: int | None, transcript: Transcript | None = None
+) -> str | None:
+    """Return how the decisions of a robot differ in a process of its own, without starting one.
+
+    The decisions are those in the transcript of a run; by default, of a new one.
+    """
+    task = build_task(controller, track)
+    if transcript is None:
+        transcript = record(controller, track)
+    information: Information = "own"
+    if controller in CONTROLLERS:
+        information = CONTROLLERS[controller].information
+    elif controller == ORACLE:
+        information = "whole map"
     replay = build_replay(task, transcript, information, robot, np.random.default_rng(0))
     return find_difference(transcript, replay, _decide_again(replay))
 
@@ -161,8 +179,8 @@ SLOW = ("atlas", "adaptive", "boosting", "visibility", "geodesic-lloyd", "diffeo
 ISOLATED = [
     pytest.param(name, track, id=f"{name}-{track}", marks=[pytest.mark.slow] if name in SLOW else [])
     for name, kind in CONTROLLERS.items()
-    for track in ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
-    if not reads_shared_maps(name)
+    for track in TRACKS
+    if kind.information != "shared map"
 ]
 
 
@@ -171,9 +189,31 @@ def test_robots_of_built_in_controllers_decide_by_their_own_observations(control
     assert isolate(controller, track, robot=2) is None
 
 
+SHARING = [
+    name
+    for name, kind in CONTROLLERS.items()
+    if kind.information == "shared map" and not reads_shared_maps(name)
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", ["atlas-shared", "voronoi-graph"])
-def test_teams_that_share_maps_decide_by_the_observations_of_the_team(controller: str) -> None:
+@pytest.mark.parametrize("track", TRACKS)
+@pytest.mark.parametrize("controller", SHARING)
+def test_robots_that_share_maps_decide_by_their_own_observations(
+    controller: str, track: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In 4 s, scans have been received, and at least two plans have been made with them."""
+    longer = replace(suite.TRACKS[track], duration=4.0)
+    monkeypatch.setitem(suite.TRACKS, track, longer)  # type: ignore[arg-type]
+    transcript = record(controller, track)
+    assert any(any(observations.messages) for observations in transcript.observations)
+    for robot in (2, 3):
+        assert isolate(controller, track, robot, transcript) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["atlas-shared", ORACLE])
+def test_teams_that_decide_together_use_only_the_observations_of_the_team(controller: str) -> None:
     assert isolate(controller, "short-range", robot=None) is None
 
 
