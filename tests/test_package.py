@@ -73,7 +73,8 @@ def test_the_source_archive_has_the_tests_and_no_film(tmp_path: Path) -> None:
 @pytest.mark.skipif(not WITH_SPHINX, reason="needs robocov[docs]")
 def test_the_wheel_carries_maps_entries_and_a_handbook_that_needs_no_sphinx(tmp_path: Path) -> None:
     (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
-    site, empty = tmp_path / "site", tmp_path / "empty"
+    site = tmp_path / "site"
+    empty = tmp_path / "empty"
     with zipfile.ZipFile(wheel) as files:
         files.extractall(site)
     assert Path(wheel).stat().st_size < 5e6

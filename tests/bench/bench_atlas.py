@@ -34,7 +34,9 @@ from robocov.metrics import compute_path_lengths, find_settling_time
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.results import find_reference
 
-SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200), range(901, 905), 3.0
+SIZES = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200)
+SEEDS = range(901, 905)
+SHORT = 3.0
 RANGES = ({}, {"communication_range": 3.0}, {"communication_range": 6.0}, {"sensing_range": 6.0})
 PROTOTYPE = {6: 0.168, 50: 0.263, 200: 0.575}  # ms, a vectorized step of RAPF before there was a compiled one
 
@@ -49,7 +51,9 @@ def walls(turn: float, door: float, width: float) -> tuple[WallObstacle, WallObs
 def crosses(name: str, seed: int) -> bool:
     """Return whether one of three robots goes through a random door within 30 s."""
     rng = np.random.default_rng(seed)
-    width, turn, door = 0.2 * rng.uniform(1.6, 3.0), rng.uniform(0.0, math.tau), rng.uniform(-1.5, 1.5)
+    width = 0.2 * rng.uniform(1.6, 3.0)
+    turn = rng.uniform(0.0, math.tau)
+    door = rng.uniform(-1.5, 1.5)
     square = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
     across = np.array([math.cos(turn), math.sin(turn)])
     begin = 4.0 - 2.0 * across + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
@@ -66,9 +70,12 @@ def doors(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float]:
     """Return the mean distance, and the mean way, of a team in generated rooms after 60 s, m."""
-    rooms, team = generate_map(seed, kind="rooms"), Team.homogeneous(robots, communication_range=hears)
+    rooms = generate_map(seed, kind="rooms")
+    team = Team.homogeneous(robots, communication_range=hears)
     start = rooms.start(None).sample(robots, seed=0, radius=0.1)
-    some, walked, before = Simulation(rooms, make_controller(name), start, team), 0.0, start
+    some = Simulation(rooms, make_controller(name), start, team)
+    walked = 0.0
+    before = start
     while some.time < 60.0:
         some.step()
         walked += float(np.hypot(*(some.positions - before).T).mean())
@@ -90,7 +97,8 @@ def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, float]:
     """Return gap, when the team came to rest (s, or nan), and mean way (m) of 120 s on a map of the suite."""
-    rooms, team = suite.load_suite_map(on), Team.homogeneous(suite.TEAM_SIZE, **changes)
+    rooms = suite.load_suite_map(on)
+    team = Team.homogeneous(suite.TEAM_SIZE, **changes)
     start = rooms.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
     record = Simulation(rooms, make_controller(name), start, team).run(120.0)
     cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
@@ -106,7 +114,8 @@ def ranges(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
         tables = [list(pool.map(partial(ended, each, changes=changes), maps)) for each in (name, "rapf")]
         (gaps, rest, ways), (others, _, theirs) = (np.transpose(each) for each in tables)
         behind = [each for each, mine, its in zip(maps, gaps, others, strict=True) if mine > its]
-        above, still = (gaps > 0.05).sum(), np.isfinite(rest).mean()
+        above = (gaps > 0.05).sum()
+        still = np.isfinite(rest).mean()
         yield (
             f"{changes or 'all hear all, see 3 m'}: gap {np.median(gaps):.1%} (worst {gaps.max():.0%}; "
             f"{above} of {len(maps)} above 5 %), {still:.0%} at rest by 120 s, way {np.median(ways):.1f} m; "
@@ -145,7 +154,8 @@ def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     for n in SIZES:
         side = 10.0 * max(1.0, math.sqrt(n / 6.0))
         rooms = generate_map(7, kind="polygons", side=side, obstacles=max(6, n))
-        start, took = rooms.start("uniform").sample(n, seed=0, radius=0.1), []
+        start = rooms.start("uniform").sample(n, seed=0, radius=0.1)
+        took = []
         for each in (name, "rapf"):
             some = Simulation(rooms, make_controller(each), start)
             some.step()
@@ -162,7 +172,8 @@ def world(seed: int) -> tuple[Environment, np.ndarray]:
 
     32 robots in a square of 1024 m without obstacles, with 32 places of interest.
     """
-    rng, side = np.random.default_rng(seed), 1024.0
+    rng = np.random.default_rng(seed)
+    side = 1024.0
     peaks = [
         Gaussian(tuple(rng.uniform(0.0, side, 2).tolist()), rng.uniform(6.0, 10.0), rng.uniform(40.0, 60.0))
         for _ in range(32)
@@ -178,7 +189,8 @@ def remaining(name: str, seed: int) -> float:
     team = Team.homogeneous(
         32, radius=1.0, max_speed=5.0, max_acceleration=10.0, sensing_range=32.0, communication_range=128.0
     )
-    some, cost = Simulation(field, make_controller(name), start, team), CoverageCost(field, 128)
+    some = Simulation(field, make_controller(name), start, team)
+    cost = CoverageCost(field, 128)
     while some.time < 120.0:
         some.step()
     weights = field.density.evaluate(cost.points)

@@ -32,7 +32,8 @@ def by_brute_force(environment, robots):
     def placed(points):
         return [p for p in points.tolist() if brute.is_well_placed(environment.free, tuple(p), SIDE)]
 
-    robots, points = placed(robots)[:3], placed(cost.points)
+    robots = placed(robots)[:3]
+    points = placed(cost.points)
     if not robots or not points:
         return 0.0
     expected = brute.compute_distances(environment.free, robots, points).min(axis=0)
@@ -45,7 +46,10 @@ def by_brute_force(environment, robots):
 def main(seconds: float, seed: int) -> None:
     """Print the largest errors so far, now and then."""
     names = sorted(KINDS)
-    worst, slow_worst, maps, slow_maps = 0.0, 0.0, 0, 0
+    worst = 0.0
+    slow_worst = 0.0
+    maps = 0
+    slow_maps = 0
     until = said = time.monotonic()
     until += seconds
     try:
@@ -53,7 +57,9 @@ def main(seconds: float, seed: int) -> None:
             seed += 1
             rng = np.random.default_rng(seed)
             kind = names[seed % len(names)]
-            count, lattice, robots = rng.integers(1, 50), int(rng.integers(1, 40)), int(rng.integers(1, 80))
+            count = rng.integers(1, 50)
+            lattice = int(rng.integers(1, 40))
+            robots = int(rng.integers(1, 80))
             environment = build_random_map(kind, int(count), seed)
             if environment is None:
                 continue

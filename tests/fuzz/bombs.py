@@ -48,7 +48,8 @@ def _tilesets(tiles: int, count: int) -> Case:
 
 def _tile_shapes() -> Case:
     """Return a map of Tiled of 250,000 tiles of 20,000 kinds, each of which has a shape of its own."""
-    size, kinds = 500, 20_000
+    size = 500
+    kinds = 20_000
     shape = "<objectgroup><object width='4' height='8'/></objectgroup>"
     tiles = "".join(f'<tile id="{k}">{shape}</tile>' for k in range(kinds))
     ids = struct.pack(f"<{size * size}I", *(k % kinds + 1 for k in range(size * size)))

@@ -155,7 +155,8 @@ def lines(count: int) -> bytes:
     side = math.isqrt(count) + 1
     text = ["0", "SECTION", "2", "ENTITIES"]
     for k in range(count):
-        x, y = 2 * (k % side), 2 * (k // side)
+        x = 2 * (k % side)
+        y = 2 * (k // side)
         text += ["0", "LINE", "8", "walls", "10", f"{x}", "20", f"{y}", "11", f"{x + 1}", "21", f"{y + 0.5}"]
     return "\n".join([*text, "0", "ENDSEC", "0", "EOF", ""]).encode()
 

@@ -126,7 +126,8 @@ def _study(path: Path, job: dict[str, Any]) -> str:
 def _check(path: Path, job: dict[str, Any]) -> str:
     from robocov_app.cli import main as command
 
-    out, err = io.StringIO(), io.StringIO()
+    out = io.StringIO()
+    err = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = command(["check", str(path), *job["options"].get("words", ())])
     lines = err.getvalue().splitlines()

@@ -232,7 +232,8 @@ def _changed_plain(content: bytes, random: Random) -> bytes:
 
 
 def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
-    found, at = [], 8
+    found = []
+    at = 8
     while at + 12 <= len(content):
         length = int.from_bytes(content[at : at + 4], "big")
         found.append((content[at + 4 : at + 8], content[at + 8 : at + 8 + length]))

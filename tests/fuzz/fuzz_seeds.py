@@ -127,7 +127,8 @@ _DXF = [
 
 def png(rows: list[list[int]], depth: int = 8) -> bytes:
     """Return a gray picture of one channel as PNG."""
-    width, height = len(rows[0]), len(rows)
+    width = len(rows[0])
+    height = len(rows)
     size = {8: "B", 16: "H"}[depth]
     raw = b"".join(b"\0" + struct.pack(f">{width}{size}", *row) for row in rows)
     header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)

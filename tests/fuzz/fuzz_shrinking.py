@@ -44,12 +44,15 @@ def _less(
     parts = split(case.files[name])
     size = max(len(parts) // 2, 1)
     while parts and time.monotonic() < deadline:
-        at, gone = 0, False
+        at = 0
+        gone = False
         while at < len(parts) and time.monotonic() < deadline:
             fewer = parts[:at] + parts[at + size :]
             smaller = case.with_file(name, b"".join(fewer))
             if fails(smaller):
-                case, parts, gone = smaller, fewer, True
+                case = smaller
+                parts = fewer
+                gone = True
             else:
                 at += size
         if size == 1 and not gone:

@@ -151,7 +151,8 @@ class Tally:
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in sorted(self.counts.items()))
-        total, ways = sum(self.counts.values()), len(self.kinds)
+        total = sum(self.counts.values())
+        ways = len(self.kinds)
         return f"{self.target:<10} {total} cases: {counts}; {ways} ways to end, slowest {self.slowest:.2f} s"
 
 

@@ -195,8 +195,10 @@ def is_well_placed(free: MultiPolygon, point: tuple[float, float], size: float) 
         for a, b in pairwise([tuple(map(Fraction, vertex)) for vertex in ring]):
             if p in (a, b) or is_strictly_on(a, b, p):
                 return True
-            ux, uy = b[0] - a[0], b[1] - a[1]
-            dx, dy = p[0] - a[0], p[1] - a[1]
+            ux = b[0] - a[0]
+            uy = b[1] - a[1]
+            dx = p[0] - a[0]
+            dy = p[1] - a[1]
             along = min(max((dx * ux + dy * uy) / (ux * ux + uy * uy), Fraction(0)), Fraction(1))
             distance = math.hypot(dx - along * ux, dy - along * uy)
             is_clear = is_clear and distance > 1e-9 * size

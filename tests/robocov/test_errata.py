@@ -87,7 +87,8 @@ def list_edges(ring: np.ndarray) -> list[tuple[tuple[float, float], tuple[float,
 
 def test_the_second_integral_of_equation_18_has_the_other_sign() -> None:
     """The double integral of (15) over each edge is the difference of the two integrals, not their sum."""
-    px, py = 1.7, 1.2
+    px = 1.7
+    py = 1.2
     h = 0.9
     errors_of_sum = []
     for a, b in list_edges(PENTAGON.vertices):

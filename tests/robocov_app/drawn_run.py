@@ -50,7 +50,8 @@ def record_walk(
     part = np.linspace(0.0, 1.0, steps)[:, None, None]
     side = np.random.default_rng(seed).normal(size=(1, n, 2)) * 0.3
     positions = begin + (end - begin) * part + side * np.sin(np.pi * part)
-    low, high = environment.region.vertices.min(axis=0), environment.region.vertices.max(axis=0)
+    low = environment.region.vertices.min(axis=0)
+    high = environment.region.vertices.max(axis=0)
     positions = np.clip(positions, low + 0.1, high - 0.1)
     time = np.arange(steps) * 0.1
     nothing = np.full_like(positions, np.nan)

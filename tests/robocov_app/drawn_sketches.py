@@ -170,8 +170,11 @@ def changes(draw, sketch):
     selection = draw(selections(sketch))
     owners = [*(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
     owner = draw(st.sampled_from(owners)) if owners else BOUNDARY
-    a, b = draw(places), draw(places)
-    length, dx, dy = draw(_SOME_LENGTHS), draw(_SHIFTS), draw(_SHIFTS)
+    a = draw(places)
+    b = draw(places)
+    length = draw(_SOME_LENGTHS)
+    dx = draw(_SHIFTS)
+    dy = draw(_SHIFTS)
     degrees = draw(st.sampled_from([90.0, -45.0, 30.0, 7.3, 180.0]))
     factor = draw(st.sampled_from([0.5, 2.0, -1.0, 1.37]))
     side = draw(st.sampled_from(transform.SIDES))

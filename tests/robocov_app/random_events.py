@@ -219,7 +219,8 @@ class RandomEvents:
             self.post(pygame.KEYDOWN, **content)
             if content["unicode"]:
                 self.post(pygame.TEXTINPUT, text=content["unicode"])
-        code, mod = self.random.choice(STRANGE_KEYS), self.random.randrange(2**15)
+        code = self.random.choice(STRANGE_KEYS)
+        mod = self.random.randrange(2**15)
         self.post(pygame.KEYDOWN, key=code, mod=mod, unicode="\x00", scancode=0)
 
     def type_text(self) -> None:
@@ -255,7 +256,8 @@ class RandomEvents:
         return self.random.randint(-10, width + 10), self.random.randint(-10, height + 10)
 
     def move(self) -> None:
-        before, self.at = self.at, self.choose_place()
+        before = self.at
+        self.at = self.choose_place()
         rel = self.at[0] - before[0], self.at[1] - before[1]
         buttons = tuple(int(k in self.held) for k in (1, 2, 3))
         self.post(pygame.MOUSEMOTION, pos=self.at, rel=rel, buttons=buttons, touch=False)
@@ -278,7 +280,8 @@ class RandomEvents:
 
     def touch(self) -> None:
         kind = self.random.choice((pygame.FINGERDOWN, pygame.FINGERMOTION, pygame.FINGERUP))
-        x, y = self.random.uniform(-1, 2), self.random.uniform(-1, 2)
+        x = self.random.uniform(-1, 2)
+        y = self.random.uniform(-1, 2)
         self.post(kind, touch_id=0, finger_id=1, x=x, y=y, dx=0.1, dy=math.nan, pressure=1.0)
         self.post(pygame.MULTIGESTURE, touch_id=0, x=x, y=y, pinched=math.inf, rotated=0.1, num_fingers=2)
 

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+FREE = 254
+UNKNOWN = 205
+OCCUPIED = 0
 """What map savers write."""
 
 PLAN = """

@@ -15,7 +15,9 @@ class SubPathProxy(ThreadingTCPServer):
 
     def __init__(self, port: int) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.behind, self.rate, self.lines = port, 0.0, list[Any]()
+        self.behind = port
+        self.rate = 0.0
+        self.lines = list[Any]()
         Thread(target=self.serve_forever, daemon=True).start()
 
     def link(self, link: str) -> str:

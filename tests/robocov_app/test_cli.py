@@ -266,7 +266,8 @@ def test_any_words_end_in_an_answer_or_one_line(
     last = {"run": ["--out", str(taken)], "compare": ["--out", str(taken)], "import": ["-o", str(taken)]}.get(
         command, []
     )
-    out, err = io.StringIO(), io.StringIO()
+    out = io.StringIO()
+    err = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = main([command, *words, *last])
     assert status in (0, 2), err.getvalue()

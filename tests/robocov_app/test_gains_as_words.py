@@ -154,7 +154,8 @@ def test_values_of_words_are_told_where_they_are_many() -> None:
 
 
 def test_words_have_even_places_and_no_line_between_them() -> None:
-    places, values = np.repeat([0.0, 1.0, 2.0], 4), np.arange(12.0)
+    places = np.repeat([0.0, 1.0, 2.0], 4)
+    values = np.arange(12.0)
     words = ("centroid", "sensing", "median")
     row = GainResults("RAPF", choose_controller_styles(["rapf"])["rapf"], places, values)
     axes = plot_gains([row], "target", (420, 290), "cost", words).axes[0]
@@ -170,10 +171,8 @@ def test_words_have_even_places_and_no_line_between_them() -> None:
 
 
 def test_laws_of_the_window_say_words() -> None:
-    before, after = (
-        ControllerChoice("rapf"),
-        ControllerChoice("rapf", {"target": "median", "attraction_limit": None}),
-    )
+    before = ControllerChoice("rapf")
+    after = ControllerChoice("rapf", {"target": "median", "attraction_limit": None})
     assert after.describe_changes(before) == "attraction_limit = no limit, target = median"
     assert after.description == "RAPF, target median, attraction_limit no limit"
     with pytest.raises(ParameterError, match="unknown choice 'mediam'"):

@@ -63,7 +63,8 @@ def executed(tmp_path_factory):
         specs = KernelSpecManager(kernel_dirs=[str(spec.parent)], ensure_native_kernel=False)
         manager = AsyncKernelManager(kernel_name="robocov", kernel_spec_manager=specs)
         if os.name == "posix":  # no ports, and paths short enough for sockets
-            manager.transport, manager.ip = "ipc", str(Path(short_folder) / "kernel")
+            manager.transport = "ipc"
+            manager.ip = str(Path(short_folder) / "kernel")
         notebook = nbformat.read(NOTEBOOK, as_version=4)
         # in its cells, too, warnings are errors; those of Jupyter's own start are not ours
         notebook.cells.insert(0, nbformat.v4.new_code_cell("import warnings\nwarnings.simplefilter('error')"))

@@ -208,9 +208,11 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
         Position on the axis for "no limit"; None if no gain is without limit.
     """
     levels = np.unique(gains[np.isfinite(gains)])
-    low, high = 0.0, 0.0
+    low = 0.0
+    high = 0.0
     if len(levels):
-        low, high = float(levels[0]), float(levels[-1])
+        low = float(levels[0])
+        high = float(levels[-1])
     has_unlimited = bool(np.isnan(gains).any())
     is_logarithmic = len(levels) > 1 and low > 0 and high / low >= _MIN_LOG_RATIO
     if is_logarithmic:

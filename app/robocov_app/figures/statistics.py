@@ -220,7 +220,8 @@ def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval
     failures = (1.0 - estimate) * trials
     sides = 2.0 if successes and failures else 1.0
     tail = (1.0 - CONFIDENCE_LEVEL) / sides
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     if successes:
         low = float(betaincinv(successes, failures + 1.0, tail))
     if failures:

@@ -346,7 +346,8 @@ class Episode:
             self.coverage = coverage or self._evaluate_cost(self.time, self.cycle, self._available)
         remaining = self._available & previously_available
         if remaining.any():
-            before, after = previous_coverage, self.coverage
+            before = previous_coverage
+            after = self.coverage
             if has_changed:
                 before, after = self._compare_costs(remaining)
             shares[remaining] = self._share_change(before, after)

@@ -47,7 +47,8 @@ def clip_polygon(corners: Array) -> list[Array]:
         return []
     if is_within_limit(corners):
         return [corners]
-    low, high = -MAX_DRAWN_PX, MAX_DRAWN_PX
+    low = -MAX_DRAWN_PX
+    high = MAX_DRAWN_PX
     clipped = shapely.clip_by_rect(shapely.Polygon(corners), low, low, high, high)
     polygons = [part for part in shapely.get_parts(clipped) if isinstance(part, shapely.Polygon)]
     return [np.asarray(polygon.exterior.coords)[:-1] for polygon in polygons if not polygon.is_empty]
@@ -65,8 +66,10 @@ def clip_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
     sequence of (float, float), px
         The two ends of the visible part; empty if the whole segment is outside.
     """
-    (x1, y1), (x2, y2) = start, end
-    low, high = -MAX_DRAWN_PX, MAX_DRAWN_PX
+    x1, y1 = start
+    x2, y2 = end
+    low = -MAX_DRAWN_PX
+    high = MAX_DRAWN_PX
     if max(abs(x1), abs(y1), abs(x2), abs(y2)) <= high:
         return start, end
     if min(x1, x2) > high or max(x1, x2) < low or min(y1, y2) > high or max(y1, y2) < low:

@@ -133,7 +133,8 @@ def _format_team_parameter(key: str, value: Any) -> str:
         return f"{label} without limit"
     if not all(isinstance(item, int | float) for item in values):
         return ""
-    low, high = min(values), max(values)
+    low = min(values)
+    high = max(values)
     unit = UNITS[name]
     if low == high:
         return f"{label} {low:.4g} {unit}"

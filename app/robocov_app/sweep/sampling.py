@@ -49,7 +49,8 @@ class Range:
             m values, rounded to six significant digits.
         """
         if self.scale == "log":
-            low, high = math.log(self.low), math.log(self.high)
+            low = math.log(self.low)
+            high = math.log(self.high)
             exact = np.exp(low + (high - low) * fractions)
         else:
             exact = self.low + (self.high - self.low) * fractions

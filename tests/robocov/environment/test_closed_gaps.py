@@ -82,7 +82,9 @@ def test_niches_stay_open(obstacles: tuple[Obstacle, ...]) -> None:
 
 def test_paths_lead_around_a_box_near_the_wall() -> None:
     hall = build_hall(build_box(4.0, 0.05, 5.0, 2.0))
-    left, right, slot = [3.9, 0.02], [5.1, 0.02], [4.5, 0.02]
+    left = [3.9, 0.02]
+    right = [5.1, 0.02]
+    slot = [4.5, 0.02]
     distances = Geodesics(hall.close_gaps(RADIUS_M)).compute_distances([left], [right, slot])
     assert distances[0, 0] > 4.0
     # The slot below the box is a niche that is open on one side.

@@ -23,7 +23,8 @@ def simulate_walks(state: np.ndarray, row: int, column: int, seed: int, count: i
     rows, columns = state.shape
     free_ends = 0
     for _ in range(count):
-        r, c = row, column
+        r = row
+        c = column
         while state[r, c] == UNKNOWN:
             neighbors = [(r, c + 1), (r + 1, c), (r, c - 1), (r - 1, c)]
             neighbors = [(i, j) for i, j in neighbors if 0 <= i < rows and 0 <= j < columns]

@@ -41,8 +41,10 @@ class Clock:
 
 
 def test_calls_alternate_and_have_median_times():
-    clock, order = Clock(), []
-    slow, quick = clock.work(9.0, 3.0, 1.0, 2.0), clock.work(9.0, 0.5, 0.25, 1.5)
+    clock = Clock()
+    order = []
+    slow = clock.work(9.0, 3.0, 1.0, 2.0)
+    quick = clock.work(9.0, 0.5, 0.25, 1.5)
 
     def noted(name, call):
         order.append((name, gc.isenabled()))
@@ -61,7 +63,8 @@ def test_calls_alternate_and_have_median_times():
 def test_rounds_continue_until_the_minimum_time():
     clock = Clock()
     for least, seconds, rounds in ((2, 6.5, 7), (5, 2.0, 5)):
-        made, work = [], clock.work(*[1.0] * 20)
+        made = []
+        work = clock.work(*[1.0] * 20)
         measure_interleaved({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
         assert len(made) == 1 + rounds
 

@@ -26,7 +26,8 @@ def line(law: str, track: str) -> str:
         medians[name] = np.median(gaps)
     above = sum(median > 0.05 for median in medians.values())
     touched = sum(row["contacts"] > 0 for row in rows)
-    gap, way = 100.0 * rating.gap.estimate, rating.compute_median("path_length_m")
+    gap = 100.0 * rating.gap.estimate
+    way = rating.compute_median("path_length_m")
     cells = f"{gap:.1f}", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
     rest = 100.0 * rating.compute_rest()[0]
     return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} | {way:.1f} |"

@@ -54,7 +54,8 @@ def test_every_option_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder, sheet = tmp_path / "new" / "maps", tmp_path / "sheet.png"
+    folder = tmp_path / "new" / "maps"
+    sheet = tmp_path / "sheet.png"
     words = ["generate", "--kind", "mazes", "--count", "4", "--seed", "8", "--out", str(folder)]
     assert main([*words, "--plot", str(sheet), "--theme", "dark"]) == 0
     said = capsys.readouterr()
@@ -70,7 +71,8 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["generate", "--count", "2", "--out", str(tmp_path), "--overwrite"]
-    other, mine = tmp_path / "other.json", tmp_path / "polygons-1.json"
+    other = tmp_path / "other.json"
+    mine = tmp_path / "polygons-1.json"
     other.write_text("mine")
     assert main([*words, "--gap", "0.5"]) == 0
     assert main(words) == 0

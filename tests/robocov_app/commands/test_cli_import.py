@@ -24,7 +24,8 @@ def run_command(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
 
 def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
-    out, picture = tmp_path / "out.json", tmp_path / "seen.png"
+    out = tmp_path / "out.json"
+    picture = tmp_path / "seen.png"
     lines = run_command(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
     assert lines == [
         "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",

@@ -115,7 +115,8 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
 
 @pytest.mark.slow
 def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    light, dark = tmp_path / "light.png", tmp_path / "dark.png"
+    light = tmp_path / "light.png"
+    dark = tmp_path / "dark.png"
     assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
     assert main(["optimum", "trap", *FAST, "--plot", str(dark), "--theme", "dark"]) == 0
     again = light.read_bytes()

@@ -93,7 +93,8 @@ def test_overwrite_removes_only_the_earlier_result(
 def test_an_obstructed_result_keeps_the_earlier_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
+    out = tmp_path / "run"
+    elsewhere = tmp_path / "elsewhere"
     words = ("run", "square", *SHORT, "--video", "--frames", "--out", str(out), "--overwrite")
     answer(capsys, "run", "square", *SHORT, "--out", str(out))
     elsewhere.mkdir()
@@ -196,7 +197,8 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
 def test_a_class_that_fails_is_named_with_its_line(
     body: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    mine, out = tmp_path / "mine.py", tmp_path / "run"
+    mine = tmp_path / "mine.py"
+    out = tmp_path / "run"
     base = "class Base:\n def begin(self, region, team): pass\n def decide(self, seen, memory): pass\n"
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")

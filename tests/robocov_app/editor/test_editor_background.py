@@ -19,9 +19,11 @@ PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
 
 
 def find_pixel(background: Background, position):
-    dx, dy = position[0] - background.corner[0], position[1] - background.corner[1]
+    dx = position[0] - background.corner[0]
+    dy = position[1] - background.corner[1]
     cos, sin = compute_cos_sin(background.rotation_deg)
-    x, y = cos * dx + sin * dy, cos * dy - sin * dx
+    x = cos * dx + sin * dy
+    y = cos * dy - sin * dx
     return x / background.scale, background.pixels[1] - y / background.scale
 
 
@@ -84,7 +86,8 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 @given(backgrounds, st.tuples(st.integers(0, 99), st.integers(0, 99)), st.sampled_from([0.1, 2.5, 40.0]))
 def test_scaling_gives_two_points_the_given_distance(background, offset, meters):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
-    a, b = background.to_world((0, 0)), background.to_world((offset[0] + 5, offset[1]))
+    a = background.to_world((0, 0))
+    b = background.to_world((offset[0] + 5, offset[1]))
     pixel_a = find_pixel(background, a)
     pixel_b = find_pixel(background, b)
     scaled = scale_to_length(background, a, b, meters)
@@ -107,7 +110,8 @@ def test_impossible_scales_raise_a_map_error():
 @given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))
 def test_leveling_makes_two_points_horizontal_or_vertical(background, offset):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
-    a, b = background.to_world((0, 0)), background.to_world(offset)
+    a = background.to_world((0, 0))
+    b = background.to_world(offset)
     level = level_background(background, a, b)
     start = level.to_world((0, 0))
     end = level.to_world(offset)

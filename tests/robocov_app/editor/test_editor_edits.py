@@ -145,7 +145,8 @@ def collect_shapes(sketch: Sketch) -> shapely.Geometry:
 
 def distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
     """Return the largest distance between corresponding vertices."""
-    first, second = shapely.get_coordinates(a), shapely.get_coordinates(b)
+    first = shapely.get_coordinates(a)
+    second = shapely.get_coordinates(b)
     assert len(first) == len(second)
     return float(np.abs(first - second).max())
 

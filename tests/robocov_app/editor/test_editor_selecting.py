@@ -211,10 +211,8 @@ def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(driver: EditorDrive
 
 
 def test_clicking_again_selects_the_object_below(tmp_path: Path) -> None:
-    lower, upper = (
-        PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6))),
-        PolygonObstacle(((2, 2), (4, 2), (4, 4))),
-    )
+    lower = PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6)))
+    upper = PolygonObstacle(((2, 2), (4, 2), (4, 4)))
     with open_editor(tmp_path, sheet(lower, upper)) as driver:
         driver.click_all((3.5, 2.5))
         assert driver.editor.selection == Selection.of(1)

@@ -88,7 +88,8 @@ def test_the_nearest_vertices_and_edges_are_found(sketch, point, reach):
     else:
         assert math.dist(point, edge.point) == pytest.approx(nearest, abs=1e-9)
         ring = sketch.list_vertex_rings(edge.owner)[edge.ring]
-        a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
+        a = ring[edge.index]
+        b = ring[(edge.index + 1) % len(ring)]
         assert shapely.LineString([a, b]).distance(shapely.Point(edge.point)) < 1e-9
 
 

@@ -163,7 +163,8 @@ def test_inserting_on_an_edge_keeps_the_shape(data):
     ]
     edge = data.draw(st.sampled_from(edges))
     ring = sketch.list_vertex_rings(edge.owner)[edge.ring]
-    a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
+    a = ring[edge.index]
+    b = ring[(edge.index + 1) % len(ring)]
     middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
     change = vertices.insert_vertex(sketch, replace(edge, point=middle))
     (new,) = change.selection.vertices

@@ -77,7 +77,8 @@ def test_maps_of_different_sizes_are_compared_at_one_scale():
 def test_the_arena_is_not_distorted(environment):
     axes = plot_trajectories(record_walk(environment, 3), size=(1000, 800)).axes[0]
     box = axes.get_window_extent()
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    left, right = axes.get_xlim()
+    low, high = axes.get_ylim()
     assert box.width / (right - left) == pytest.approx(box.height / (high - low))
 
 
@@ -268,7 +269,8 @@ class TestCost:
         assert len(dashes) == len(marks) == 4
 
     def test_the_style_of_a_controller_does_not_depend_on_others(self):
-        time, values = T, 1.0 + np.exp(-T)
+        time = T
+        values = 1.0 + np.exp(-T)
         lloyd = TimeCurve("LA", "lloyd", time, values)
         alone = plot_cost([lloyd]).axes[0].lines
         among = plot_cost([TimeCurve("mine", "mine", time, values), lloyd]).axes[0].lines

@@ -76,7 +76,8 @@ def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
     assert len(maps) == count
     for axes in maps:
         box = axes.get_window_extent()
-        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        left, right = axes.get_xlim()
+        low, high = axes.get_ylim()
         assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-4)
 
 
@@ -128,7 +129,8 @@ def test_the_colors_are_those_of_the_scale(theme, tmp_path):
 
 
 def test_all_maps_are_in_one_scale_of_colors():
-    near, far = build_snapshot(ROOMS, n=12), build_snapshot(ROOMS, n=1)
+    near = build_snapshot(ROOMS, n=12)
+    far = build_snapshot(ROOMS, n=1)
     figure = plot_coverage([], [near, far])
     (bar,) = [axes for axes in figure.axes if axes.axison]
     assert bar.get_xlim()[1] == choose_color_limit(far.field.max_distance) > near.field.max_distance

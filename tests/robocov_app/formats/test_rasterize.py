@@ -45,7 +45,8 @@ def test_a_cell_is_covered_where_its_center_is(
 def test_rooms_that_share_a_wall_share_no_cell() -> None:
     # centers lie on the common edge: each belongs to just one
     grid = CellGrid(4, 4, 1.0, (0.0, 0.0))
-    left, right = shapely.box(0, 0, 1.5, 4), shapely.box(1.5, 0, 4, 4)
+    left = shapely.box(0, 0, 1.5, 4)
+    right = shapely.box(1.5, 0, 4, 4)
     both = grid.find_covered_cells(left).astype(int) + grid.find_covered_cells(right)
     assert both.tolist() == [[1] * 4] * 4
     slanted = Polygon([(0, 0), (4, 0), (4, 4)]), Polygon([(0, 0), (4, 4), (0, 4)])

@@ -190,7 +190,8 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
     assert shapely.distance(outline.boundary, corners).max() <= tolerance * (1 + 1e-6) + CELL / 16
     assert abs(result.area - outline.area) <= 0.02 * outline.area + 1e-9
     # two places that a robot of just this size goes between are connected afterwards
-    before, after = find_rooms(outline, radius * 1.0001), shapely.union_all(find_rooms(result, radius * 0.99))
+    before = find_rooms(outline, radius * 1.0001)
+    after = shapely.union_all(find_rooms(result, radius * 0.99))
     parts = shapely.get_parts(after)
     for room in before:
         if room.area < 4 * radius * radius:

@@ -87,7 +87,8 @@ def test_arcs_satisfy_the_equation_of_their_ellipse(
     if chord >= 2.0:  # it has to grow
         flat = flat * (2.0 / chord)
         chord = 2.0
-    a, b = flat[0], flat[-1]
+    a = flat[0]
+    b = flat[-1]
     height = math.sqrt(max(1.0 - chord**2 / 4, 0.0))
     across = np.array([a[1] - b[1], b[0] - a[0]]) / chord
     center = (a + b) / 2 + across * height * (1 if large != clockwise else -1)

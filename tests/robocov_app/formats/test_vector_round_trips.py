@@ -67,7 +67,8 @@ _SIZE = st.integers(10, 300).map(lambda n: n / 100)
 
 def _block(x: float, y: float, width: float, height: float, hole: bool) -> PolygonObstacle:
     outer = ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
-    a, b = x + width / 4, y + height / 4
+    a = x + width / 4
+    b = y + height / 4
     inner = ((a, b), (a + width / 2, b), (a + width / 2, b + height / 2))
     return PolygonObstacle(outer, (inner,) if hole else (), "<desk> & 'chair'")
 

@@ -28,7 +28,8 @@ def test_limits_are_what_has_an_effect() -> None:
 @pytest.mark.parametrize("action", ACTIONS)
 def test_an_action_is_found_of_its_force(action: str) -> None:
     rng = np.random.default_rng(0)
-    values, velocities = rng.normal(size=(2, 2)), rng.normal(size=(2, 2))
+    values = rng.normal(size=(2, 2))
+    velocities = rng.normal(size=(2, 2))
     forces = compute_driving_forces(action, values, velocities, TEAM)
     np.testing.assert_allclose(compute_actions(action, forces, velocities, TEAM), values, rtol=1e-12)
 

@@ -19,7 +19,8 @@ def test_the_example_learns(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     exec(dedent(few.replace("range(10, 14)", "range(10, 12)")), names)
     told = capsys.readouterr().out.split()
-    median, best = float(told[1]), float(told[-1])
+    median = float(told[1])
+    best = float(told[-1])
     assert best > median + 1.0
     assert best > 1.0
     assert len(names["returns"]) == 5 and np.ptp(names["returns"]) > 2.0

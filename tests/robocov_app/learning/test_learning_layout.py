@@ -47,7 +47,8 @@ def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float
         else:
             row += [0.0] * 3
     if layout.rays:
-        distances, hit = seen.scans.distances[robot], seen.scans.hit[robot]
+        distances = seen.scans.distances[robot]
+        hit = seen.scans.hit[robot]
         row += [d / 2.0 if h else 1.0 for d, h in zip(distances, hit, strict=True)]
     if layout.centroid:
         row += [*(partition(seen.positions, REGION, seen.neighbors).centroid[robot] - [x, y]) / 10.0]
@@ -82,7 +83,8 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     rng = np.random.default_rng(seed)
     positions = rng.uniform((0, 0), (8, 6), size=(n, 2))
     seen = seen_at(positions, reach, seed, rays=6)
-    layout, team = ObservationLayout(3, 6, True), Team.homogeneous(n, communication_range=reach)
+    layout = ObservationLayout(3, 6, True)
+    team = Team.homogeneous(n, communication_range=reach)
     i = int(rng.integers(n))
     before = layout.build_rows(seen, team)[i]
     heard = np.zeros(n, dtype=bool)
@@ -95,7 +97,8 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     other = seen_at(moved, reach, seed + 1, rays=6)
     for name in ("velocities", "obstacle_points"):
         getattr(other, name)[i] = getattr(seen, name)[i]
-    other.scans.distances[i], other.scans.hit[i] = seen.scans.distances[i], seen.scans.hit[i]
+    other.scans.distances[i] = seen.scans.distances[i]
+    other.scans.hit[i] = seen.scans.hit[i]
     assert layout.build_rows(other, team)[i].tobytes() == before.tobytes()
 
 

@@ -28,7 +28,8 @@ def places(environment: Environment, seed: int, n: int = 4) -> np.ndarray:
 def test_parts_sum_up_to_the_decrease(cost: CoverageCost, seed: int) -> None:
     begin = places(cost.environment, seed)
     moved = begin + np.random.default_rng(seed).uniform(-0.1, 0.1, size=begin.shape)
-    before, after = cost(begin), cost(moved)
+    before = cost(begin)
+    after = cost(moved)
     decrease = before.mean_distance - after.mean_distance
     assert share_reward("shared", before, after, 0.1).tolist() == [decrease] * 4
     assert share_reward("own", before, after, 0.1).sum() == pytest.approx(decrease, abs=1e-12)
@@ -41,7 +42,8 @@ def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
     for robot in range(4):
         moved = begin.copy()
         moved[robot] += 0.02, 0.01
-        before, after = cost(begin), cost(moved)
+        before = cost(begin)
+        after = cost(moved)
         own = share_reward("own", before, after, 1.0)
         decrease = before.mean_distance - after.mean_distance
         assert abs(decrease) > 1e-5

@@ -46,7 +46,8 @@ def test_the_shading_covers_the_region(theme):
             build_density_scene(environment)
         )
     plain, heavy = frames.values()
-    peak, edge = get_pixel_color(painter, heavy, 3.0, 3.0), get_pixel_color(painter, heavy, 7.8, 7.8)
+    peak = get_pixel_color(painter, heavy, 3.0, 3.0)
+    edge = get_pixel_color(painter, heavy, 7.8, 7.8)
     background = np.array(theme.background)
     assert np.abs(peak - background).max() > 60
     assert np.abs(edge - background).max() <= 3

@@ -112,7 +112,8 @@ def test_fields_with_moving_obstacles_depend_on_time():
     crossed = Environment("crossed", SEALED.boundary, (CircleObstacle((2.0, 1.0), 0.8, path=path),))
     fields = DistanceFields(CoverageCost(crossed, 64), 5.0)
     robots = np.array([[1.0, 3.0], [2.0, 5.0]])
-    x, y = np.array([1.95, 2.05]), np.array([1.05, 0.95])
+    x = np.array([1.95, 2.05])
+    y = np.array([1.05, 0.95])
     assert fields.compute_at(robots).result.owner.max() == 1
     # at four seconds it stands on the second robot, where the other cannot be either
     later = fields.compute_at(robots, 4.0)
@@ -126,7 +127,8 @@ def test_no_distance_leaks_through_a_wall():
     cost = CoverageCost(SEALED, 64)
     field = DistanceFields(cost, 5.0).compute_at(np.array([[1.0, 1.0], [3.0, 5.0]]))
     x, y, _ = list_pixel_centers(SEALED)
-    distance, (owner, borders) = field.compute_distances(x, y), field.compute_cells(x, y, 0.1)
+    distance = field.compute_distances(x, y)
+    owner, borders = field.compute_cells(x, y, 0.1)
     closed = x > 6.15 + cost.spacing
     assert np.isinf(distance[:, closed]).all()
     assert (owner[:, closed] == -1).all()
@@ -188,7 +190,8 @@ def test_scales_end_at_round_lengths_not_far_beyond(distance):
 def test_levels_follow_the_distances_up_to_the_limit():
     cost = CoverageCost(ROOMS, 64)
     field = DistanceField(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
-    x, y = np.linspace(0.1, 15.9, 60), np.linspace(9.9, 0.1, 40)
+    x = np.linspace(0.1, 15.9, 60)
+    y = np.linspace(9.9, 0.1, 40)
     distance = field.compute_distances(x, y)
     level = compute_color_levels(field, x, y, 5.0, 9)
     assert (level[np.isfinite(distance)] <= MAX_LEVEL).all()

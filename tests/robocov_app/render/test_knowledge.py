@@ -77,7 +77,8 @@ class TestRayScan:
         away = np.hypot(columns - x, rows - y) / painter.scale
         ink = np.abs(frame - np.array(LIGHT.background)).max(axis=2)
         reach = 3.0 * painter.camera.zoom / painter.scale
-        near, far = ink[(away > 14) & (away < 30)], ink[(away > 0.7 * reach) & (away < 0.9 * reach)]
+        near = ink[(away > 14) & (away < 30)]
+        far = ink[(away > 0.7 * reach) & (away < 0.9 * reach)]
         assert near.mean() < 1.3 * far.mean()
         assert far.max() > np.median(far) + 10
         rim = ink[(away > 0.8 * reach - 0.5) & (away < 0.8 * reach + 0.5)]

@@ -265,7 +265,8 @@ class TestRobots:
         frame, painter = render_layers(scene, "robots")
         for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
             quarters = np.rint((pixel + 0.5) * sprites.FINENESS).astype(int)
-            (x, y), shift = quarters // sprites.FINENESS, tuple((quarters % sprites.FINENESS).tolist())
+            x, y = quarters // sprites.FINENESS
+            shift = tuple((quarters % sprites.FINENESS).tolist())
             fill = LIGHT.robots[painter._hues[robot]]
             misses = []
             for number in range(1, 10):
@@ -424,7 +425,8 @@ class TestTrajectories:
         assert (stepwise[far] == 255).all()
 
     def test_another_run_or_a_step_back_replaces_the_page(self):
-        first, second = record_walk(SQUARE, 5, seed=1), record_walk(SQUARE, 5, seed=2)
+        first = record_walk(SQUARE, 5, seed=1)
+        second = record_walk(SQUARE, 5, seed=2)
         painter = Painter(SQUARE, SIZE)
         painter.show_only({"trajectories"})
         painter.render_frame(build_row_scene(first))

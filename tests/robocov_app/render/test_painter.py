@@ -27,7 +27,8 @@ def test_a_frame_has_the_requested_size(size):
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_the_same_scene_gives_the_same_bytes(theme):
     scene = build_row_scene(record_walk(ROOMS, 12))
-    first, second = Painter(ROOMS, (800, 600), theme), Painter(ROOMS, (800, 600), theme)
+    first = Painter(ROOMS, (800, 600), theme)
+    second = Painter(ROOMS, (800, 600), theme)
     assert (
         first.render_frame(scene).tobytes()
         == second.render_frame(scene).tobytes()

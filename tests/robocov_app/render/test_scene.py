@@ -57,7 +57,8 @@ def test_a_scene_has_working_and_failed_robots_and_obstacles(record: Record) -> 
 def test_neighbors_are_renumbered(record: Record) -> None:
     scene = build_record_scene(record, 30)
     assert scene.snapshot is not None
-    whole, part = record.snapshot(30).seen.neighbors, scene.snapshot.seen.neighbors
+    whole = record.snapshot(30).seen.neighbors
+    part = scene.snapshot.seen.neighbors
     rows = np.array(scene.numbers) - 1
     robot, neighbor = whole.list_pairs()
     expected = set(zip(robot.tolist(), neighbor.tolist(), strict=True))
@@ -199,7 +200,9 @@ def test_more_than_so_many_are_not_remembered(monkeypatch):
     )
 )
 def test_the_first_point_in_each_square_is_known(steps):
-    sensed, time, kept = SensedPoints(), 0.0, []
+    sensed = SensedPoints()
+    time = 0.0
+    kept = []
     for seconds, points, back in steps:
         time += seconds
         sensed.add(time, range(len(points)), np.array(points).reshape(-1, 2))

@@ -26,7 +26,8 @@ def build_random_trail(rows, n=3, seed=0):
     """Return (rows, n, 2) m of smooth walks in the square."""
     rng = np.random.default_rng(seed)
     time = np.arange(rows)[:, None] / RATE
-    speed, phase = rng.uniform(0.2, 0.7, size=(2, n)), rng.uniform(0, 6, size=(2, n))
+    speed = rng.uniform(0.2, 0.7, size=(2, n))
+    phase = rng.uniform(0, 6, size=(2, n))
     return 4.0 + 3.0 * np.stack(
         [np.sin(time * speed[0] + phase[0]), np.cos(time * speed[1] + phase[1])], axis=2
     )
@@ -85,7 +86,8 @@ def count_pixels_off_paths(painter, trail, frame, theme=LIGHT, reach=3.0):
 class TestThinning:
     """A long run's trail loses every second of its older rows."""
 
-    rows, at = 120, 80
+    rows = 120
+    at = 80
 
     def thinned(self, trail):
         keep = np.concatenate([np.arange(0, self.at // 2, 2), np.arange(self.at // 2, len(trail))])
@@ -101,7 +103,8 @@ class TestThinning:
         for count in range(1, self.at + 1):
             render_trail(whole, trail[:count])
             render_trail(thin, trail[:count])
-        page, before = layer._page, layer._key
+        page = layer._page
+        before = layer._key
         for count in range(self.at + together, self.rows + 1):
             expected = render_trail(whole, trail[:count])
             seen = render_trail(thin, *self.thinned(trail[:count]))

@@ -33,8 +33,10 @@ MAPS = tuple("abcdefghijkl")
 OURS = build_contender("howard", {})
 """A contender in place of ours: goals can be judged for any."""
 
-RAPF, LLOYD = UNTUNED[1], UNTUNED[3]
-LARGE, HUGE = FULL.beyond.large, FULL.beyond.huge
+RAPF = UNTUNED[1]
+LLOYD = UNTUNED[3]
+LARGE = FULL.beyond.large
+HUGE = FULL.beyond.huge
 
 
 def build_outcomes(ours: float = 1.005, rapf: float = 1.05, lloyd: float = 1.08, **other: float) -> Outcomes:
@@ -162,7 +164,8 @@ def test_without_a_run_no_goal_is_judged():
 
 @given(st.lists(st.tuples(st.sampled_from("xyz"), st.floats(0.0, 2.0)), min_size=1, max_size=20))
 def test_the_worst_median_is_that_of_the_worst_map(rows):
-    maps, values = [name for name, _ in rows], np.array([value for _, value in rows])
+    maps = [name for name, _ in rows]
+    values = np.array([value for _, value in rows])
     found = estimate_maximum_over_maps(lambda drawn: np.median(values[drawn], axis=-1), maps)
     names = np.array(maps)
     assert found.estimate == pytest.approx(max(np.median(values[names == name]) for name in set(maps)))

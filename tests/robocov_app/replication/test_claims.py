@@ -35,7 +35,8 @@ from robocov_app.replication.results.outcomes import (
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
 STARTS = ("corner", "centre", "uniform")
-FEW, MANY = 11, 30
+FEW = 11
+MANY = 30
 
 
 def build_instances(maps: int, seeds: int = 2) -> tuple[ProblemInstance, ...]:

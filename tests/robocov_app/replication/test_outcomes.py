@@ -132,7 +132,8 @@ def test_the_mean_of_a_single_sample_is_its_value():
 
 def test_outcomes_are_joined_by_scenario(study, folder):
     whole = read_outcomes(folder, study, REFERENCES)
-    left, right = whole.select([True, True, False, False]), whole.select([False, False, True, True])
+    left = whole.select([True, True, False, False])
+    right = whole.select([False, False, True, True])
     again = merge_outcomes([left, right])
     assert again.instances == whole.instances
     for key, values in whole.values.items():

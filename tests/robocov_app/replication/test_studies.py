@@ -109,7 +109,8 @@ class TestMaps:
         assert environment.region.bounds == (0.0, 0.0, 10.0, 10.0)
 
     def test_the_same_density_is_drawn_again(self):
-        (first, *_), (again, *_) = study_maps.build_density_maps(QUICK), study_maps.build_density_maps(QUICK)
+        first = study_maps.build_density_maps(QUICK)[0]
+        again = study_maps.build_density_maps(QUICK)[0]
         assert first.environment == again.environment
         density = first.environment.density
         assert density is not None and not density.is_uniform
@@ -134,7 +135,8 @@ class TestMaps:
 
     def test_nearly_always_can_be_shown_on_the_maps_of_the_full_study(self):
         for count in (len(FULL.bundled + FULL.generated), len(CONVEX) + len(FULL.convex_generated)):
-            lows, p_values = [], []
+            lows = []
+            p_values = []
             for others in range(6):
                 there = estimate_fraction(np.arange(count) >= others, range(count))
                 lows.append(there.low)
@@ -177,7 +179,8 @@ class TestPaper:
             assert len({task.document for task in laws}) == 1
 
     def test_shared_gains_are_shared_and_the_papers_formula_is_not_limited(self):
-        rapf, rpf = RAPF_SHARED.all_gains, RPF_SHARED.all_gains
+        rapf = RAPF_SHARED.all_gains
+        rpf = RPF_SHARED.all_gains
         assert {name: rapf[name] for name in rpf} == rpf
         assert rapf["attraction_limit"] is None
         grids = studies.list_gain_sets(FULL)
@@ -199,7 +202,8 @@ class TestPaper:
         }
 
     def test_figures_4_and_6_begin_in_the_same_places_and_8_elsewhere(self):
-        first, second = load_map("blocks-a"), load_map("blocks-b")
+        first = load_map("blocks-a")
+        second = load_map("blocks-b")
         assert first.starts["paper"] == second.starts["paper"] != second.starts["other"]
         found = studies.build_figure_studies(TINY)
         assert found["figures-a"].starts == ("paper",)
@@ -207,7 +211,8 @@ class TestPaper:
         assert {len(study) for study in found.values()} == {2, 4}
 
     def test_figures_4_to_8_are_run_at_the_best_gains_from_the_same_places(self):
-        shared, best = studies.build_figure_studies(TINY), studies.build_figure_studies(TINY, PAPERS)
+        shared = studies.build_figure_studies(TINY)
+        best = studies.build_figure_studies(TINY, PAPERS)
         assert list(best) == ["figures-a-best", "figures-b-best"]
         for name, study in best.items():
             tasks = list(generate_tasks(study))
@@ -296,7 +301,8 @@ class TestBeyond:
 
     @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {*PAPER, *OURS}))
     def test_every_baseline_has_a_grid_and_its_defaults_are_in_it(self, name):
-        known, usual = get_gains(CONTROLLERS[name]), get_gain_values(make_controller(name))
+        known = get_gains(CONTROLLERS[name])
+        usual = get_gain_values(make_controller(name))
         sets = [
             {**usual, **{gain: known[gain].validate(value, "grid") for gain, value in gains.items()}}
             for gains in GAIN_GRIDS[name]

@@ -64,7 +64,8 @@ def small_parts():
 def study(tmp_path_factory):
     """The folder, what both parts gave, and the pictures of the paper's page."""
     with shared(tmp_path_factory, "tiny-paper") as root:
-        folder, kept = root / "out", root / "images"
+        folder = root / "out"
+        kept = root / "images"
         open_folder(folder, TINY)
         paper = parts.run_paper(folder, TINY, options())
         if not kept.exists():
@@ -197,12 +198,14 @@ class TestRuns:
             for case in ("convex", "a", "b", "other")
             for law in ("rapf", "lloyd" if case == "convex" else "rpf")
         }
-        other, same = paper.figures["other/rapf"].record, paper.figures["b/rpf"].record
+        other = paper.figures["other/rapf"].record
+        same = paper.figures["b/rpf"].record
         assert (other.start, same.start) == ("other", "paper")
         assert same.positions[0] == pytest.approx(paper.figures["a/rapf"].record.positions[0])
 
     def test_figures_4_to_8_show_the_best_gains_as_well(self, paper):
-        best, of = paper.best_figures, {each.key: each for each in paper.contenders}
+        best = paper.best_figures
+        of = {each.key: each for each in paper.contenders}
         assert set(best) == {f"{case}/{law}" for case in ("a", "b", "other") for law in ("rapf", "rpf")}
         for name, run in best.items():
             assert dict(run.record.gains) == of[f"{name.partition('/')[2]}-best"].all_gains

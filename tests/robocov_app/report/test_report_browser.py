@@ -126,7 +126,8 @@ def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
     opened.until(lambda: opened.time > 1.0)
     opened.find(".main").click()
     opened.until(lambda: not opened.playing)
-    after, at = opened.drawn(), opened.time
+    after = opened.drawn()
+    at = opened.time
     assert len(after) == 3 and all(old != new for old, new in zip(before, after, strict=True))
     time.sleep(0.2)
     assert opened.time == at and opened.drawn() == after

@@ -67,7 +67,8 @@ def test_speeds_are_embedded_for_cells_by_travel_time() -> None:
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=50))
 def test_quantized_numbers_are_accurate_to_half_a_step(values) -> None:
     array = np.array(values)
-    low, high = float(array.min()), float(array.max())
+    low = float(array.min())
+    high = float(array.max())
     back = dequantize(quantize(array, low, high), low, high)
     assert np.abs(back - array).max() <= 0.51 * (high - low) / (NO_NUMBER - 1) + 1e-12
 

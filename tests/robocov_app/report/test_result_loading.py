@@ -110,7 +110,8 @@ def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
         assert "</script> too far" in (run.error or "")
         assert run.figures == {} and np.isnan(run.final_distance)
     first = result.completed_runs[0]
-    record, history = result.read_record(first), result.read_history(first)
+    record = result.read_record(first)
+    history = result.read_history(first)
     assert record.seed == first.seed and record.environment.name == SQUARE.name
     assert history is not None and history.mean_distance[-1] == pytest.approx(first.final_distance)
 

@@ -90,7 +90,8 @@ class TestFrames:
     def test_the_mean_time_is_told_with_it(self):
         record = record_walk(SQUARE, 3, steps=21)
         options = {"size": (480, 240), "rows": np.array([10])}
-        time, mean = np.array([0.0]), np.array([3.0])
+        time = np.array([0.0])
+        mean = np.array([3.0])
         histories = [CostHistory(time, mean, mean, mean, other) for other in (None, mean, 2.0 * mean)]
         frames = [
             next(draw_frames(record, VideoSettings(), cost=each, **options)).tobytes() for each in histories
@@ -121,7 +122,8 @@ class TestSaveFrames:
         assert sorted(path.name for path in folder.iterdir()) == ["000000.png", "000001.png", "000002.png"]
 
     def test_a_full_disk_is_named_and_leaves_whole_frames_only(self, tmp_path, monkeypatch):
-        write, calls = Path.write_bytes, itertools.count()
+        write = Path.write_bytes
+        calls = itertools.count()
 
         def full(self, data):
             if next(calls) == 2:

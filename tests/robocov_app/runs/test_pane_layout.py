@@ -74,7 +74,8 @@ class TestLayout:
 
 class TestFrames:
     def test_the_longest_run_ends_it(self):
-        short, long = record_walk(ROOMS, 2, steps=11), record_walk(ROOMS, 2, steps=41)
+        short = record_walk(ROOMS, 2, steps=11)
+        long = record_walk(ROOMS, 2, steps=41)
         _, frames = film([short, long], size=(640, 300), speed=1.0)
         assert sum(1 for _ in frames) == len(select_frame_rows(long.time, 5))
 
@@ -83,7 +84,8 @@ class TestFrames:
         second = replace(first, positions=first.positions[:, ::-1] + 0.4)
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
-            style, layers = VideoSettings(fps=5), build_pane_layers("robots")
+            style = VideoSettings(fps=5)
+            layers = build_pane_layers("robots")
             cost = known(records[1])
             alone = draw_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale

@@ -91,7 +91,8 @@ def test_more_samples_keep_the_first_ones(method: SamplingMethod, grows: bool) -
 
 
 def test_controllers_with_the_same_ranges_get_the_same_samples() -> None:
-    wanted, sampling = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}, Sampling(samples=7, seed=2)
+    wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
+    sampling = Sampling(samples=7, seed=2)
     tried = [
         [(choice["k_rep"], choice["rho_0"]) for choice in build_gains(kind, wanted, sampling).choices]
         for kind in (Rapf, Rpf)

@@ -257,7 +257,8 @@ class Full:
     """A file on a disk with room for a few more bytes."""
 
     def __init__(self, file: Any, room: int) -> None:
-        self._file, self._room = file, room
+        self._file = file
+        self._room = room
 
     def write(self, data: bytes) -> int:
         if not self._room:

@@ -29,7 +29,8 @@ class Counting(BaseWindow):
         self.events.append(event.type)
 
     def update(self, seconds: float) -> None:
-        self.frames, self.passed = self.frames + 1, self.passed + seconds
+        self.frames = self.frames + 1
+        self.passed = self.passed + seconds
         self.closed = self.passed >= self.lasts
 
     def draw(self) -> None:

@@ -80,7 +80,8 @@ class StubWorker:
         self.is_alive = False
 
     def poll(self):
-        answer, self._answer = self._answer, None
+        answer = self._answer
+        self._answer = None
         return answer
 
 

@@ -64,7 +64,8 @@ def decoded(data: bytes, before: np.ndarray | None) -> np.ndarray:
     st.lists(st.tuples(st.integers(1, 6), st.integers(1, 6), st.integers(0, 2**32)), min_size=1, max_size=6)
 )
 def test_pictures_arrive_as_they_were(sizes):
-    before, shown = None, None
+    before = None
+    shown = None
     for number, (wide, high, seed) in enumerate(sizes):
         pixels = np.random.default_rng(seed).integers(0, 3, (high, wide)).astype(np.uint32) * 0x10FF
         picture = Frame(number, pixels)
@@ -145,7 +146,8 @@ def cookie_of(display):
 
 
 def test_strangers_see_nothing_and_do_nothing(display):
-    own, cookie = f"http://127.0.0.1:{display.port}", cookie_of(display)
+    own = f"http://127.0.0.1:{display.port}"
+    cookie = cookie_of(display)
     for path in ("/", "/?token=", "/?token=ä", "/?token=" + "x" * 24, "/socket", "/page.html", "//[x/"):
         with pytest.raises((urllib.error.HTTPError, UnicodeEncodeError)) as refused:
             urllib.request.urlopen(own + path)
@@ -203,7 +205,8 @@ def test_the_longest_text_that_a_page_pastes_is_taken(display):
 def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
     surface = pygame.Surface((200, 200), 0, 32)
     with socket_of(display, Cookie=cookie_of(display)) as line:
-        shown, pictures = None, 0
+        shown = None
+        pictures = 0
         for shade in range(0, 250, 5):
             surface.fill((shade, shade, 255), (shade // 2, 10, 40, 40))
             display.send(surface)
@@ -211,7 +214,8 @@ def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
         while shown is None or not np.array_equal(shown, Frame.from_surface(surface, 0).pixels):
             data = line.recv(5)
             if isinstance(data, bytes):
-                shown, pictures = decoded(data, shown), pictures + 1
+                shown = decoded(data, shown)
+                pictures = pictures + 1
                 line.send(json.dumps({"kind": "shown", "number": HEADER.unpack_from(data)[0]}))
         assert pictures <= 50
         with pytest.raises(TimeoutError):
@@ -281,7 +285,8 @@ def test_a_page_that_lost_its_line_is_known_again(display):
 
 
 def test_what_is_held_is_let_go_when_control_passes():
-    hands, at = EventTranslator(Clipboard()), {"kind": "button", "x": 5, "y": 6, "button": 1}
+    hands = EventTranslator(Clipboard())
+    at = {"kind": "button", "x": 5, "y": 6, "button": 1}
     told = ({**at, "down": True}, {"kind": "blur"}, {"kind": "blur"})
     found = [[each.type for each in hands.translate(MESSAGES.validate_json(json.dumps(one)))] for one in told]
     assert found[1:] == [[pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST], [pygame.WINDOWFOCUSLOST]]
@@ -677,7 +682,8 @@ def test_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypat
 
 
 def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
-    folder, outside = tmp_path / "folder", tmp_path / "outside.json"
+    folder = tmp_path / "folder"
+    outside = tmp_path / "outside.json"
     folder.mkdir()
     outside.write_text("{}")
     (folder / "link.json").symlink_to(outside)

@@ -53,7 +53,8 @@ def rested(browser):
     seen = [""]
 
     def same():
-        before, seen[0] = seen[0], picture(browser)
+        before = seen[0]
+        seen[0] = picture(browser)
         return before == seen[0] and browser.js("return work.then(() => true)")
 
     browser.until(same)
@@ -161,7 +162,8 @@ def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_pa
         browser.driver.switch_to.window(projector)
         browser.until(lambda: browser.find("#toast").is_displayed())
         assert "asks for control" in browser.find("#toast").text
-        later, hand_over = browser.all("#toast button")[1], browser.all("#toast button")[0]
+        later = browser.all("#toast button")[1]
+        hand_over = browser.all("#toast button")[0]
         assert (hand_over.text, later.text) == ("Hand over", "Later")
         hand_over.click()
         browser.until(lambda: browser.js("return document.body.className") == "watching")

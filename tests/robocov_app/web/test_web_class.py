@@ -28,7 +28,9 @@ from robocov_app.web.frames import HEADER
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("web")]
 
 PATIENCE_S = 60.0
-TAB, DELETE, ENTER = "\ue004", "\ue017", "\ue007"
+TAB = "\ue004"
+DELETE = "\ue017"
+ENTER = "\ue007"
 
 
 def wait_until(condition):

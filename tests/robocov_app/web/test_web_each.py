@@ -97,7 +97,9 @@ def alive(pid):
 def test_each_visitor_has_a_window_of_their_own(tmp_path):
     options = ("--paused", "--each", "--max-sessions", "2", "--folder", str(tmp_path))
     with served("demo", "rooms", *options) as link:
-        ada, ben, cleo = Visitor(), Visitor(), Visitor()
+        ada = Visitor()
+        ben = Visitor()
+        cleo = Visitor()
         status, own, page = ada.get(link)
         assert status == 200
         assert b"<canvas" in page
@@ -140,7 +142,8 @@ def test_who_only_fetches_the_page_takes_no_window(tmp_path):
 def test_a_window_that_nobody_looks_at_is_ended_and_its_work_is_offered(tmp_path, monkeypatch):
     monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     options = ("--each", "--max-sessions", "1", "--idle-minutes", "0.05", "--folder", str(tmp_path))
-    ada, ben = Visitor(), Visitor()
+    ada = Visitor()
+    ben = Visitor()
     with served("edit", *options, cwd=tmp_path) as link:
         with ada.page(link) as line:
             first_frame(line)

@@ -94,6 +94,7 @@ def test_without_the_extra_it_is_a_replay(monkeypatch):
 
 def test_behind_a_hub_the_cell_asks_the_hub(monkeypatch):
     window = notebook_window.LiveWindow.__new__(notebook_window.LiveWindow)
-    window.link, window.height = "http://127.0.0.1:4567/?token=abc", 500
+    window.link = "http://127.0.0.1:4567/?token=abc"
+    window.height = 500
     monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/ada/")
     assert 'src="/user/ada/proxy/4567/?token=abc"' in window._repr_html_()

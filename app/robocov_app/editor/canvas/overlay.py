@@ -421,6 +421,7 @@ def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
     color = canvas.theme.start
     if gap.width < 2 * radius:
         color = canvas.theme.error
+    # A line along the gap, and a short one across it at each end.
     for line_start, line_end in (
         (start, end),
         (start - across, start + across),

@@ -35,12 +35,16 @@ MIN_COARSE_GRID_PX = 55.0  # between the coarse lines
 REDRAW_MARGIN_PX = 6  # around changed objects
 FLAT_LINE_WIDTH_PX = 1.5  # of parts of obstacles that have no area
 NAME_MARGIN_PX = 8.0  # free space to the left and right of a name, both together
+LINE_REACH_PX = 2  # at any scale: lines are drawn up to this distance from their ends
+MIN_NAMED_HEIGHT_MARGIN_PX = 4.0  # at any scale: an obstacle with a name is higher than its text by this
+MIN_SPACE_HEIGHT_MARGIN_PX = 2.0  # at any scale: so is the space in which the name is written, by this
 
 PIXEL_BIAS = 1e-4  # small shift of the camera, because round coordinates would lie exactly between two pixels
 MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pixels for scrolling
 MAX_REDRAWN_FRACTION = 0.5  # of the image; if more has changed, all of it is redrawn
 MAX_BOXES = 40  # more boxes are merged into one
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
+MIN_NAMED_WIDTH_FACTOR = 3.0  # an obstacle with a name is wider than the height of its text by this factor
 OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
 _TRANSPARENT = (0, 0, 0, 0)
 
@@ -255,13 +259,15 @@ class Sheet:
             name = item.shape.name
             outline = self.outlines.get(item)
             low_x, low_y, high_x, high_y = outline.bounds.tolist()
-            if not name or (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
+            is_low = (high_y - low_y) * zoom < size + MIN_NAMED_HEIGHT_MARGIN_PX
+            is_narrow = (high_x - low_x) * zoom < MIN_NAMED_WIDTH_FACTOR * size
+            if not name or is_low or is_narrow:
                 continue
             space = outline.name_space
             width = space.width * zoom - NAME_MARGIN_PX * canvas.scale
             text = fonts.shorten_to_width(name, size, width)
             is_readable = text == name or len(text) > MIN_LABEL_CHARACTERS
-            if space.height * zoom > size + 2 and is_readable:
+            if space.height * zoom > size + MIN_SPACE_HEIGHT_MARGIN_PX and is_readable:
                 center = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
                 canvas.draw_text(text, center, size=canvas.theme.small_text, color=color, anchor="middle")
 
@@ -414,11 +420,11 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
     following[np.array(ends) - 1] = [0, *ends[:-1]]
     edges = np.hstack([corners, corners[following]])
     # Skipping edges outside the image saves time.
-    clip = canvas.surface.get_clip()
+    box = canvas.surface.get_clip().inflate(2 * LINE_REACH_PX, 2 * LINE_REACH_PX)
     low = np.minimum(edges[:, :2], edges[:, 2:])
     high = np.maximum(edges[:, :2], edges[:, 2:])
-    is_visible = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
-    is_visible &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
+    is_visible = (high[:, 0] >= box.left) & (low[:, 0] <= box.right)
+    is_visible &= (high[:, 1] >= box.top) & (low[:, 1] <= box.bottom)
     canvas.draw_segments(edges[is_visible], color, width)
 
 

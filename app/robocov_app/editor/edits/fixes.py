@@ -243,11 +243,12 @@ def _move_start(request: FixRequest) -> Change:
     assert isinstance(name, str)
     start = sketch.get_start(name)
     _, free = find_problems(sketch, radius)
-    space = free.buffer(-radius - SPARE_M)
+    space = free.buffer(-radius - SPARE_M)  # where the center of a robot can be
     number = 0
     label = ""
     if isinstance(start, PointsStart):
         x, y = shapely.get_coordinates(request.problem.geometry)[-1].tolist()
+        # If a position occurs twice, the last one is moved, as in the message.
         number = max(k for k, position in enumerate(start.positions) if position == (x, y))
         others = shapely.points(np.delete(np.array(start.positions), number, axis=0))
         space -= shapely.union_all(shapely.buffer(others, START_DISTANCE_RADII * radius + SPARE_M))

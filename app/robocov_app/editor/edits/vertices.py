@@ -238,9 +238,9 @@ def _compute_cuts(
     count = len(ring)
     for index in sorted(indices):
         is_end = not is_closed and index in (0, count - 1)
-        turn = _compute_turn(ring, index)
         if is_end:
             continue
+        turn = _compute_turn(ring, index)
         require(turn <= math.pi - MIN_CORNER_RAD, "a corner that turns right back cannot be cut off")
         if turn >= MIN_CORNER_RAD:
             cuts[index] = compute_cut(turn)

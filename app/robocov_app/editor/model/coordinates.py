@@ -131,7 +131,8 @@ def parse_size(text: str) -> tuple[float, float]:
     """Parse a width and height, m: ``3 x 2``, ``3 2``, ``120cm × 80cm``. A single length is used for both."""
     typed = _clean(text)
     side = _parse_length(typed)
-    width, height = (side, side)
+    width = side
+    height = side
     if math.isnan(side):
         width, height = _parse_pair(typed, "x×*")
     _require_value(width, text, _SIZE_HELP)

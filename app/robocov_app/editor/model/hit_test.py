@@ -74,8 +74,9 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
     searched = list(owners)
     if len(searched) > MANY_OBJECTS:
         nearby = {item.key for item in _list_items_near(sketch, point, reach)}
-        far = sketch.index_by_key.keys() - nearby
-        searched = [owner for owner in searched if owner not in far]
+        distant_obstacles = sketch.index_by_key.keys() - nearby
+        # The boundary and the starts, which are no obstacles, are always searched.
+        searched = [owner for owner in searched if owner not in distant_obstacles]
     smallest_gap = reach
     nearest: Edge | None = None
     for owner in searched:
@@ -87,8 +88,10 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
             ends = np.roll(points, -1, axis=0)[: ring.edge_count]
             feet, gaps = find_nearest_on_edges(starts, ends, point)
             index = int(gaps.argmin())
-            if gaps[index] < smallest_gap or (nearest is None and gaps[index] <= reach):
-                smallest_gap = float(gaps[index])
+            gap = float(gaps[index])
+            is_first_in_reach = nearest is None and gap <= reach
+            if is_first_in_reach or gap < smallest_gap:
+                smallest_gap = gap
                 nearest = Edge(owner, ring.number, index, (float(feet[index, 0]), float(feet[index, 1])))
     return nearest
 

@@ -74,9 +74,9 @@ def _check_circle(circle: env.CircleObstacle | env.DiscStart) -> Iterator[Proble
 def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
     """Yield errors in the width, position and length of a wall."""
     yield from _check_size("width", wall.width, wall.points)
-    far = list(_check_distance(wall.points))
-    if far:
-        yield from far
+    distance_problems = list(_check_distance(wall.points))
+    if distance_problems:
+        yield from distance_problems
         return
     points = to_array(wall.points)
     extent = 0.0
@@ -127,9 +127,9 @@ def _check_holes(shape: env.PolygonObstacle) -> Iterator[Problem]:
 
 def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
     """Yield errors in the outline of a boundary or polygon, or in a hole; `label` is its name in messages."""
-    far = list(_check_distance(ring))
-    if far:
-        yield from far
+    distance_problems = list(_check_distance(ring))
+    if distance_problems:
+        yield from distance_problems
         return
     points = to_array(ring)
     # Only different corners count.
@@ -178,6 +178,7 @@ def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
     positions, counts = np.unique(ends, axis=0, return_counts=True)
     is_crossing = counts > 2
     if not is_crossing.any():
+        # An outline that turns back and runs along itself has free ends, where only one piece ends.
         is_crossing = counts != 2
     crossings = positions[is_crossing]
     if not len(crossings):

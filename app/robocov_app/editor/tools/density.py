@@ -178,6 +178,7 @@ class DensityTool(EditorTool):
         if isinstance(feature, Gaussian):
             if self._hit.kind == "rim":
                 return density.resize_peak(sketch, number, distance(feature.center, end))
+            # The center of a peak jumps to the pointer.
             start = feature.center
         elif self._hit.kind == "corner":
             return density.move_corner(sketch, number, self._hit.corner, end)

@@ -34,6 +34,7 @@ _TAG_SIDES = ((1, -1), (-1, -1), (-1, 1), (1, 1))
 _HIDDEN_PATH_COST = 4
 """Hiding a section of the path, or moving a tag into the view, is as bad as hiding this many robots."""
 _MAX_LENGTH_WITH_CENTIMETERS_M = 100
+_TAG_EDGE_STRENGTH = 0.5
 
 
 def draw_cursor_path(canvas: Canvas, scene: Scene) -> None:
@@ -51,7 +52,7 @@ def draw_cursor_path(canvas: Canvas, scene: Scene) -> None:
     text = _format_length(float(np.hypot(*np.diff(path, axis=0).T).sum()))
     box = _place_tag(canvas, scene, corners, canvas.measure_text(text, bold=True))
     radius = round(_TAG_CORNER_PX * canvas.scale)
-    edge = mix(theme.background, theme.final, 0.5)
+    edge = mix(theme.background, theme.final, _TAG_EDGE_STRENGTH)
     pygame.draw.rect(canvas.surface, theme.background, box, border_radius=radius)
     pygame.draw.rect(canvas.surface, edge, box, canvas.scale_width(1.0), border_radius=radius)
     canvas.draw_text(text, box.center, color=theme.final, bold=True, anchor="middle")

@@ -31,6 +31,8 @@ _PANEL_LABELS_PX = 84
 """Space for the title and the labels of a panel, above and below its axes."""
 _OFFSET = 0.11
 """Horizontal distance between controllers at the same value; the distance between values is 1."""
+_TEXT_STRENGTH = 0.7
+_REFERENCE_LINE_STRENGTH = 0.35
 
 
 @plain_style()
@@ -49,7 +51,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     """
     theme = get_theme(theme)
     width, height = _SIZE_PX
-    quiet = mix(theme.background, theme.ink, 0.7)
+    quiet = mix(theme.background, theme.ink, _TEXT_STRENGTH)
     names = list(dict.fromkeys(degradation.axis for degradation in degradations))
     columns = min(_MAX_COLUMNS, len(names))
     rows = math.ceil(len(names) / columns)
@@ -101,7 +103,12 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
     """Draw the panel of a disturbance: the values next to each other, the controllers slightly shifted."""
     values = list(dict.fromkeys(degradation.value for degradation in degradations))
     styles = choose_controller_styles(degradation.controller for degradation in degradations)
-    axes.axhline(1.0, color=to_plot_color(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
+    axes.axhline(
+        1.0,
+        color=to_plot_color(mix(theme.background, theme.ink, _REFERENCE_LINE_STRENGTH)),
+        linewidth=1.0,
+        zorder=1,
+    )
     for k, (controller, style) in enumerate(styles.items()):
         own = [degradation for degradation in degradations if degradation.controller == controller]
         offset = _OFFSET * (k - (len(styles) - 1) / 2)

@@ -61,7 +61,8 @@ def _format_range(values: Sequence[Value], unit: str) -> str:
     numbers = [value for value in values if isinstance(value, int | float)]
     if not numbers:
         return "none"
-    low, high = min(numbers), max(numbers)
+    low = min(numbers)
+    high = max(numbers)
     text = f"{low:.4g} to {high:.4g}"
     if low == high:
         text = f"{low:.6g}"

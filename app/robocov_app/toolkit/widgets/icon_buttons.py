@@ -23,7 +23,13 @@ _KEY_TEXT_PX = 9.0
 _KEY_MARGIN_PX = (3, 1)
 _CORNER_RADIUS_PX = 6.0
 _ROUND_RADIUS_PX = 100.0  # larger than any button, so that its ends are half circles
+_KEY_LINE_PX = 11.0
 _DISABLED_STRENGTH = 0.35
+# Fractions of the color of text in the faces of buttons.
+_HOVERED_STRENGTH = 0.08
+_HELD_STRENGTH = 0.16
+_HOVERED_ACCENT_STRENGTH = 0.15
+_HELD_ACCENT_STRENGTH = 0.25
 
 
 def show_icon_button(
@@ -78,8 +84,8 @@ def show_icon_button(
         _draw_icon(page, icon, icon_rect, _ICON_PX, ink)
         if shortcut:
             corner = rect.inflate(-page.px(2 * _KEY_MARGIN_PX[0]), -page.px(2 * _KEY_MARGIN_PX[1]))
-            corner.top = corner.bottom - page.px(_KEY_TEXT_PX + 2)
-            corner.height = page.px(_KEY_TEXT_PX + 2)
+            corner.top = corner.bottom - page.px(_KEY_LINE_PX)
+            corner.height = page.px(_KEY_LINE_PX)
             faint = ink if selected else page.theme.faint
             draw_text(page, shortcut, corner, faint, _KEY_TEXT_PX, align="right")
     return is_clicked
@@ -104,9 +110,9 @@ def show_main_button(page: Page, icon: str, text: str, *, key: str, tip: str = "
     if is_visible(page, rect):
         strength = 0.0
         if page.active == key:
-            strength = 0.25
+            strength = _HELD_ACCENT_STRENGTH
         elif page.is_hovered(rect):
-            strength = 0.15
+            strength = _HOVERED_ACCENT_STRENGTH
         side = min(rect.size)
         disc = Rect(0, 0, side, side)
         disc.center = rect.center
@@ -121,12 +127,12 @@ def _draw_flat_face(page: Page, rect: Rect, key: str, *, selected: bool, enabled
     is_hovered = enabled and page.is_hovered(rect)
     is_held = page.active == key and bool(rect.collidepoint(page.pointer))
     if selected:
-        strength = 0.15 if is_hovered else 0.0
+        strength = _HOVERED_ACCENT_STRENGTH if is_hovered else 0.0
         draw_box(page, rect, mix(page.theme.accent, page.theme.ink, strength), radius=_CORNER_RADIUS_PX)
     elif is_held:
-        draw_box(page, rect, shade(page, 0.16), radius=_CORNER_RADIUS_PX)
+        draw_box(page, rect, shade(page, _HELD_STRENGTH), radius=_CORNER_RADIUS_PX)
     elif is_hovered:
-        draw_box(page, rect, shade(page, 0.08), radius=_CORNER_RADIUS_PX)
+        draw_box(page, rect, shade(page, _HOVERED_STRENGTH), radius=_CORNER_RADIUS_PX)
     draw_focus_ring(page, rect, key)
     if not enabled:
         return shade(page, _DISABLED_STRENGTH)

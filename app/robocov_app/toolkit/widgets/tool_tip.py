@@ -18,6 +18,16 @@ _TEXT_PX = 11.0
 _LINE_PX = 16.0
 _MAX_WIDTH_PX = 240.0
 _DISTANCE_PX = 5.0
+"""Distance of the tip from the widget."""
+_TEXT_LEFT_PX = 7.0
+_TEXT_TOP_PX = 5.0
+_MARGINS_PX = 9.0
+"""Space above and below the text, both together."""
+_CORNER_RADIUS_PX = 4.0
+# Fractions of the color of text in the colors of the tip.
+_FILL_STRENGTH = 0.2
+_LIGHT_FILL_STRENGTH = 0.92
+_EDGE_STRENGTH = 0.24
 
 
 class ToolTip:
@@ -69,18 +79,20 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)
     lines = wrap_text(text, size, round(_MAX_WIDTH_PX * scale))
-    width = max(measure_text(line, size) for line in lines) + round(14 * scale)
-    box = Rect(0, 0, width, line_height * len(lines) + round(9 * scale))
-    box.topleft = x, widget.bottom + round(_DISTANCE_PX * scale)
+    width = max(measure_text(line, size) for line in lines) + round(2 * _TEXT_LEFT_PX * scale)
+    box = Rect(0, 0, width, line_height * len(lines) + round(_MARGINS_PX * scale))
+    box.topleft = (x, widget.bottom + round(_DISTANCE_PX * scale))
     if box.bottom > screen.get_height():
         box.bottom = widget.top - round(_DISTANCE_PX * scale)
     box.clamp_ip(screen.get_rect())
     # The text is light in both themes.
-    strength = 0.2
+    strength = _FILL_STRENGTH
     if theme is LIGHT:
-        strength = 0.92
+        strength = _LIGHT_FILL_STRENGTH
     fill = mix(theme.panel, theme.ink, strength)
-    draw_rounded_box(screen, box, fill, edge=mix(theme.panel, theme.ink, 0.24), radius=round(4 * scale))
+    edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
+    draw_rounded_box(screen, box, fill, edge=edge, radius=round(_CORNER_RADIUS_PX * scale))
+    left = box.left + round(_TEXT_LEFT_PX * scale)
     for number, line in enumerate(lines):
-        top = box.top + round(_DISTANCE_PX * scale) + number * line_height
-        screen.blit(render_text(line, size, _TEXT_COLOR), (box.left + round(7 * scale), top))
+        top = box.top + round(_TEXT_TOP_PX * scale) + number * line_height
+        screen.blit(render_text(line, size, _TEXT_COLOR), (left, top))

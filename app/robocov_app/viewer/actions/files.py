@@ -1,7 +1,6 @@
 """Actions on files: maps, sessions and drafts of the viewer."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -119,17 +118,17 @@ class FileActions:
         names = self.list_maps()
         index = names.index(self.map_name) if self.map_name in names else 0
         too_small: list[str] = []
-        has_opened = False
         for k in range(1, len(names) + 1):
             name = names[(index + steps * k) % len(names)]
-            with suppress(InputError):
+            try:
                 self.open_map(name)
-                has_opened = True
-                break
-            too_small.append(name)
-        if has_opened and too_small:
-            robots = self._viewer.session.timeline.scenario.robots
-            self._viewer.show_message(f"no space for {robots} robots: {', '.join(too_small)}")
+            except InputError:
+                too_small.append(name)
+                continue
+            if too_small:
+                robots = self._viewer.session.timeline.scenario.robots
+                self._viewer.show_message(f"no space for {robots} robots: {', '.join(too_small)}")
+            return
 
     def save_map(self) -> None:
         """Save the map to a new file."""

@@ -16,6 +16,7 @@ _SWITCH_PADDING_PX = 6
 _VALUE_GAP_PX = 7
 _TIME_GAP_PX = 4
 _MIN_TIME_STEP_S = 1.0
+_GRID_STRENGTH = 0.12
 
 
 def draw_title(canvas: Canvas, frame: ChartFrame) -> float:
@@ -74,7 +75,7 @@ def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
     """Draw the horizontal grid lines, the values to the left of them and the times below."""
     times = scale.times
     size = frame.theme.small_text
-    line_color = mix(frame.theme.panel, frame.theme.ink, 0.12)
+    line_color = mix(frame.theme.panel, frame.theme.ink, _GRID_STRENGTH)
     for value in scale.values.ticks.tolist():
         row = scale.to_row(value)
         canvas.surface.fill(line_color, (round(times.left), round(row), round(times.width), 1))

@@ -19,6 +19,7 @@ _EVENT_SIGNS = {
 """Symbol of each kind of event."""
 _OTHER_EVENT_SIGN = "•"
 _MAX_DESCRIBED_EVENTS = 3
+_LINE_STRENGTH = 0.3
 
 # Lengths in pixels at scale 1.
 _TEXT_TOP_PX = 6
@@ -31,7 +32,7 @@ def draw_events(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
     """Draw a line for each event, with its text if there is space, or else with its symbol alone."""
     events = frame.timeline.events
     times = frame.times
-    line_color = mix(frame.theme.panel, frame.theme.ink, 0.3)
+    line_color = mix(frame.theme.panel, frame.theme.ink, _LINE_STRENGTH)
     for event in events:
         frame.draw_rule(canvas.surface, times.to_column(event.time), line_color, top=0)
     size = frame.theme.small_text

@@ -13,6 +13,7 @@ from robocov_app.viewer.chart.scale import TOP_PX
 # Position of the tag relative to the pointer's column and the top of the curves, px at scale 1.
 _LEFT_PX = 12
 _TOP_GAP_PX = 16
+_RULE_STRENGTH = 0.35
 
 
 def draw_pointer_tag(
@@ -38,7 +39,7 @@ def draw_pointer_tag(
     times = frame.times
     top = frame.layout.chart.top
     column = round(times.to_column(time))
-    frame.draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
+    frame.draw_rule(screen, column, mix(theme.panel, theme.ink, _RULE_STRENGTH), top=top)
     text = ghost or describe_events_at(frame, pixel[0]) or _describe_values(frame, time)
     text_width = create_flat_canvas(screen, theme, scale).measure_text(text)
     left = min(column + _LEFT_PX * scale, times.right - text_width)

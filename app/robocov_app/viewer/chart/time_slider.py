@@ -20,6 +20,8 @@ _EVENT_DOT_PX = 5
 _MIN_EVENT_DOT_RADIUS_PX = 2.0
 _HANDLE_RADIUS_PX = 6.5
 _HANDLE_RING_PX = 2.0
+_EMPTY_BAR_STRENGTH = 0.13
+_SIMULATED_BAR_STRENGTH = 0.4
 
 
 def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
@@ -41,7 +43,8 @@ def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> No
     bar = pygame.Rect(
         round(times.left), round(middle - thickness / 2), round(times.right - times.left), thickness
     )
-    pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), bar, border_radius=thickness)
+    color = mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH)
+    pygame.draw.rect(canvas.surface, color, bar, border_radius=thickness)
     title_position = (_TITLE_LEFT_PX * frame.scale, middle)
     canvas.draw_text("time", title_position, color=theme.faint, size=theme.small_text)
     _draw_state(canvas, frame, times.right + _STATE_GAP_PX * frame.scale, middle)
@@ -73,7 +76,7 @@ def draw_slider_state(screen: pygame.Surface, frame: ChartFrame) -> None:
     column = times.to_column(frame.session.displayed.time)
     end_column = times.to_column(timeline.end_time)
     # Gray up to the simulated time; if the past is displayed, colored up to the displayed time.
-    _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, 0.4))
+    _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, _SIMULATED_BAR_STRENGTH))
     if not timeline.is_live:
         _fill_bar(screen, frame, column, theme.accent)
         frame.draw_rule(screen, column, theme.accent, top=frame.layout.chart.top)

@@ -48,6 +48,7 @@ def describe_passage_changes(
             is_reachable = areas == areas.max(initial=0.0)
         lost_centers = shapely.union_all(components[~is_reachable])
         lost_area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost_centers, radius)))
+        # Smaller areas, such as corners, are not worth a message.
         if lost_area > radius * radius:
             descriptions.append(f"{lost_area:.1f} m² cut off")
     descriptions += _describe_narrow_gap(before, after, radius)

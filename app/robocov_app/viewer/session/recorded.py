@@ -33,6 +33,10 @@ MAX_RECORD_BYTES = 400_000_000
 STATE_BYTES = 1500
 """Approximate memory for the state of one pane, without the arrays of the record."""
 _PERIOD_TOLERANCE = 1e-6
+_TIME_TOLERANCE = 1e-6
+"""Relative tolerance of the times of a record, which are rounded."""
+_STEP_TOLERANCE = 1e-3
+"""The same as a fraction of the interval between two times."""
 _FORCE_TOLERANCE = 1e-9
 
 
@@ -112,7 +116,8 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
         record = run.record
         even_times = np.arange(len(record)) * record.dt
         elapsed = record.time - record.time[0]
-        if not np.allclose(elapsed, even_times, rtol=1e-6, atol=1e-3 * record.dt):
+        tolerance = _STEP_TOLERANCE * record.dt
+        if not np.allclose(elapsed, even_times, rtol=_TIME_TOLERANCE, atol=tolerance):
             file = run.folder / RECORD_FILE
             raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
         for name, value in _describe_run(record).items():
@@ -159,7 +164,9 @@ def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunH
         setup = PaneSetup(scenario.environment, choice, scenario.properties, roster.numbers, roster.failed)
         pane_states.append(_build_states(record, setup))
     # Enough memory that the record is not thinned, up to `MAX_RECORD_BYTES`.
-    needed_bytes = len(first) * len(records) * (STATE_BYTES + first.positions[0].nbytes * 2)
+    # The arrays of a state are its positions and velocities.
+    state_bytes = STATE_BYTES + 2 * first.positions[0].nbytes
+    needed_bytes = len(first) * len(records) * state_bytes
     history = RunHistory(dt, MAX_HISTORY_BYTES + min(needed_bytes, MAX_RECORD_BYTES))
     steps_between_states = round(first.dt / dt)
     for index in range(len(first)):

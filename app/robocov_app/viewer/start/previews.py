@@ -196,7 +196,8 @@ def _render_outline(
     """Render a map, transparent where it is free; the colors are those of obstacles, boundary and outside."""
     obstacle, boundary, outside = colors
     outline = load_previews().outlines[name]
-    width, height = size[0] * _FINENESS, size[1] * _FINENESS
+    width = size[0] * _FINENESS
+    height = size[1] * _FINENESS
     large = Surface((width, height), pygame.SRCALPHA, 32)
     large.fill(outside)
     left, bottom, right, top = outline.bounds
@@ -216,7 +217,8 @@ def _render_outline(
 
 def _is_counter_clockwise(ring: NDArray[Any]) -> bool:
     """Return whether the signed area of a closed ring, (k, 2), is positive."""
-    x, y = ring[:, 0], ring[:, 1]
+    x = ring[:, 0]
+    y = ring[:, 1]
     return bool((x[:-1] * y[1:] - x[1:] * y[:-1]).sum() > 0)
 
 

@@ -53,11 +53,14 @@ class GridFrame:
     def place(self, points: Array) -> Array:
         """Convert positions in the grid, (n, 2) in cells from its lower left corner, to positions in m."""
         x, y = (points * self.cell).T
+        rotated_x = x
+        rotated_y = y
         if self.yaw:
             cos = math.cos(self.yaw)
             sin = math.sin(self.yaw)
-            x, y = x * cos - y * sin, x * sin + y * cos
-        return np.column_stack([x + self.origin[0], y + self.origin[1]])
+            rotated_x = x * cos - y * sin
+            rotated_y = x * sin + y * cos
+        return np.column_stack([rotated_x + self.origin[0], rotated_y + self.origin[1]])
 
 
 def build_grid_map(
