@@ -26,17 +26,11 @@ from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
 from robocov.controllers.route_following import follow_routes
-from robocov.controllers.shared_map import (
-    CERTAIN_RANGE_FRACTION,
-    MAX_SILENCE_S,
-    HearingGroup,
-    build_unknown_map,
-    list_hearing_groups,
-    update_maps,
-)
-from robocov.controllers.teammates import Teammates
+from robocov.controllers.scan_exchange import ScanExchange
+from robocov.controllers.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S, build_unknown_map
+from robocov.controllers.teammates import TeammateReport, Teammates, receive_reports
 from robocov.density import Density
-from robocov.observation import Decision, Observations, Scanning, Scans
+from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
@@ -300,9 +294,11 @@ class Atlas(BaseController):
             previous = estimates or Estimates.build_initial(len(seen.positions))
             seen, estimates = estimate_positions(seen, previous, memory.team)
             conservative = assume_closer_neighbors(seen, estimates)
-        memory = self._add_scans(seen, memory)
         first_plan_time = 0.0 if estimates is None else _LISTENING_S
-        memory = self._plan_routes(seen, memory, first_plan_time=first_plan_time)
+        memory = self._update_maps(seen, memory)
+        due_robots = self._list_due_robots(seen, memory, first_plan_time=first_plan_time)
+        memory = self._plan_routes(seen, memory, due_robots)
+        memory, messages = self._send_messages(seen, memory, due_robots)
         returns = update_returns(seen, memory.returns)
         command = follow_routes(
             conservative,
@@ -318,27 +314,43 @@ class Atlas(BaseController):
             goals=command.goals,
             terms={"attraction": command.forces},
             memory=replace(memory, legs=command.legs, returns=returns, estimates=estimates),
+            messages=messages,
         )
 
-    def _add_scans(self, seen: Observations, memory: AtlasMemory) -> AtlasMemory:
-        """Return the memory with the maps after the scans, if there are any."""
+    def _update_maps(self, seen: Observations, memory: AtlasMemory) -> AtlasMemory:
+        """Return the memory with the maps after the scans of this step, if there are any."""
         if seen.scans is None:
             return memory
-        maps = self._update_maps(list(memory.maps), seen, seen.scans, memory.team.radius)
-        states = [
-            replace(state, known_map=known_map) for state, known_map in zip(memory.states, maps, strict=True)
-        ]
+        states = []
+        for robot, state in enumerate(memory.states):
+            scanned = state.known_map.add_scan(
+                seen.positions[robot], seen.scans.distances[robot], seen.scans.hit[robot]
+            )
+            # Cells at the positions of other robots are free.
+            neighbors = seen.get_neighbor_positions(robot)
+            known_map = scanned.add_robots(neighbors, float(memory.team.radius[robot]))
+            states.append(replace(state, known_map=known_map))
         return replace(memory, states=tuple(states))
 
-    def _plan_routes(self, seen: Observations, memory: AtlasMemory, *, first_plan_time: float) -> AtlasMemory:
-        """Return the memory with the plans that are due, and the routes of these robots to their goals."""
+    def _list_due_robots(
+        self, seen: Observations, memory: AtlasMemory, *, first_plan_time: float
+    ) -> list[int]:
+        """Return the robots that plan in this step."""
+        return [
+            robot
+            for robot, state in enumerate(memory.states)
+            if seen.time >= max(state.next_plan_time, first_plan_time) - TIME_TOLERANCE_S
+        ]
+
+    def _plan_routes(self, seen: Observations, memory: AtlasMemory, due_robots: Sequence[int]) -> AtlasMemory:
+        """Return the memory with the plans of some robots, and their routes to their goals."""
         states = list(memory.states)
         routes = list(memory.routes)
         legs = memory.legs.copy()
         for robot, state in enumerate(states):
-            if seen.time >= max(state.next_plan_time, first_plan_time) - TIME_TOLERANCE_S:
-                reports = self._list_reports(states, seen.neighbors.list_neighbors(robot))
-                states[robot], goal = self._plan(seen, memory.team, state, robot, reports)
+            if robot in due_robots:
+                reports = self._list_reports(seen, memory, robot)
+                states[robot], goal = self._plan(seen, memory, robot, reports)
                 basis = states[robot].basis
                 if goal is not None and basis is not None:
                     routes[robot] = basis.planner.find_route(seen.positions[robot], goal)
@@ -347,35 +359,32 @@ class Atlas(BaseController):
                 routes[robot] = seen.positions[robot : robot + 1]
         return replace(memory, states=tuple(states), routes=tuple(routes), legs=legs)
 
-    def _update_maps(
-        self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
-    ) -> list[DiscoveredMap]:
-        """Return the maps after a scan of each robot; cells at the positions of other robots become free."""
-        updated_maps = []
-        for robot, known_map in enumerate(maps):
-            scanned = known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
-            neighbors = seen.get_neighbor_positions(robot)
-            updated_maps.append(scanned.add_robots(neighbors, float(radius[robot])))
-        return updated_maps
-
-    def _list_reports(self, states: Sequence[PlannerState], neighbors: IntArray) -> list[Teammates]:
-        """Return what the neighbors of a robot report about others."""
+    def _list_reports(self, seen: Observations, memory: AtlasMemory, robot: int) -> list[TeammateReport]:
+        """Return the reports about others that a robot has received."""
         return []
 
-    def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
-        """Return whether all robots plan on the same map; see `_Cooperation`."""
+    def _send_messages(
+        self, seen: Observations, memory: AtlasMemory, due_robots: Sequence[int]
+    ) -> tuple[AtlasMemory, tuple[tuple[Message, ...], ...]]:
+        """Return the memory and the messages that each robot sends; empty if robots send none."""
+        return memory, ()
+
+    def _is_agreed(self, teammates: Teammates, seen: Observations, memory: AtlasMemory, robot: int) -> bool:
+        """Return whether a robot and its teammates plan on the same map; see `_Cooperation`."""
         return False
 
     def _plan(
-        self, seen: Observations, team: Team, previous: PlannerState, robot: int, reports: Sequence[Teammates]
+        self, seen: Observations, memory: AtlasMemory, robot: int, reports: Sequence[TeammateReport]
     ) -> tuple[PlannerState, Array | None]:
         """Update a robot's plan; return its state, and its goal or None if it keeps its route."""
+        team = memory.team
+        previous = memory.states[robot]
         position = seen.positions[robot]
         known_map = previous.known_map
         radius = float(team.radius[robot])
         max_speed = float(team.max_speed[robot])
         knowledge = _update_knowledge(previous, seen, team, robot, reports)
-        is_agreed = self._is_agreed(knowledge.teammates, seen)
+        is_agreed = self._is_agreed(knowledge.teammates, seen, memory, robot)
         others = _list_others(knowledge.teammates, position, seen.time, is_agreed=is_agreed)
         window = Window.build_around(known_map.raster, position, math.inf, _OWN_NODES)
         spacing = window.stride * known_map.raster.cell_size
@@ -551,7 +560,7 @@ class Atlas(BaseController):
 
 
 def _update_knowledge(
-    state: PlannerState, seen: Observations, team: Team, robot: int, reports: Sequence[Teammates]
+    state: PlannerState, seen: Observations, team: Team, robot: int, reports: Sequence[TeammateReport]
 ) -> TeamKnowledge:
     """Return what a robot knows of the others now."""
     knowledge = state.knowledge
@@ -744,12 +753,16 @@ def _build_team_window(known_map: DiscoveredMap, positions: Array, *, is_whole_t
 
 @dataclass(frozen=True)
 class AtlasShared(Atlas):
-    """`Atlas` with shared maps: robots that hear each other exchange their maps and positions of others.
+    """`Atlas` with shared maps: robots send each other their scans, and positions of others.
 
     Robots that all hear each other have the same map, and make the same plan for the whole team, however
     large it is. Relocations are then final, no robot plans for itself alone, and all learn from each
     viewpoint. A robot that does not hear all others behaves as with `Atlas`. It assumes that robots out of
     range are where one of its neighbors last heard them.
+
+    Messages are those of `robocov.controllers.scan_exchange`, twice a second: 542 bytes for a scan, and with
+    six robots 81 bytes for a digest of the scans that a robot has. With each plan, a robot that is heard by
+    one which does not hear all others also sends a report: 28 bytes for each robot that it knows of.
 
     Parameters
     ----------
@@ -778,26 +791,70 @@ class AtlasShared(Atlas):
     information = "shared map"
     is_staggered = False
 
-    def _update_maps(
-        self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
-    ) -> list[DiscoveredMap]:
-        groups = list_hearing_groups(seen.neighbors)
-        scanned_maps = update_maps(maps, seen, scans, groups)
-        # Robots that share a map before this update also share the updated one.
-        shared_maps: dict[tuple[int, HearingGroup, float], DiscoveredMap] = {}
-        updated_maps = []
-        for known_map, group, robot_radius in zip(scanned_maps, groups, radius.tolist(), strict=True):
-            key = (id(known_map), group, robot_radius)
-            if key not in shared_maps:
-                shared_maps[key] = known_map.add_robots(seen.positions[list(group)], robot_radius)
-            updated_maps.append(shared_maps[key])
-        return updated_maps
+    def begin(self, region: Region, team: Team) -> AtlasMemory:
+        """Return the memory of robots that know neither walls nor other robots; see `Atlas.begin`."""
+        memory = super().begin(region, team)
+        n = len(team)
+        unknown_map = memory.states[0].known_map
+        exchange = ScanExchange.start(unknown_map, n, robot_radii=team.radius.tolist())
+        return replace(memory, exchange=exchange, reports=({},) * n)
 
-    def _list_reports(self, states: Sequence[PlannerState], neighbors: IntArray) -> list[Teammates]:
-        hears_all = len(neighbors) == len(states) - 1
+    def _update_maps(self, seen: Observations, memory: AtlasMemory) -> AtlasMemory:
+        """Return the memory with the scans and reports that have arrived; maps are updated before plans."""
+        assert memory.exchange is not None
+        exchange = memory.exchange.receive(seen)
+        reports = memory.reports
+        if seen.messages:
+            reports = tuple(
+                {**known_reports, **receive_reports(seen, robot)}
+                for robot, known_reports in enumerate(memory.reports)
+            )
+        return replace(memory, exchange=exchange, reports=reports)
+
+    def _list_due_robots(
+        self, seen: Observations, memory: AtlasMemory, *, first_plan_time: float
+    ) -> list[int]:
+        assert memory.exchange is not None
+        if not memory.exchange.has_scans:
+            return []
+        return super()._list_due_robots(seen, memory, first_plan_time=first_plan_time)
+
+    def _plan_routes(self, seen: Observations, memory: AtlasMemory, due_robots: Sequence[int]) -> AtlasMemory:
+        assert memory.exchange is not None
+        exchange = memory.exchange.update_maps(due_robots)
+        states = list(memory.states)
+        for robot in due_robots:
+            states[robot] = replace(states[robot], known_map=exchange.maps[robot])
+        memory = replace(memory, states=tuple(states), exchange=exchange)
+        planned = super()._plan_routes(seen, memory, due_robots)
+        # A plan uses the reports that have arrived since the last one.
+        reports = list(memory.reports)
+        for robot in due_robots:
+            reports[robot] = {}
+        return replace(planned, reports=tuple(reports))
+
+    def _list_reports(self, seen: Observations, memory: AtlasMemory, robot: int) -> list[TeammateReport]:
+        hears_all = len(seen.neighbors.list_neighbors(robot)) == len(memory.states) - 1
         if hears_all:
             return []
-        return [states[neighbor].knowledge.teammates for neighbor in neighbors.tolist()]
+        return [report for _, report in sorted(memory.reports[robot].items())]
 
-    def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
+    def _send_messages(
+        self, seen: Observations, memory: AtlasMemory, due_robots: Sequence[int]
+    ) -> tuple[AtlasMemory, tuple[tuple[Message, ...], ...]]:
+        exchange = memory.exchange
+        assert exchange is not None
+        for robot in due_robots:
+            neighbors = seen.neighbors.list_neighbors(robot).tolist()
+            teammates = memory.states[robot].knowledge.teammates
+            # Robots that hear all others need no reports.
+            if len(teammates.robots) > 0 and not exchange.hear_all(robot, neighbors):
+                report = teammates.build_report()
+                exchange = exchange.add_message(robot, Message(report, report.size))
+        if seen.scans is not None:
+            exchange = exchange.add_scans(seen, seen.scans)
+        exchange, messages = exchange.send(seen)
+        return replace(memory, exchange=exchange), messages
+
+    def _is_agreed(self, teammates: Teammates, seen: Observations, memory: AtlasMemory, robot: int) -> bool:
         return bool((teammates.heard_times == seen.time).all())

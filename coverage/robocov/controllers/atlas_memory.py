@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.localization import Estimates
-from robocov.controllers.teammates import Teammates
+from robocov.controllers.scan_exchange import ScanExchange
+from robocov.controllers.teammates import TeammateReport, Teammates
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.team import Team
@@ -125,13 +126,13 @@ class AtlasMemory:
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     estimates: Estimates | None = None
     """Position estimates, if robots know positions of others by messages."""
+    exchange: ScanExchange | None = None
+    """The scans that robots with shared maps exchange; None if they share nothing."""
+    reports: tuple[Mapping[int, TeammateReport], ...] = ()
+    """The newest report from each other robot since the last plan of each robot, by sender. Never changed in
+    place."""
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:
-        """The map that each robot has discovered."""
+        """The map that each robot has discovered; with shared maps, when it last planned."""
         return tuple(state.known_map for state in self.states)
-
-    @property
-    def reports(self) -> tuple[Teammates, ...]:
-        """Knowledge of each robot about the others, which it reports if maps are shared."""
-        return tuple(state.knowledge.teammates for state in self.states)

@@ -227,10 +227,43 @@ class ScanExchange:
         return ScanExchange(tuple(states), self.round_count + 1)
 
     def add_message(self, robot: int, message: Message) -> ScanExchange:
-        """Return the exchange with another message that a robot sends."""
+        """Return the exchange with a message of another kind that a robot sends before all others.
+
+        Parameters
+        ----------
+        robot : int
+        message : Message
+            It replaces an earlier message of the same kind that has not been sent yet.
+
+        Returns
+        -------
+        ScanExchange
+        """
+        kind = type(message.payload)
+        state = self.robots[robot]
+        others = [each for each in state.outgoing if not isinstance(each.payload, kind)]
         states = list(self.robots)
-        states[robot] = replace(states[robot], outgoing=(*states[robot].outgoing, message))
+        states[robot] = replace(state, outgoing=(message, *others))
         return replace(self, robots=tuple(states))
+
+    def hear_all(self, robot: int, neighbors: Sequence[int]) -> bool:
+        """Return whether each neighbor of a robot hears all others, according to its newest digest.
+
+        Parameters
+        ----------
+        robot : int
+        neighbors : sequence of int
+
+        Returns
+        -------
+        bool
+        """
+        digests = self.robots[robot].digests
+        other_count = len(self.robots) - 1
+        return all(
+            neighbor in digests and np.count_nonzero(digests[neighbor].digest.is_heard) == other_count
+            for neighbor in neighbors
+        )
 
     def send(self, seen: Observations) -> tuple[ScanExchange, tuple[tuple[Message, ...], ...]]:
         """Send as many of the messages as each robot may send in a step.
@@ -273,7 +306,7 @@ def _add_digests(state: RobotExchange, seen: Observations, robot: int) -> RobotE
 def _prepare_messages(
     state: RobotExchange, seen: Observations, robot: int, own_scan: NumberedScan
 ) -> RobotExchange:
-    """Return the state of a robot with the messages that go with a new scan; older ones are dropped."""
+    """Return the state of a robot with the messages that go with a new scan; they replace earlier ones."""
     neighbors = seen.neighbors.list_neighbors(robot).tolist()
     is_heard = np.zeros(len(seen.positions), dtype=bool)
     is_heard[neighbors] = True
@@ -284,9 +317,10 @@ def _prepare_messages(
         min_time = seen.time - _MAX_REPAIR_MEMORY_S
         repair_times = {key: time for key, time in repair_times.items() if time >= min_time}
         repair_times.update(dict.fromkeys(((scan.robot, scan.number) for scan in repairs), seen.time))
-    payloads: list[NumberedScan | Digest] = [own_scan, digest, *repairs]
-    outgoing = tuple(Message(payload, payload.size) for payload in payloads)
-    return replace(state, own_inventory=digest.inventory, outgoing=outgoing, repair_times=repair_times)
+    waiting = [each for each in state.outgoing if not isinstance(each.payload, NumberedScan | Digest)]
+    outgoing = [*waiting, Message(own_scan, own_scan.size), Message(digest, digest.size)]
+    outgoing += [Message(scan, scan.size) for scan in repairs]
+    return replace(state, own_inventory=digest.inventory, outgoing=tuple(outgoing), repair_times=repair_times)
 
 
 def _choose_repairs(state: RobotExchange, robot: int, neighbors: Sequence[int]) -> list[NumberedScan]:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import scipy
@@ -21,8 +18,7 @@ from robocov.controllers.route_following import follow_routes
 from robocov.controllers.scan_exchange import ScanExchange
 from robocov.density import Density
 from robocov.k_median import run_lloyd
-from robocov.observation import Decision, Observations, Scanning, Scans
-from robocov.observation.neighbors import Neighbors
+from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
@@ -354,68 +350,6 @@ def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | Non
         and plan.density is density
         and np.array_equal(group.robots, plan.group.robots)
     )
-
-
-HearingGroup: TypeAlias = tuple[int, ...]
-"""Numbers of a robot and of those that it hears, ascending."""
-
-
-def list_hearing_groups(neighbors: Neighbors) -> list[HearingGroup]:
-    """Return the hearing group of each robot."""
-    if neighbors.is_complete:
-        return [tuple(range(neighbors.robot_count))] * neighbors.robot_count
-    return [
-        tuple(sorted({robot, *neighbors.list_neighbors(robot).tolist()}))
-        for robot in range(neighbors.robot_count)
-    ]
-
-
-def update_maps(
-    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, hearing_groups: Sequence[HearingGroup]
-) -> list[DiscoveredMap]:
-    """Add the scan of each robot to the maps of all robots in its hearing group.
-
-    Robots that all hear each other share one map. All scans are added to it in turn, so later scans can
-    correct earlier ones: if maps were only merged, an error in one of them would never be corrected.
-
-    Parameters
-    ----------
-    maps : sequence of DiscoveredMap
-        One for each robot.
-    seen : Observations
-    scans : Scans
-    hearing_groups : sequence of HearingGroup
-        The hearing group of each robot, as `list_hearing_groups` returns them.
-
-    Returns
-    -------
-    list of DiscoveredMap
-        The new map of each robot.
-    """
-
-    def add_scan(known_map: DiscoveredMap, robot: int) -> DiscoveredMap:
-        return known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
-
-    @cache
-    def build_own_map(robot: int) -> DiscoveredMap:
-        return add_scan(maps[robot], robot)
-
-    sizes = Counter(hearing_groups)
-    shared_maps: dict[HearingGroup, DiscoveredMap] = {}
-    updated_maps = []
-    for robot, group in enumerate(hearing_groups):
-        if sizes[group] < len(group):
-            # Not all of these robots hear each other.
-            others = (build_own_map(other) for other in group if other != robot)
-            updated_maps.append(build_own_map(robot).merge(others))
-            continue
-        if group not in shared_maps:
-            shared = maps[robot].merge(maps[other] for other in group if maps[other] is not maps[robot])
-            for member in group:
-                shared = add_scan(shared, member)
-            shared_maps[group] = shared
-        updated_maps.append(shared_maps[group])
-    return updated_maps
 
 
 def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, robot: int) -> Group:

@@ -4,14 +4,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.observation import Observations
 
 REST_RADIUS_M = 0.1
 """A robot is at rest while it stays within this distance of one point."""
+REPORT_BYTES = 28
+"""Size of the number of a robot, its position, and the time at which it was last heard."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TeammateReport:
+    """What a robot reports to its neighbors about k others. Immutable.
+
+    Attributes
+    ----------
+    robots : (k,) int array
+        Their numbers, ascending.
+    positions : (k, 2) array, m
+        Their known or assumed positions.
+    heard_times : (k,) array, s
+        Times at which they were last heard.
+    """
+
+    robots: IntArray
+    positions: Array
+    heard_times: Array
+
+    @property
+    def size(self) -> int:
+        """Size of a message with the report, bytes: 28 for each robot."""
+        return REPORT_BYTES * len(self.robots)
 
 
 class Teammates(NamedTuple):
@@ -81,14 +109,18 @@ class Teammates(NamedTuple):
         updated.rest_times[rows] = self.rest_times[previous_rows]
         return updated
 
+    def build_report(self) -> TeammateReport:
+        """Build the report of this knowledge for neighbors."""
+        return TeammateReport(self.robots, self.positions, self.heard_times)
+
     def add_reports(
-        self, reports: Sequence[Teammates], robot: int, loss_times: Mapping[int, float]
+        self, reports: Sequence[TeammateReport], robot: int, loss_times: Mapping[int, float]
     ) -> Teammates:
         """Add reports of other robots that are more recent than the robot's own knowledge.
 
         Parameters
         ----------
-        reports : sequence of Teammates
+        reports : sequence of TeammateReport
             Of several reports with the same time, the first one counts.
         robot : int
             The robot itself; reports about it are ignored.
@@ -103,9 +135,16 @@ class Teammates(NamedTuple):
                 for other in report.robots.tolist()
             ]
             is_new = report.heard_times > np.array(min_times)
-            # A reported robot may never have been in range: its silence does not mean that it has failed.
-            report = report._replace(heard_distances=np.full(len(is_new), math.inf))
-            sources.append([column[is_new] for column in report])
+            reported = Teammates(
+                robots=report.robots,
+                positions=report.positions,
+                heard_times=report.heard_times,
+                # It may never have been in range: its silence does not mean that it has failed.
+                heard_distances=np.full(len(is_new), math.inf),
+                rest_times=report.heard_times,
+                rest_positions=report.positions,
+            )
+            sources.append(reported._select(np.flatnonzero(is_new)))
         merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
         # By robot, the most recent first. The sort is stable.
         order = np.lexsort((-merged.heard_times, merged.robots))
@@ -116,3 +155,23 @@ class Teammates(NamedTuple):
         """Return the knowledge about some of the robots, in the given order."""
         columns: list[Any] = [column[rows] for column in self]
         return Teammates(*columns)
+
+
+def receive_reports(seen: Observations, robot: int) -> dict[int, TeammateReport]:
+    """Return the newest report from each sender among the messages that have arrived at a robot in a step.
+
+    Parameters
+    ----------
+    seen : Observations
+    robot : int
+
+    Returns
+    -------
+    dict of int to TeammateReport
+        By the number of the sender.
+    """
+    return {
+        message.sender: message.payload
+        for message in seen.get_messages(robot)
+        if isinstance(message.payload, TeammateReport)
+    }

@@ -10,7 +10,6 @@ coverage cost, these are weighted by their `openness`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -153,26 +152,6 @@ class DiscoveredMap:
         """
         state = self.state.copy()
         _mark_robots(state, self.raster.grid, positions, radius)
-        return self._replace_state(state)
-
-    def merge(self, other_maps: Iterable[DiscoveredMap]) -> DiscoveredMap:
-        """Fill in cells that are unseen in this map from other maps of the same raster.
-
-        Parameters
-        ----------
-        other_maps : iterable of DiscoveredMap
-            In order of precedence.
-
-        Returns
-        -------
-        DiscoveredMap
-            This map itself if the other maps add nothing to it.
-        """
-        state = self.state
-        for other_map in other_maps:
-            # An observation by any robot replaces a presumption; this robot's own observations stay.
-            is_unseen = (state == UNKNOWN) | ((state == PRESUMED_WALL) & (other_map.state != UNKNOWN))
-            state = np.where(is_unseen, other_map.state, state)
         return self._replace_state(state)
 
     def count_changed_walls(self, earlier: DiscoveredMap) -> int:

@@ -330,7 +330,7 @@ def test_the_latest_report_about_a_robot_counts() -> None:
         (5, 9.0, 3.0),  # considered missing since
         (6, 9.0, 4.0),  # as old as its own knowledge
     )
-    later = own.add_reports([report], 0, {4: 2.5, 5: 3.5})
+    later = own.add_reports([report.build_report()], 0, {4: 2.5, 5: 3.5})
     assert later.robots.tolist() == [2, 3, 4, 6]
     assert later.positions[:, 0].tolist() == [0.2, 0.33, 0.4, 0.6]
     assert later.heard_times.tolist() == [5.0, 2.0, 3.0, 4.0]

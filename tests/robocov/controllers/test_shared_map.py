@@ -11,7 +11,7 @@ from robocov.controllers import CONTROLLERS, Rapf, get_information, make_control
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
 from robocov.controllers.scan_exchange import ScanExchange
-from robocov.controllers.shared_map import Situation, assign_goals, list_hearing_groups, update_maps
+from robocov.controllers.shared_map import Situation, assign_goals
 from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
@@ -120,65 +120,6 @@ def test_controllers_state_that_they_share_maps(name: str) -> None:
 def test_the_number_of_nodes_is_checked() -> None:
     with pytest.raises(ParameterError, match=r"voronoi-graph.nodes: expected a whole number from 16"):
         make_controller("voronoi-graph", {"nodes": 3})
-
-
-def add_scans(
-    maps: list[DiscoveredMap], neighbors: Neighbors, distances: np.ndarray, is_hit: np.ndarray
-) -> list[DiscoveredMap]:
-    """Return the maps of robots at (2.02, 2.02) after scans, (n, rays)."""
-    n = len(distances)
-    seen = Observations(
-        np.tile([2.02, 2.02], (n, 1)), np.zeros((n, 2)), neighbors, np.full((n, 2), np.nan), ROOMS.region
-    )
-    return update_maps(maps, seen, Scans(distances, is_hit), list_hearing_groups(neighbors))
-
-
-def build_random_maps() -> list[DiscoveredMap]:
-    """Return the maps of four robots."""
-    rng = np.random.default_rng(0)
-    states = rng.choice([UNKNOWN, FREE, WALL], size=(4, *RASTER.shape)).astype(np.uint8)
-    return [DiscoveredMap(RASTER, state) for state in states]
-
-
-BLIND = np.zeros((4, 8))
-"""Scans of four robots that see nothing."""
-
-
-def test_robots_that_all_hear_each_other_share_one_map() -> None:
-    maps = build_random_maps()
-    later = add_scans(maps, Neighbors(4), BLIND, BLIND > 0.0)
-    assert len({id(known_map) for known_map in later}) == 1
-    # The first robot that knows a cell counts.
-    states = np.array([known_map.state for known_map in maps])
-    first_known = (states != UNKNOWN).argmax(axis=0)
-    np.testing.assert_array_equal(later[0].state, states[first_known, *np.indices(RASTER.shape)])
-
-
-def test_robots_in_a_line_get_the_maps_of_their_neighbors() -> None:
-    """A robot trusts its own cells most; the last robot does not hear any other."""
-    maps = build_random_maps()
-    states = np.array([known_map.state for known_map in maps])
-    positions = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]])
-    line = Neighbors.from_ranges(positions, np.full(4, 1.5))
-    later = add_scans(maps, line, BLIND, BLIND > 0.0)
-    np.testing.assert_array_equal(later[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
-    np.testing.assert_array_equal(later[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
-    assert later[3] is maps[3]
-
-
-def test_errors_of_a_map_are_corrected_by_scans_of_robots_that_share_it() -> None:
-    """Robot 1 believes a wall to be free that robot 2 sees; the pairs do not hear each other."""
-    free = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, np.uint8))
-    unknown = DiscoveredMap(RASTER, np.full(RASTER.shape, UNKNOWN, np.uint8))
-    positions = np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]])
-    pairs = Neighbors.from_ranges(positions, np.full(4, 1.5))
-    distances = np.array([[0.0], [1.0], [0.0], [0.0]])
-    later = add_scans([free, unknown, free, unknown], pairs, distances, distances > 0.0)
-    assert later[0] is later[1]
-    assert later[2] is later[3]
-    assert later[0].is_blocked[20, 30]
-    assert not later[2].is_blocked[20, 30]
-    assert (later[0].state >= WALL).sum() == 1
 
 
 def test_goals_are_assigned_with_the_smallest_sum_of_squared_path_lengths() -> None:

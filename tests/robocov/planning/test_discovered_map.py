@@ -113,20 +113,6 @@ def test_cells_where_robots_are_become_free_except_for_walls(
     assert after.add_robots(positions, radius) is after
 
 
-def test_merging_adds_what_the_other_map_contains(cluttered: Environment, sensor: RangeSensor) -> None:
-    positions = sample_free_positions(cluttered, 6, 2)
-    own = build_map(cluttered, sensor, positions[:3], 3.0)
-    other = build_map(cluttered, sensor, positions[3:], 3.0)
-    both = own.merge([other])
-    is_seen = (own.state == FREE) | (own.state >= WALL)
-    assert np.array_equal(both.state[is_seen], own.state[is_seen])
-    is_added = ~is_seen & (other.state != UNKNOWN)
-    assert np.array_equal(both.state[is_added], other.state[is_added])
-    is_unchanged = ~is_seen & ~is_added
-    assert np.array_equal(both.state[is_unchanged], own.state[is_unchanged])
-    assert both.merge([own, other]) is both
-
-
 def test_a_wall_is_removed_when_rays_have_passed_it_in_several_scans(empty: Environment) -> None:
     position = np.array([2.0, 2.0])
     raster = Raster(empty.region, 0.05)
