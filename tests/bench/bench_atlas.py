@@ -1,6 +1,12 @@
-"""The goals of `atlas` that the benchmark's tracks do not measure, and another simulator's setting.
+"""Measure the goals of the controller `atlas` that the benchmark's tracks do not cover.
 
-python tests/bench/bench_atlas.py doors sizes ranges rest pace lpac [--controller atlas-shared] [--count 200]
+    python tests/bench/bench_atlas.py doors sizes ranges rest pace --controller atlas-shared
+
+- ``doors``: whether robots find narrow doors in walls of random direction
+- ``sizes``: whether a larger team is ever worse than a smaller one
+- ``ranges``: gaps, rest and path lengths with limited ranges, beside `rapf`
+- ``rest``: whether a team that has rested for ten minutes responds to a failure and to an open door
+- ``pace``: computing time, beside `rapf`
 """
 
 from __future__ import annotations
@@ -8,10 +14,11 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -20,202 +27,279 @@ from robocov import (
     CoverageCost,
     Environment,
     Failure,
-    Gaussian,
-    Gaussians,
     Simulation,
     Team,
-    UniformStart,
     generate_map,
     load_map,
     make_controller,
 )
+from robocov.arrays import Array
 from robocov.environment import WallObstacle
 from robocov.metrics import compute_path_lengths, find_settling_time
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.results import find_reference
 
-SIZES = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200)
-SEEDS = range(901, 905)
-SHORT = 3.0
-RANGES = ({}, {"communication_range": 3.0}, {"communication_range": 6.0}, {"sensing_range": 6.0})
-PROTOTYPE = {6: 0.168, 50: 0.263, 200: 0.575}  # ms, a vectorized step of RAPF before there was a compiled one
+REFERENCE_CONTROLLER = "rapf"
+ROBOT_RADIUS_M = 0.1
+SHORT_RANGE_M = 3.0
+
+SQUARE_SIDE_M = 8.0
+"""Side of the square with a wall through its center."""
+WALL_WIDTH_M = 0.1
+DOOR_WIDTH_RANGE = (1.6, 3.0)
+"""Range of the widths of random doors, in diameters of a robot."""
+MAX_DOOR_OFFSET_M = 1.5
+"""Maximum distance of a door from the center of its wall."""
+MAX_CROSSING_TIME_S = 30.0
+CROSSED_DISTANCE_M = 0.15
+"""A robot has crossed the wall if its center is this far behind the wall's center line."""
+
+TEAM_SIZES = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200)
+MAX_CORNER_TEAM = 50
+"""Largest of these teams that fits into the corner where it starts."""
+ROOM_SEEDS = range(901, 905)
+
+LIMITED_RANGES: tuple[dict[str, float], ...] = (
+    {},
+    {"communication_range": SHORT_RANGE_M},
+    {"communication_range": 6.0},
+    {"sensing_range": 6.0},
+)
+LARGE_GAP = 0.05
+
+REST_TIME_S = 600.0
+RESPONSE_TIME_S = 60.0
+PACE_DURATION_S = 20.0
+FIRST_VERSION_STEP_MS = {6: 0.168, 50: 0.263, 200: 0.575}
+"""Time of a step of RAPF before its kernels were compiled, by team size."""
+STEPS_PER_S = 60
+
+Event: TypeAlias = Literal["nothing happens", "a robot fails", "a door opens"]
+EVENTS: tuple[Event, ...] = ("nothing happens", "a robot fails", "a door opens")
 
 
-def walls(turn: float, door: float, width: float) -> tuple[WallObstacle, WallObstacle]:
-    """Return the two halves of a wall through the middle of 8 x 8 m, with a door."""
-    along = np.array([-math.sin(turn), math.cos(turn)])
-    ends = [(4.0 + along * far).tolist() for far in (-6.0, door - width / 2, door + width / 2, 6.0)]
-    return WallObstacle(ends[:2], 0.1), WallObstacle(ends[2:], 0.1)
+class FinalState(NamedTuple):
+    """State of a team in the end."""
+
+    mean_distance: float
+    """m"""
+    mean_path_length: float
+    """m"""
 
 
-def crosses(name: str, seed: int) -> bool:
-    """Return whether one of three robots goes through a random door within 30 s."""
+class LimitedRun(NamedTuple):
+    """Result of a run with limited ranges."""
+
+    gap: float
+    settling_time: float
+    """s, nan if the team does not come to rest."""
+    mean_path_length: float
+    """m"""
+
+
+def build_wall(direction: float, door_offset: float, door_width: float) -> tuple[WallObstacle, WallObstacle]:
+    """Build the two halves of a wall with a door, through the center of the square.
+
+    Parameters
+    ----------
+    direction : float, rad
+        Direction of the wall's normal vector, from +x.
+    door_offset : float, m
+        Position of the door along the wall, from the center of the square.
+    door_width : float, m
+
+    Returns
+    -------
+    tuple of two WallObstacle
+    """
+    along = np.array([-math.sin(direction), math.cos(direction)])
+    center = 0.5 * SQUARE_SIDE_M
+    half_length = 0.75 * SQUARE_SIDE_M
+    half_width = 0.5 * door_width
+    ends = [-half_length, door_offset - half_width, door_offset + half_width, half_length]
+    points = [(float(x), float(y)) for x, y in center + np.outer(ends, along)]
+    first_half = WallObstacle((points[0], points[1]), WALL_WIDTH_M)
+    second_half = WallObstacle((points[2], points[3]), WALL_WIDTH_M)
+    return first_half, second_half
+
+
+def build_divided_square(name: str, wall: tuple[WallObstacle, WallObstacle]) -> Environment:
+    """Build the square with a wall through its center."""
+    side = SQUARE_SIDE_M
+    return Environment(name, ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side)), wall)
+
+
+def crosses_door(controller: str, seed: int) -> bool:
+    """Return whether one of three robots passes through a random door in time."""
     rng = np.random.default_rng(seed)
-    width = 0.2 * rng.uniform(1.6, 3.0)
-    turn = rng.uniform(0.0, math.tau)
-    door = rng.uniform(-1.5, 1.5)
-    square = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
-    across = np.array([math.cos(turn), math.sin(turn)])
-    begin = 4.0 - 2.0 * across + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
-    some = Simulation(Environment("door", square, walls(turn, door, width)), make_controller(name), begin)
-    while some.time < 30.0 and ((some.positions - 4.0) @ across).max() < 0.15:
-        some.step()
-    return some.time < 30.0
+    door_width = 2.0 * ROBOT_RADIUS_M * rng.uniform(*DOOR_WIDTH_RANGE)
+    direction = rng.uniform(0.0, math.tau)
+    door_offset = rng.uniform(-MAX_DOOR_OFFSET_M, MAX_DOOR_OFFSET_M)
+    environment = build_divided_square("door", build_wall(direction, door_offset, door_width))
+    normal = np.array([math.cos(direction), math.sin(direction)])
+    center = 0.5 * SQUARE_SIDE_M
+    starts = center - 2.0 * normal + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
+    simulation = Simulation(environment, make_controller(controller), starts)
+    while simulation.time < MAX_CROSSING_TIME_S:
+        simulation.step()
+        if ((simulation.positions - center) @ normal).max() >= CROSSED_DISTANCE_M:
+            return True
+    return False
 
 
-def doors(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    crossed = np.array(list(pool.map(partial(crosses, name), range(count))))
-    yield f"{crossed.sum()} of {count}, 1.6 to 3 diameters wide, are crossed; not {np.flatnonzero(~crossed)}"
+def measure_doors(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield the number of random doors that robots pass through."""
+    is_crossed = np.array(list(pool.map(partial(crosses_door, controller), range(count))))
+    failed_seeds = np.flatnonzero(~is_crossed)
+    low, high = DOOR_WIDTH_RANGE
+    yield f"{is_crossed.sum()} of {count} doors of {low:g} to {high:g} diameters crossed; not {failed_seeds}"
 
 
-def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float]:
-    """Return the mean distance, and the mean way, of a team in generated rooms after 60 s, m."""
+def run_in_rooms(controller: str, seed: int, communication_range: float, robots: int) -> FinalState:
+    """Run a team in generated rooms for 60 s."""
     rooms = generate_map(seed, kind="rooms")
-    team = Team.homogeneous(robots, communication_range=hears)
-    start = rooms.start(None).sample(robots, seed=0, radius=0.1)
-    some = Simulation(rooms, make_controller(name), start, team)
-    walked = 0.0
-    before = start
-    while some.time < 60.0:
-        some.step()
-        walked += float(np.hypot(*(some.positions - before).T).mean())
-        before = some.positions
-    return CoverageCost(rooms, lattice=64)(some.positions).mean_distance, walked
+    team = Team.homogeneous(robots, communication_range=communication_range)
+    starts = rooms.start(None).sample(robots, seed=0, radius=ROBOT_RADIUS_M)
+    record = Simulation(rooms, make_controller(controller), starts, team).run(60.0)
+    cost = CoverageCost(rooms, lattice=64)(record.positions[-1])
+    path_lengths = compute_path_lengths(record.positions)
+    return FinalState(mean_distance=cost.mean_distance, mean_path_length=float(path_lengths.mean()))
 
 
-def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Mean distances by team size, and how far one is above that of a smaller team: it should never rise."""
-    for hears in (math.inf, SHORT):  # more than 90 do not fit into the corner where they begin
-        for seed in SEEDS:
-            found = list(pool.map(partial(final, name, seed, hears), SIZES[:-2]))
-            costs = np.array([cost for cost, _ in found])
-            rises = costs / np.minimum.accumulate(costs) - 1.0
-            told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=False))
-            first = f"rises by {rises.max():.1%}; one walks {found[0][1]:.1f} m"
-            yield f"rooms {seed}, hear {hears} m: {told} m, {first}"
+def measure_sizes(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield mean distances by team size, and by how much one exceeds that of a smaller team."""
+    sizes = [size for size in TEAM_SIZES if size <= MAX_CORNER_TEAM]
+    for communication_range in (math.inf, SHORT_RANGE_M):
+        for seed in ROOM_SEEDS:
+            run = partial(run_in_rooms, controller, seed, communication_range)
+            states = list(pool.map(run, sizes))
+            costs = np.array([state.mean_distance for state in states])
+            increases = costs / np.minimum.accumulate(costs) - 1.0
+            table = ", ".join(f"{size}: {cost:.2f}" for size, cost in zip(sizes, costs, strict=True))
+            yield (
+                f"rooms {seed}, communication range {communication_range} m: {table} m; "
+                f"largest increase {increases.max():.1%}; "
+                f"path of a single robot {states[0].mean_path_length:.1f} m"
+            )
 
 
-def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, float]:
-    """Return gap, when the team came to rest (s, or nan), and mean way (m) of 120 s on a map of the suite."""
-    rooms = suite.load_suite_map(on)
-    team = Team.homogeneous(suite.TEAM_SIZE, **changes)
-    start = rooms.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
-    record = Simulation(rooms, make_controller(name), start, team).run(120.0)
-    cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
-    rest = find_settling_time(record.time, record.positions)
-    gap = cost / find_reference(on, suite.TEAM_SIZE)["mean_distance_m"] - 1.0
-    return gap, math.nan if rest is None else rest, float(compute_path_lengths(record.positions).mean())
+def run_with_ranges(controller: str, map_name: str, ranges: Mapping[str, float]) -> LimitedRun:
+    """Run six robots on a map of the suite for 120 s."""
+    environment = suite.load_suite_map(map_name)
+    team = Team.homogeneous(suite.TEAM_SIZE, **ranges)
+    starts = environment.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
+    record = Simulation(environment, make_controller(controller), starts, team).run(120.0)
+    cost = CoverageCost(environment, suite.LATTICE)(record.positions[-1])
+    reference = find_reference(map_name, suite.TEAM_SIZE)["mean_distance_m"]
+    settling_time = find_settling_time(record.time, record.positions)
+    return LimitedRun(
+        gap=cost.mean_distance / reference - 1.0,
+        settling_time=math.nan if settling_time is None else settling_time,
+        mean_path_length=float(compute_path_lengths(record.positions).mean()),
+    )
 
 
-def ranges(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Six robots on the maps of the benchmark's short-range track for 120 s, beside RAPF."""
+def measure_ranges(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield gaps, rest and path lengths on the maps of the short-range track, beside `rapf`."""
     maps = suite.TRACKS["short-range"].maps
-    for changes in RANGES:
-        tables = [list(pool.map(partial(ended, each, changes=changes), maps)) for each in (name, "rapf")]
-        (gaps, rest, ways), (others, _, theirs) = (np.transpose(each) for each in tables)
-        behind = [each for each, mine, its in zip(maps, gaps, others, strict=True) if mine > its]
-        above = (gaps > 0.05).sum()
-        still = np.isfinite(rest).mean()
+    for ranges in LIMITED_RANGES:
+        runs = list(pool.map(partial(run_with_ranges, controller, ranges=ranges), maps))
+        reference_runs = list(pool.map(partial(run_with_ranges, REFERENCE_CONTROLLER, ranges=ranges), maps))
+        gaps = np.array([run.gap for run in runs])
+        reference_gaps = np.array([run.gap for run in reference_runs])
+        is_settled = np.isfinite([run.settling_time for run in runs])
+        path_length = np.median([run.mean_path_length for run in runs])
+        reference_path_length = np.median([run.mean_path_length for run in reference_runs])
+        worse_maps = [name for name, is_worse in zip(maps, gaps > reference_gaps, strict=True) if is_worse]
         yield (
-            f"{changes or 'all hear all, see 3 m'}: gap {np.median(gaps):.1%} (worst {gaps.max():.0%}; "
-            f"{above} of {len(maps)} above 5 %), {still:.0%} at rest by 120 s, way {np.median(ways):.1f} m; "
-            f"RAPF {np.median(others):.1%}, {np.median(theirs):.1f} m; behind it on {behind}"
+            f"{ranges or 'usual ranges'}: median gap {np.median(gaps):.1%}, largest {gaps.max():.0%}, "
+            f"{(gaps > LARGE_GAP).sum()} of {len(maps)} above {LARGE_GAP:.0%}; "
+            f"{is_settled.mean():.0%} settled after 120 s; path length {path_length:.1f} m; "
+            f"{REFERENCE_CONTROLLER}: gap {np.median(reference_gaps):.1%}, "
+            f"path length {reference_path_length:.1f} m; worse than it on {worse_maps}"
         )
 
 
-def moved(name: str, what: str) -> float:
-    """Return how far a team that has rested for ten minutes goes when something happens, mean, m."""
-    rooms = load_map("rooms")
-    start = rooms.start(None).sample(6, seed=0, radius=0.1)
-    square = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
-    if what == "a door opens":
-        rooms = Environment("shut", square, walls(0.0, 0.0, 0.0))
-        start = np.array([[x, y] for x in (1.0, 1.5) for y in (1.0, 1.5, 2.0)])
-    dies = Conditions(failures=(Failure(2, 600.0),)) if what == "a robot fails" else None
-    some = Simulation(rooms, make_controller(name), start, conditions=dies)
-    while some.time < 600.0:
-        some.step()
-    before = some.positions
-    if what == "a door opens":
-        some = some.with_changes(environment=replace(rooms, name="open", obstacles=walls(0.0, 0.0, 1.0)))
-    while some.time < 660.0:
-        some.step()
-    return float(np.hypot(*(some.positions - before).T).mean())
+def measure_response(controller: str, event: Event) -> float:
+    """Return how far a team that has rested for ten minutes moves after an event, as a mean, m."""
+    environment = load_map("rooms")
+    starts = environment.start(None).sample(6, seed=0, radius=ROBOT_RADIUS_M)
+    conditions = None
+    if event == "a robot fails":
+        conditions = Conditions(failures=(Failure(2, REST_TIME_S),))
+    elif event == "a door opens":
+        environment = build_divided_square("shut", build_wall(0.0, 0.0, 0.0))
+        starts = np.array([[x, y] for x in (1.0, 1.5) for y in (1.0, 1.5, 2.0)])
+    simulation = Simulation(environment, make_controller(controller), starts, conditions=conditions)
+    simulation.run(REST_TIME_S)
+    rest_positions = simulation.positions
+    if event == "a door opens":
+        opened = replace(environment, name="open", obstacles=build_wall(0.0, 0.0, 1.0))
+        simulation = simulation.with_changes(environment=opened)
+    simulation.run(RESPONSE_TIME_S)
+    return float(np.hypot(*(simulation.positions - rest_positions).T).mean())
 
 
-def rest(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    events = ("nothing happens", "a robot fails", "a door opens")
-    for what, way in zip(events, pool.map(partial(moved, name), events), strict=True):
-        yield f"after 10 min {what}: in 1 min robots move by {way:.2f} m"
+def measure_rest(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield how far a team at rest moves after each event."""
+    distances = pool.map(partial(measure_response, controller), EVENTS)
+    for event, distance in zip(EVENTS, distances, strict=True):
+        yield f"after 10 min of rest, {event}: robots move by {distance:.2f} m within 1 min"
 
 
-def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Seconds of the whole simulation for one second: six robots on 10 x 10 m, more on as much each."""
-    for n in SIZES:
-        side = 10.0 * max(1.0, math.sqrt(n / 6.0))
-        rooms = generate_map(7, kind="polygons", side=side, obstacles=max(6, n))
-        start = rooms.start("uniform").sample(n, seed=0, radius=0.1)
-        took = []
-        for each in (name, "rapf"):
-            some = Simulation(rooms, make_controller(each), start)
-            some.step()
-            began = time.perf_counter()
-            while some.time < 20.0:
-                some.step()
-            took.append((time.perf_counter() - began) / 20.0)
-        old = f", {took[0] / (0.06 * PROTOTYPE[n]):.1f} times its prototype's" if n in PROTOTYPE else ""
-        yield f"{n} robots: {took[0]:.3f} s for one second, {took[0] / took[1]:.0f} times RAPF's{old}"
+def time_simulation(controller: str, environment: Environment, starts: Array) -> float:
+    """Return the computing time of a simulated second, s."""
+    simulation = Simulation(environment, make_controller(controller), starts)
+    # The first step compiles kernels.
+    simulation.step()
+    start_time = time.perf_counter()
+    while simulation.time < PACE_DURATION_S:
+        simulation.step()
+    return (time.perf_counter() - start_time) / PACE_DURATION_S
 
 
-def world(seed: int) -> tuple[Environment, np.ndarray]:
-    """Return the default setting of the simulator CoverageControl (Agarwal et al. 2024, LPAC), and starts.
-
-    32 robots in a square of 1024 m without obstacles, with 32 places of interest.
-    """
-    rng = np.random.default_rng(seed)
-    side = 1024.0
-    peaks = [
-        Gaussian(tuple(rng.uniform(0.0, side, 2).tolist()), rng.uniform(6.0, 10.0), rng.uniform(40.0, 60.0))
-        for _ in range(32)
-    ]
-    square = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side))
-    field = Environment("field", square, density=Gaussians(tuple(peaks), 0.0), starts={"any": UniformStart()})
-    return field, field.start("any").sample(32, seed=seed, radius=1.0)
-
-
-def remaining(name: str, seed: int) -> float:
-    """Return the sum of squared distances, weighed by the density, after 120 s by that at the start."""
-    field, start = world(seed)
-    team = Team.homogeneous(
-        32, radius=1.0, max_speed=5.0, max_acceleration=10.0, sensing_range=32.0, communication_range=128.0
-    )
-    some = Simulation(field, make_controller(name), start, team)
-    cost = CoverageCost(field, 128)
-    while some.time < 120.0:
-        some.step()
-    weights = field.density.evaluate(cost.points)
-    ends, begins = (weights @ cost(each).distances ** 2 for each in (some.positions, start))
-    return float(ends / begins)
+def measure_pace(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield computing times by team size, on maps with the same area for each robot."""
+    for size in TEAM_SIZES:
+        side = 10.0 * max(1.0, math.sqrt(size / 6.0))
+        environment = generate_map(7, kind="polygons", side=side, obstacles=max(6, size))
+        starts = environment.start("uniform").sample(size, seed=0, radius=ROBOT_RADIUS_M)
+        seconds = time_simulation(controller, environment, starts)
+        reference_seconds = time_simulation(REFERENCE_CONTROLLER, environment, starts)
+        line = (
+            f"{size} robots: {seconds:.3f} s per simulated second, "
+            f"{seconds / reference_seconds:.0f} times {REFERENCE_CONTROLLER}"
+        )
+        if size in FIRST_VERSION_STEP_MS:
+            first_version_seconds = STEPS_PER_S * FIRST_VERSION_STEP_MS[size] / 1000.0
+            line += f", {seconds / first_version_seconds:.1f} times its first version in numpy"
+        yield line
 
 
-def lpac(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    shares = np.array(list(pool.map(partial(remaining, name), range(4))))
-    told = " ".join(f"{each:.2f}" for each in shares)
-    yield f"CoverageControl's setting: after 120 s {shares.mean():.2f} of the first cost is left ({told})"
+Measure: TypeAlias = Callable[[str, int, ProcessPoolExecutor], Iterator[str]]
+MEASURES: Mapping[str, Measure] = {
+    "doors": measure_doors,
+    "sizes": measure_sizes,
+    "ranges": measure_ranges,
+    "rest": measure_rest,
+    "pace": measure_pace,
+}
 
 
 def main() -> None:
-    measures = {each.__name__: each for each in (doors, sizes, ranges, rest, pace, lpac)}
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="+", choices=measures)
+    """Print the measures that are named on the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("measures", nargs="+", choices=MEASURES)
     parser.add_argument("--controller", default="atlas")
-    parser.add_argument("--count", type=int, default=200, help="of doors")
-    parser.add_argument("--workers", type=int, default=2)
-    given = parser.parse_args()
-    with ProcessPoolExecutor(given.workers) as pool:
-        for what in given.what:
-            for line in measures[what](given.controller, given.count, pool):
-                print(f"{given.controller}, {what}: {line}", flush=True)
+    parser.add_argument("--count", type=int, default=200, help="number of doors")
+    parser.add_argument("--workers", type=int, default=2, help="number of processes")
+    arguments = parser.parse_args()
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        for name in arguments.measures:
+            for line in MEASURES[name](arguments.controller, arguments.count, pool):
+                print(f"{arguments.controller}, {name}: {line}", flush=True)
 
 
 if __name__ == "__main__":
