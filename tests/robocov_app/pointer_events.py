@@ -9,7 +9,12 @@ REACH_M = 0.1
 
 
 def build_event(
-    point: tuple[float, float], *, robot: int | None = None, is_right: bool = False
+    point: tuple[float, float],
+    *,
+    robot: int | None = None,
+    is_right: bool = False,
+    shift: bool = False,
+    alt: bool = False,
 ) -> ViewerPointerEvent:
     """Build the event of a pointer that does not snap, at a position in m."""
-    return ViewerPointerEvent(point, point, REACH_M, robot=robot, is_right=is_right)
+    return ViewerPointerEvent(point, point, REACH_M, shift, alt, robot=robot, is_right=is_right)

@@ -88,6 +88,15 @@ class ViewerModel(WindowModel):
             return selected
         return None
 
+    @property
+    def selected_obstacle(self) -> int | None:
+        """Index of the selected obstacle, if it is still on the displayed map."""
+        obstacles = self.session.displayed.environment.obstacles
+        selected = self.inspection.obstacle
+        if selected is None or selected not in obstacles:
+            return None
+        return obstacles.index(selected)
+
     def attempt(self, action: Callable[[], object]) -> None:
         """Run an action, and show the message that it returns or the error that it raises."""
         super().attempt(action)

@@ -7,6 +7,7 @@ from robocov_app.viewer.actions.comparison import ComparisonActions
 from robocov_app.viewer.actions.files import FileActions
 from robocov_app.viewer.actions.playback import PlaybackActions
 from robocov_app.viewer.actions.robots import RobotActions
+from robocov_app.viewer.actions.selection import SelectionActions
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.session import Session
@@ -42,6 +43,8 @@ class Presenter(ViewerModel):
         Actions on controllers, gains and limits.
     robots : RobotActions
         Actions on single robots.
+    selection : SelectionActions
+        Actions on the selected robot or obstacle.
     files : FileActions
         Actions on maps, sessions and drafts.
     """
@@ -63,6 +66,7 @@ class Presenter(ViewerModel):
         self.playback = PlaybackActions(self)
         self.comparison = ComparisonActions(self)
         self.robots = RobotActions(self)
+        self.selection = SelectionActions(self, self.robots)
         self.files = FileActions(self, folder, map_name=map_name, draft_folder=draft_folder, file=file)
 
     def choose_tool(self, name: str) -> None:
@@ -81,5 +85,11 @@ class Presenter(ViewerModel):
             self.toolbox.current = self.toolbox.hand
 
     def resize_tool(self, factor: float) -> None:
-        """Change the size of the tool in use by a factor; if it has no size, the width of new walls."""
+        """Change the size of the tool in use by a factor; if it has none, the width of walls.
+
+        The hand changes the selected wall. If no wall is selected, it is the width of new walls.
+        """
+        if self.tool is self.toolbox.hand and self.selection.has_wall:
+            self.show_message(self.selection.scale_wall_width(factor))
+            return
         self.show_message(self.toolbox.resizable.resize(self.session, factor))

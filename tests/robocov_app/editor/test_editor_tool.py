@@ -10,8 +10,6 @@ from robocov_app.editor.edits.paths import describe_path
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model import geometry
 from robocov_app.editor.model.geometry import (
-    SHIFT_ANGLE_DEG,
-    constrain_angle,
     distance,
     format_bearing,
     format_length,
@@ -20,7 +18,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import format_position, translate_message
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
-from robocov_app.toolkit.tools.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import SHIFT_ANGLE_DEG, compute_cos_sin, constrain_angle
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)

@@ -167,7 +167,7 @@ def test_the_hand_moves_obstacles():
     session = start_session()
     hand.press(session, build_event((4.2, 1.2)))
     assert hand.obstacle == 0
-    assert hand.build_overlay(session) == ViewerToolOverlay()
+    assert hand.build_overlay(session) == ViewerToolOverlay(selected=HALL.obstacles[0])
     hand.move(session, build_event((4.5, 2.2)))
     state = hand.build_overlay(session)
     assert state.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
@@ -176,7 +176,7 @@ def test_the_hand_moves_obstacles():
     assert session.displayed.environment is HALL
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) == "circle “pillar” moved"
     assert session.displayed.environment.obstacles == (state.obstacle, HALL.obstacles[1])
-    assert hand.build_overlay(session) == ViewerToolOverlay()
+    assert hand.build_overlay(session) == ViewerToolOverlay(selected=state.obstacle)
     assert session.undo() == "circle “pillar” moved"
     assert session.displayed.environment == HALL
 
@@ -197,7 +197,7 @@ def test_the_map_can_change_while_an_obstacle_is_dragged():
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "obstacles reversed")
-    assert hand.build_overlay(session) == ViewerToolOverlay()
+    assert hand.build_overlay(session) == ViewerToolOverlay(selected=HALL.obstacles[0])
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))

@@ -13,10 +13,9 @@ from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.toolkit.tools.geometry import compute_bearing, compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_bearing
 
 Box: TypeAlias = tuple[float, float, float, float]  # minimum x and y, maximum x and y, m
-SHIFT_ANGLE_DEG = 45.0  # while Shift is held, lines and moves have a multiple of this angle
 SHIFT_ROTATION_DEG = 15.0  # while Shift is held, rotations are a multiple of this angle
 DECIMALS = 4  # decimal places of lengths in files, m: tenths of a millimeter
 distance = math.dist
@@ -65,13 +64,6 @@ def drop_repeated_points(ring: Iterable[Point], *, is_closed: bool = True) -> Ri
 def compute_leveling_angle(a: Point, b: Point) -> float:
     """Return the smallest rotation that makes the line from `a` to `b` horizontal or vertical, degrees."""
     return 90.0 * round(compute_bearing(a, b) / 90.0) - compute_bearing(a, b)
-
-
-def constrain_angle(origin: Point, point: Point) -> Point:
-    """Move a point to the nearest line through `origin` whose angle is a multiple of `SHIFT_ANGLE_DEG`."""
-    cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
-    along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
-    return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0
 
 
 def build_rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:

@@ -14,7 +14,7 @@ from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.tool import EditorPointerEvent
 from robocov_app.editor.tools.tool_overlay import DraggedImage, EditorToolOverlay
-from robocov_app.toolkit.tools.geometry import compute_bearing
+from robocov_app.toolkit.tools.geometry import compute_bearing, constrain_angle
 from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tools.tool import CursorShape
 
@@ -120,7 +120,7 @@ class MoveDrag(Drag):
         self.guides = ()
         end = event.unsnapped_point
         if event.shift:
-            end = geometry.constrain_angle(self._start, event.unsnapped_point)
+            end = constrain_angle(self._start, event.unsnapped_point)
         dx = end[0] - self._start[0]
         dy = end[1] - self._start[1]
         context = self.context
@@ -188,7 +188,7 @@ class VertexDrag(Drag):
         """Update the drag after a move of the pointer."""
         if event.shift and self._origin is not None:
             self.guides = ()
-            self._place(geometry.constrain_angle(self._origin, event.unsnapped_point))
+            self._place(constrain_angle(self._origin, event.unsnapped_point))
         else:
             self._place(self._snap(event, event.unsnapped_point, self._origin))
 

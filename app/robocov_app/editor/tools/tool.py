@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from robocov.environment import Point
 from robocov.errors import MapError
-from robocov_app.editor.model.geometry import constrain_angle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.tools.context import EditorContext
@@ -16,12 +15,6 @@ from robocov_app.toolkit.tools.tool import PointerEvent, Tool
 @dataclass(frozen=True)
 class EditorPointerEvent(PointerEvent):
     """Event of the pointer on the sheet."""
-
-    def constrain(self, origin: Point | None) -> Point:
-        """Return the snapped point; with Shift, the nearest point at a round angle from `origin`."""
-        if self.shift and origin is not None:
-            return constrain_angle(origin, self.unsnapped_point)
-        return self.point
 
 
 class EditorTool(Tool[EditorContext, EditorPointerEvent]):

@@ -9,7 +9,15 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.tool import EditorPointerEvent
 from robocov_app.toolkit.panel import WindowPart
-from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
+from robocov_app.toolkit.tools.pointer import (
+    LEFT_BUTTON,
+    RIGHT_BUTTON,
+    Gesture,
+    PanGesture,
+    Pixel,
+    Pointer,
+    read_modifiers,
+)
 from robocov_app.toolkit.tools.snapping import Snap
 from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
@@ -157,12 +165,11 @@ class EditorPointer(Pointer):
         tool = editor.tool
         unsnapped = self.canvas.to_world(pixel)
         reach = REACH_PX * editor.pixel
-        modifiers = pygame.key.get_mods()
-        has_ctrl = bool(modifiers & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        modifiers = read_modifiers()
         point = unsnapped
         if tool.snaps:
             snap = Snap(unsnapped)
-            if editor.snaps and not has_ctrl:
+            if editor.snaps and not modifiers.ctrl:
                 snap = editor.snap(unsnapped, reach, tool.origin, tool.snap_points)
             point = snap.point
             tool.guides = snap.guides
@@ -170,9 +177,9 @@ class EditorPointer(Pointer):
             point=point,
             unsnapped_point=unsnapped,
             reach=reach,
-            shift=bool(modifiers & pygame.KMOD_SHIFT),
-            alt=bool(modifiers & pygame.KMOD_ALT),
-            ctrl=has_ctrl,
+            shift=modifiers.shift,
+            alt=modifiers.alt,
+            ctrl=modifiers.ctrl,
         )
 
 

@@ -9,6 +9,9 @@ from robocov.arrays import Array
 
 Point: TypeAlias = tuple[float, float]
 
+SHIFT_ANGLE_DEG = 45.0
+"""While Shift is held, lines and moves have a multiple of this angle."""
+
 
 def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
     """Find the point of each edge that is nearest to a given point.
@@ -46,3 +49,10 @@ def compute_cos_sin(degrees: float) -> tuple[float, float]:
 def compute_bearing(a: Point, b: Point) -> float:
     """Return the direction from point a to point b, in degrees counterclockwise from the x axis."""
     return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+
+
+def constrain_angle(origin: Point, point: Point) -> Point:
+    """Move a point to the nearest line through `origin` whose angle is a multiple of `SHIFT_ANGLE_DEG`."""
+    cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
+    along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
+    return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0

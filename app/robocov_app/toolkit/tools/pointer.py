@@ -17,6 +17,24 @@ _NEVER_S = -1.0
 Pixel: TypeAlias = tuple[int, int]
 
 
+class Modifiers(NamedTuple):
+    """Modifier keys that are held down; Ctrl includes the Command key of macOS."""
+
+    shift: bool
+    alt: bool
+    ctrl: bool
+
+
+def read_modifiers() -> Modifiers:
+    """Return the modifier keys that are held down."""
+    held = pygame.key.get_mods()
+    return Modifiers(
+        shift=bool(held & pygame.KMOD_SHIFT),
+        alt=bool(held & pygame.KMOD_ALT),
+        ctrl=bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META)),
+    )
+
+
 class Gesture:
     """Action of the mouse while a button is held down: base class of the gestures.
 

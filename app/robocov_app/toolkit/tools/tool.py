@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from math import dist
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
-Point: TypeAlias = tuple[float, float]
+from robocov_app.toolkit.tools.geometry import Point, constrain_angle
+
 CursorShape: TypeAlias = Literal["arrow", "cross", "hand", "move", "sideways", "updown", "rising", "falling"]
 """Shape of the mouse cursor; "rising" and "falling" are arrows along the diagonals."""
 
@@ -35,6 +36,12 @@ class PointerEvent:
     shift: bool = False
     alt: bool = False
     ctrl: bool = False
+
+    def constrain(self, origin: Point | None) -> Point:
+        """Return the snapped point; with Shift, the nearest point at a round angle from `origin`."""
+        if self.shift and origin is not None:
+            return constrain_angle(origin, self.unsnapped_point)
+        return self.point
 
     def has_moved_from(self, position: Point) -> bool:
         """Return whether the pointer has moved deliberately since it was pressed at a position, m."""
@@ -89,6 +96,11 @@ class Tool(Generic[ContextT, EventT]):
     key = ""
     hint = ""
     snaps = False
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an action has been started but not completed."""
+        return False
 
     def press(self, context: ContextT, event: EventT) -> str | None:
         """Handle a press of the button."""

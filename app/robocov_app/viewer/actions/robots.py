@@ -27,7 +27,7 @@ class RobotActions:
         """
         if number not in self._viewer.robot_numbers:
             raise ParameterError(f"there is no robot {number}")
-        self._viewer.inspection.selected = number
+        self._viewer.inspection.select_robot(number)
 
     def select_next(self, steps: int) -> None:
         """Select the robot that is `steps` places further in the order of their numbers, cyclically."""
@@ -38,7 +38,7 @@ class RobotActions:
         else:
             # So that the first selection is the first robot forwards, and the last robot backwards.
             index = -1 if steps > 0 else 0
-        self._viewer.inspection.selected = numbers[(index + steps) % len(numbers)]
+        self._viewer.inspection.select_robot(numbers[(index + steps) % len(numbers)])
 
     def fail_or_revive(self) -> None:
         """Let the selected robot fail, or revive it."""
@@ -47,6 +47,25 @@ class RobotActions:
     def remove(self) -> None:
         """Remove the selected robot from the team."""
         self._viewer.session.remove_robot(self._require_selected())
+
+    def add_at_cursor(self) -> str:
+        """Let a robot join at the free position nearest to the cursor; return a message."""
+        cursor = self._viewer.inspection.cursor
+        if cursor is None:
+            raise ParameterError("move the mouse to where the robot should join")
+        return f"robot {self._viewer.session.add_robot(cursor)} joined"
+
+    def toggle_following(self) -> str:
+        """Let the camera follow the selected robot, or stop following; return a message."""
+        inspection = self._viewer.inspection
+        number = self._require_selected()
+        if inspection.followed == number:
+            inspection.followed = None
+            return f"the view no longer follows robot {number}"
+        if number not in self._viewer.session.displayed.numbers:
+            raise ParameterError(f"robot {number} has failed: revive it first")
+        inspection.followed = number
+        return f"the view follows robot {number}; panning or F stops it"
 
     def _require_selected(self) -> int:
         selected = self._viewer.selected_robot

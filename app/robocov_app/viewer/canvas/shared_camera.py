@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.environment import Point
 from robocov_app.render.camera import Camera
 from robocov_app.render.painter import Painter
 from robocov_app.toolkit.tools.viewport import zoom_about
@@ -13,6 +14,8 @@ from robocov_app.viewer.canvas.camera_glide import CameraGlide
 from robocov_app.viewer.presenter import Presenter
 
 MAX_GLIDE_STEP_S = 0.05
+FOLLOW_ZOOM = 2.0
+"""Factor by which the view zooms in when it starts to follow a robot and the whole map is shown."""
 
 
 class SharedCamera:
@@ -43,7 +46,8 @@ class SharedCamera:
             self._pass_to_painters(self._camera)
 
     def fit(self) -> None:
-        """Show the whole map at once."""
+        """Show the whole map at once, and no longer follow a robot."""
+        self._viewer.inspection.followed = None
         self._glide = None
         self._camera = None
         for painter in self._painters:
@@ -65,10 +69,21 @@ class SharedCamera:
         self._glide_from(start)
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the map by dx and dy pixels; the center of the view stays within the bounds of the map."""
+        """Move the map by dx and dy pixels, and no longer follow a robot.
+
+        The center of the view stays within the bounds of the map.
+        """
+        self._viewer.inspection.followed = None
         camera = self._painters[0].camera.pan(dx, dy)
         x, y = np.clip(camera.center, *self._get_bounds()).tolist()
         self._show(replace(camera, center=(x, y)))
+
+    def center_on(self, point: Point) -> None:
+        """Move a point of the map, m, to the middle of the view; zoom in first if the whole map is shown."""
+        camera = self._painters[0].camera
+        if self._camera is None:
+            camera = replace(camera, zoom=FOLLOW_ZOOM * camera.zoom)
+        self._show(replace(camera, center=point))
 
     @property
     def is_moving(self) -> bool:

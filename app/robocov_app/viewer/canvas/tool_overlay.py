@@ -8,6 +8,7 @@ import shapely
 
 from robocov.arrays import Array
 from robocov.environment import Obstacle
+from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers.robots import compute_drawn_radii
@@ -20,6 +21,7 @@ from robocov_app.viewer.tools.tool import ViewerToolOverlay
 FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
 _MARK_PX = 3.0  # half the side of the mark of a point
 _LINE_PX = 1.5
+_SELECTED_LINE_PX = 2.5  # outline of the selected obstacle
 _CLOSING_LINE_PX = 1.0  # from the last point of an outline to its first one
 _DRAG_DASH_PX = 3.0
 _SELECTION_RING_PX = 2.2
@@ -28,6 +30,7 @@ _HOVER_RING_PX = 1.2
 _HOVER_GAP_PX = 3.5
 _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
+_HOVER_STRENGTH = 0.7  # fraction of the accent color in the outline of the hovered obstacle
 _OBSTACLE_ALPHA = 89  # opacity of a preview, 0 to 255
 _PREMULTIPLIED_FRACTION = 0.35  # the same opacity as a fraction, for premultiplied colors
 _MAX_PIXEL = 1e4  # limit of the coordinates of polygons, which may be far outside the window
@@ -70,6 +73,11 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
 
 def draw_tool_overlay(canvas: Canvas, overlay: ViewerToolOverlay) -> None:
     """Draw the overlay of a tool in a pane."""
+    if overlay.hovered is not None:
+        color = mix(canvas.theme.background, canvas.theme.accent, _HOVER_STRENGTH)
+        _draw_obstacle_outline(canvas, overlay.hovered, color, _LINE_PX)
+    if overlay.selected is not None:
+        _draw_obstacle_outline(canvas, overlay.selected, canvas.theme.accent, _SELECTED_LINE_PX)
     if overlay.obstacle is not None:
         _draw_obstacle(canvas, overlay.obstacle)
     if not overlay.line:
@@ -95,6 +103,14 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(_LINE_PX))
+
+
+def _draw_obstacle_outline(canvas: Canvas, obstacle: Obstacle, color: Color, width: float) -> None:
+    """Draw the outline of an obstacle on the map; the width is in px at scale 1."""
+    for polygon in shapely.get_parts(obstacle.polygon):
+        for ring in (polygon.exterior, *polygon.interiors):
+            corners = canvas.camera.to_pixels(np.asarray(ring.coords)[:-1])
+            canvas.draw_outline(corners, color, canvas.scale_width(width))
 
 
 def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:

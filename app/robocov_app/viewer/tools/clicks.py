@@ -2,7 +2,7 @@
 
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session, toggle_failure
-from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, change_map
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, delete_obstacle
 
 ERASE_REACH_FRACTION = 0.5  # fraction of the reach within which a click deletes an obstacle
 
@@ -25,9 +25,7 @@ class EraserTool(ViewerTool):
         index = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point, reach)
         if index is None:
             return None
-        obstacle = session.displayed.environment.obstacles[index]
-        environment = map_edits.replace_obstacles(session.displayed.environment, index, 1)
-        return change_map(session, environment, f"{map_edits.describe_obstacle(obstacle)} deleted")
+        return delete_obstacle(session, index)
 
 
 class AddRobotTool(ViewerTool):

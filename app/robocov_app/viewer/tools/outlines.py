@@ -37,6 +37,11 @@ class OutlineTool(ViewerTool, ABC):
 
     outline: DrawnOutline = field(repr=False)
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether there are points."""
+        return bool(self.outline.points)
+
     @abstractmethod
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the obstacle with these points, m; raise RobocovError if they do not define one."""
@@ -44,7 +49,8 @@ class OutlineTool(ViewerTool, ABC):
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a point, or complete the obstacle."""
         same_point = max(SAME_POINT_M, self.end_fraction * event.reach)
-        is_complete = self.outline.press(event.point, event.unsnapped_point, event.reach, same_point)
+        point = self._constrain(event)
+        is_complete = self.outline.press(point, event.unsnapped_point, event.reach, same_point)
         if is_complete:
             return self.finish(session)
         return None
@@ -54,12 +60,19 @@ class OutlineTool(ViewerTool, ABC):
         return self.finish(session)
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Move the edge that follows the cursor."""
-        self.outline.cursor = event.point
+        """Move the edge that follows the cursor; with Shift, its angle is a multiple of 45°."""
+        self.outline.cursor = self._constrain(event)
+
+    def _constrain(self, event: ViewerPointerEvent) -> Point:
+        """Return the position of the next point, which depends on Shift and on the last point."""
+        if not self.outline.points:
+            return event.point
+        return event.constrain(self.outline.points[-1])
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Complete the obstacle if it was drawn with a single drag."""
-        is_complete = self.outline.release(event.point, event.unsnapped_point, event.reach, clicked=clicked)
+        point = self._constrain(event)
+        is_complete = self.outline.release(point, event.unsnapped_point, event.reach, clicked=clicked)
         if not is_complete:
             return None
         self.outline.points.append(self.outline.cursor)

@@ -70,8 +70,8 @@ class SegmentTool(ViewerTool):
         return None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Drag the end of the segment to the cursor."""
-        self.segment.move(event.unsnapped_point)
+        """Drag the end of the segment to the cursor; with Shift, its angle is a multiple of 45°."""
+        self.segment.move(event.constrain(self.segment.start))
 
     def cancel(self, session: Session) -> bool:
         """Discard the segment; return whether there was one."""

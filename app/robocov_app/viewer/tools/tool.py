@@ -39,10 +39,16 @@ class ViewerToolOverlay(ToolOverlay):
         Preview of the obstacle that is being drawn or moved.
     has_marks : bool
         Whether the points of the line are marked.
+    hovered : Obstacle or None
+        The obstacle under the pointer, which gets a thin outline.
+    selected : Obstacle or None
+        The selected obstacle, which gets a thick outline.
     """
 
     obstacle: Obstacle | None = None
     has_marks: bool = True
+    hovered: Obstacle | None = None
+    selected: Obstacle | None = None
 
 
 class ViewerTool(Tool[Session, ViewerPointerEvent]):
@@ -123,6 +129,13 @@ def add_obstacle(session: Session, obstacle: Obstacle, name: str) -> str:
     """Add an obstacle that was drawn with the tool `name` to the map; return the message."""
     environment = map_edits.add_obstacle(session.displayed.environment, obstacle)
     return change_map(session, environment, f"{name} drawn")
+
+
+def delete_obstacle(session: Session, index: int) -> str:
+    """Delete the obstacle with an index from the map; return the message."""
+    obstacle = session.displayed.environment.obstacles[index]
+    environment = map_edits.replace_obstacles(session.displayed.environment, index, 1)
+    return change_map(session, environment, f"{map_edits.describe_obstacle(obstacle)} deleted")
 
 
 def _count(number: int, noun: str) -> str:

@@ -5,7 +5,15 @@ from collections.abc import Callable, Sequence
 import pygame
 
 from robocov_app.toolkit.panel import WindowPart
-from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
+from robocov_app.toolkit.tools.pointer import (
+    LEFT_BUTTON,
+    RIGHT_BUTTON,
+    Gesture,
+    PanGesture,
+    Pixel,
+    Pointer,
+    read_modifiers,
+)
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.window.layout import is_inside
@@ -16,8 +24,11 @@ from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.scrubbing import TimeGesture
 from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
+
+MENU_REACH_FRACTION = 0.5  # fraction of the reach within which a right click selects an obstacle
 
 
 class ViewerPointer(Pointer):
@@ -39,6 +50,8 @@ class ViewerPointer(Pointer):
         Top bar, tool rail and panel, which get events first.
     leave_lesson : callable
         Lets the user take over from a lesson.
+    open_menu : callable
+        Opens the context menu at a pixel.
     """
 
     def __init__(
@@ -50,6 +63,7 @@ class ViewerPointer(Pointer):
         layer_bar: LayerBar,
         parts: Sequence[WindowPart],
         leave_lesson: Callable[[], None],
+        open_menu: Callable[[Pixel], None],
     ) -> None:
         """Connect the mouse to the parts of the window."""
         super().__init__(parts)
@@ -59,6 +73,7 @@ class ViewerPointer(Pointer):
         self._viewer_panel = panel
         self._layer_bar = layer_bar
         self._leave_lesson = leave_lesson
+        self._open_menu = open_menu
         self._snapper = MapSnapper()
 
     def get_scale(self) -> float:
@@ -196,7 +211,17 @@ class ViewerPointer(Pointer):
         if viewer.tool.snaps:
             point = self._snapper.snap(viewer.session.displayed.environment, unsnapped, reach)
         robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
-        return ViewerPointerEvent(point, unsnapped, reach, robot=robot, is_right=is_right)
+        modifiers = read_modifiers()
+        return ViewerPointerEvent(
+            point=point,
+            unsnapped_point=unsnapped,
+            reach=reach,
+            shift=modifiers.shift,
+            alt=modifiers.alt,
+            ctrl=modifiers.ctrl,
+            robot=robot,
+            is_right=is_right,
+        )
 
     def move_tool(self, event: pygame.event.Event, pane: int) -> None:
         """Pass a move of the mouse in a pane to the tool."""
@@ -211,13 +236,39 @@ class ViewerPointer(Pointer):
         viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
-        """Handle a click that did not pan: the right button completes a drawing, the left one deselects."""
+        """Handle a click that did not pan.
+
+        The right button completes a drawing or opens the context menu, the left one deselects.
+        """
         viewer = self._viewer
-        if event.button == RIGHT_BUTTON:
-            viewer.attempt(viewer.finish_drawing)
-        elif event.button == LEFT_BUTTON and viewer.tool is viewer.toolbox.hand:
-            viewer.inspection.selected = None
+        if event.button == LEFT_BUTTON and viewer.tool is viewer.toolbox.hand:
+            viewer.inspection.clear()
             viewer.revision += 1
+        if event.button != RIGHT_BUTTON:
+            return
+        if viewer.tool.is_busy:
+            viewer.attempt(viewer.finish_drawing)
+        else:
+            self._select_at(event.pos)
+            self._open_menu(event.pos)
+
+    def _select_at(self, pixel: Pixel) -> None:
+        """Select the robot or the obstacle at a pixel of a pane; nothing on the bare floor."""
+        viewer = self._viewer
+        pane = self._canvas.find_pane(pixel)
+        if pane is None:
+            return
+        viewer.inspection.clear()
+        viewer.revision += 1
+        number = self._canvas.find_robot(pixel, pane)
+        if number is not None:
+            viewer.inspection.select_robot(number)
+            return
+        environment = viewer.session.displayed.environment
+        reach = MENU_REACH_FRACTION * self._canvas.get_reach(pane)
+        index = map_edits.find_obstacle(environment, self._canvas.to_world(pixel, pane), reach)
+        if index is not None:
+            viewer.inspection.select_obstacle(environment.obstacles[index])
 
     def hover(self, event: pygame.event.Event) -> None:
         """Update the inspected point, and while no button is held down, the tool and the chart's tag."""

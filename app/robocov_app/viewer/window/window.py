@@ -33,6 +33,7 @@ from robocov_app.viewer.panel.robot_inspector import RobotInspector
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.sharing.share import ShareActions
+from robocov_app.viewer.window.context_menu import list_menu_commands
 from robocov_app.viewer.window.dialogs import (
     build_branch_dialog,
     build_file_dialog,
@@ -161,6 +162,7 @@ class ViewerWindow(CommandWindow):
             self.layer_bar,
             self.parts,
             self.lesson.leave,
+            self.open_menu,
         )
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
@@ -188,6 +190,11 @@ class ViewerWindow(CommandWindow):
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
         )
+
+    def open_menu(self, pixel: tuple[int, int]) -> None:
+        """Open the context menu of the selection at a pixel."""
+        names = list_menu_commands(self.viewer)
+        self.dialogs.ask(Menu([self.commands[name] if name else None for name in names], pixel, self.do))
 
     @property
     def parts(self) -> Sequence[WindowPart]:
@@ -251,12 +258,25 @@ class ViewerWindow(CommandWindow):
         self.canvas.camera.update(seconds)
         self._cost_curves.update()
         self._arrange()
+        self._follow_robot()
         self._inspector.update(self.viewer.now)
         self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
         self.top_bar.update()
         self.tool_rail.update()
         self.pointer.show_action(self.cursor)
+
+    def _follow_robot(self) -> None:
+        """Keep the robot that the camera follows in the middle of the view, as long as it is displayed."""
+        viewer = self.viewer
+        number = viewer.inspection.followed
+        displayed = viewer.session.displayed
+        numbers = displayed.numbers
+        if number is None or number not in numbers:
+            viewer.inspection.followed = None
+            return
+        x, y = displayed.get_positions(viewer.pane)[numbers.index(number)].tolist()
+        self.canvas.camera.center_on((x, y))
 
     def build_frame_key(self) -> object:
         """Return all values that the frame depends on, to detect changes; None while something moves."""

@@ -1,0 +1,19 @@
+"""Commands of the context menu, which depend on what is selected."""
+
+from robocov_app.viewer.presenter import Presenter
+
+ROBOT_COMMANDS = ("robot:fail", "robot:follow", "", "robot:remove")
+WALL_COMMANDS = ("wider", "narrower", "", "duplicate", "delete")
+OBSTACLE_COMMANDS = ("duplicate", "delete")
+FLOOR_COMMANDS = ("robot:add", "", "undo", "redo", "", "fit")
+
+
+def list_menu_commands(viewer: Presenter) -> tuple[str, ...]:
+    """Return the names of the commands for the selection; an empty name separates two groups."""
+    if viewer.selected_robot is not None:
+        return ROBOT_COMMANDS
+    if viewer.selection.has_wall:
+        return WALL_COMMANDS
+    if viewer.selected_obstacle is not None:
+        return OBSTACLE_COMMANDS
+    return FLOOR_COMMANDS
