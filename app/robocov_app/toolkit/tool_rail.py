@@ -5,10 +5,11 @@ from typing import Any
 
 from pygame import Rect, Surface
 
-from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.overlay import draw_edge
 from robocov_app.toolkit.panel import WindowPart
-from robocov_app.toolkit.tools.tool import Toolbox
+from robocov_app.toolkit.tools.tool import Tool, Toolbox
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
 
@@ -51,6 +52,11 @@ class ToolRail(WindowPart):
         """Return the box of the rail."""
         return layout.rail
 
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Adopt a layout and a theme; tips are next to the rail, so that they do not cover other tools."""
+        super().arrange(layout, theme)
+        self.ui.has_tips_beside = True
+
     def draw(self, screen: Surface) -> None:
         """Draw the rail, with a line at its right edge."""
         box = self.ui.box
@@ -76,21 +82,29 @@ class ToolRail(WindowPart):
             ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
             for tool in group:
                 is_selected = tool is self._toolbox.current
-                self._show_button(ui, tool.name, f"tool:{tool.name}", tool.title, selected=is_selected)
+                tip = _build_tip(tool, self._commands[f"tool:{tool.name}"])
+                self._show_button(ui, tool.name, tip, f"tool:{tool.name}", tool.title, selected=is_selected)
         view_count = int((tools_height - count * pitch - _GROUP_GAP_PX) / pitch)
         if view_count < 1:
             return
         _show_line(ui)
         ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
         for command in VIEW_COMMANDS[:view_count]:
-            self._show_button(ui, command, command, self._commands[command].title)
+            entry = self._commands[command]
+            self._show_button(ui, command, entry.tip, command, entry.title)
 
-    def _show_button(self, ui: Ui, icon: str, command: str, title: str, *, selected: bool = False) -> None:
-        """Show a button with the key of its command; the tip is the command's title and its keys."""
-        entry = self._commands[command]
-        shortcut = _abbreviate_key(entry.key_text)
-        if ui.icon_button(icon, title, key=command, tip=entry.tip, selected=selected, shortcut=shortcut):
+    def _show_button(
+        self, ui: Ui, icon: str, tip: str, command: str, title: str, *, selected: bool = False
+    ) -> None:
+        """Show a button with the key of its command."""
+        shortcut = _abbreviate_key(self._commands[command].key_text)
+        if ui.icon_button(icon, title, key=command, tip=tip, selected=selected, shortcut=shortcut):
             self._run_command(command)
+
+
+def _build_tip(tool: Tool[Any, Any], command: Command) -> str:
+    """Return the tool tip of a tool: its title with its key, and how it is used."""
+    return f"{tool.title} ({command.key_text})\n{tool.hint[:1].upper()}{tool.hint[1:]}"
 
 
 def _show_line(ui: Ui) -> None:

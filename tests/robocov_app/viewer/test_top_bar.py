@@ -59,7 +59,7 @@ def test_buttons_of_the_bar_lie_in_it_side_by_side(tmp_path: Path, size: tuple[i
 def test_every_tool_has_a_button_with_its_key_and_a_picture(driver: Driver) -> None:
     for tool in driver.viewer.toolbox.by_name.values():
         button = driver.get_widget("button", f"tool:{tool.name}")
-        assert button.tip.endswith(f"({tool.key.upper()})")
+        assert button.tip.startswith(f"{tool.title} ({tool.key.upper()})")
         assert driver.window.tool_rail.ui.box.contains(button.rect)
         driver.push_button(f"tool:{tool.name}")
         assert driver.viewer.tool is tool

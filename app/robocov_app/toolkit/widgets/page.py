@@ -17,7 +17,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.toolkit.widgets.open_list import OpenList
 from robocov_app.toolkit.widgets.row_layout import RowLayout
 from robocov_app.toolkit.widgets.text_edit import TextEdit
-from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
+from robocov_app.toolkit.widgets.tool_tip import TipSketch, ToolTip, draw_tool_tip
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 
@@ -40,8 +40,10 @@ class Widget:
     text : str
     value : object
     tip : str
-        Tool tip.
+        Tool tip; if it has several lines, the first one is its title.
     enabled : bool
+    sketch : TipSketch or None
+        Drawing in the tool tip.
     """
 
     kind: str
@@ -51,6 +53,7 @@ class Widget:
     value: object = None
     tip: str = ""
     enabled: bool = True
+    sketch: TipSketch | None = None
 
 
 class Page(RowLayout):
@@ -94,6 +97,8 @@ class Page(RowLayout):
         Scroll offset and total height of the content at scale 1, px, by the key of the scroll area.
     tool_tip : ToolTip
         Decides when the tip of the widget under the pointer appears.
+    has_tips_beside : bool
+        Whether tips are to the right of their widgets instead of below them.
     """
 
     def __init__(self, theme: Theme, scale: float = 1.0) -> None:
@@ -121,6 +126,7 @@ class Page(RowLayout):
         self._last_click_s = -1.0
         self._last_click_key = ""
         self.tool_tip = ToolTip()
+        self.has_tips_beside = False
 
     def build(self) -> None:
         """Show the widgets and handle their input; called in every run."""
@@ -210,8 +216,16 @@ class Page(RowLayout):
             self.open_list.draw(screen, self.theme, self.scale)
         widget = next((widget for widget in self.find_hovered_widgets() if widget.tip), None)
         if widget is not None and self.active is None and self.tool_tip.is_due:
-            x = self.pointer[0]
-            draw_tool_tip(screen, widget.tip, self.theme, self.scale, x=x, widget=widget.rect)
+            draw_tool_tip(
+                screen,
+                widget.tip,
+                self.theme,
+                self.scale,
+                x=self.pointer[0],
+                widget=widget.rect,
+                sketch=widget.sketch,
+                is_beside=self.has_tips_beside,
+            )
 
     # For widgets
 

@@ -1,8 +1,10 @@
-"""Tool tips: short texts that appear when the mouse rests on a widget."""
+"""Tool tips: short texts, some with a drawing, that appear when the mouse rests on a widget."""
 
+from collections.abc import Callable
 from time import perf_counter
+from typing import NamedTuple, TypeAlias
 
-from pygame import Rect, Surface
+from pygame import BLEND_PREMULTIPLIED, Rect, Surface
 
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import LIGHT, Theme
@@ -12,22 +14,32 @@ from robocov_app.toolkit.overlay import draw_rounded_box, wrap_text
 TIP_DELAY_S = 0.6
 """Time for which the mouse must rest before a tool tip appears."""
 
-_TEXT_COLOR: Color = (245, 247, 250)
+TIP_TEXT_COLOR: Color = (245, 247, 250)
+"""Tool tips are light on dark in both themes."""
 # Lengths in pixels at scale 1.
 _TEXT_PX = 11.0
 _LINE_PX = 16.0
 _MAX_WIDTH_PX = 240.0
 _DISTANCE_PX = 5.0
-"""Distance of the tip from the widget."""
-_TEXT_LEFT_PX = 7.0
-_TEXT_TOP_PX = 5.0
-_MARGINS_PX = 9.0
-"""Space above and below the text, both together."""
+"""Distance of the tip from the widget, and of the text from the top of the tip."""
 _CORNER_RADIUS_PX = 4.0
-# Fractions of the color of text in the colors of the tip.
+_MARGIN_PX = 7.0
+_HEIGHT_PX = 9.0
+"""Height of the box in addition to that of its content."""
 _FILL_STRENGTH = 0.2
+"""Fraction of the color of text in the background of tips, with the dark theme."""
 _LIGHT_FILL_STRENGTH = 0.92
 _EDGE_STRENGTH = 0.24
+
+TipSketch: TypeAlias = Callable[[float], Surface]
+"""Function that renders a drawing for a tool tip, with premultiplied alpha, at a scale."""
+
+
+class _Line(NamedTuple):
+    """A line of a tool tip."""
+
+    text: str
+    is_title: bool
 
 
 class ToolTip:
@@ -61,13 +73,24 @@ class ToolTip:
         return perf_counter() - self._rested_since_s >= TIP_DELAY_S
 
 
-def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: int, widget: Rect) -> None:
+def draw_tool_tip(
+    screen: Surface,
+    text: str,
+    theme: Theme,
+    scale: float,
+    *,
+    x: int,
+    widget: Rect,
+    sketch: TipSketch | None = None,
+    is_beside: bool = False,
+) -> None:
     """Draw a tool tip below a widget, or above it if there is no space below.
 
     Parameters
     ----------
     screen : pygame.Surface
     text : str
+        If it has several lines, the first one is a title.
     theme : Theme
     scale : float
         Size of texts and margins.
@@ -75,15 +98,29 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
         Left end of the tip, px.
     widget : pygame.Rect
         Position of the widget in the window, px.
+    sketch : TipSketch, optional
+        Drawing below the text.
+    is_beside : bool
+        Whether the tip is to the right of the widget instead of below it.
     """
     size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)
-    lines = wrap_text(text, size, round(_MAX_WIDTH_PX * scale))
-    width = max(measure_text(line, size) for line in lines) + round(2 * _TEXT_LEFT_PX * scale)
-    box = Rect(0, 0, width, line_height * len(lines) + round(_MARGINS_PX * scale))
-    box.topleft = (x, widget.bottom + round(_DISTANCE_PX * scale))
-    if box.bottom > screen.get_height():
-        box.bottom = widget.top - round(_DISTANCE_PX * scale)
+    distance = round(_DISTANCE_PX * scale)
+    lines = _list_lines(text, size, round(_MAX_WIDTH_PX * scale))
+    width = max(measure_text(line.text, size, line.is_title) for line in lines)
+    height = line_height * len(lines)
+    image: Surface | None = None
+    if sketch is not None:
+        image = sketch(scale)
+        width = max(width, image.get_width())
+        height += distance + image.get_height()
+    box = Rect(0, 0, width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
+    if is_beside:
+        box.midleft = widget.right + distance, widget.centery
+    else:
+        box.topleft = x, widget.bottom + distance
+        if box.bottom > screen.get_height():
+            box.bottom = widget.top - distance
     box.clamp_ip(screen.get_rect())
     # The text is light in both themes.
     strength = _FILL_STRENGTH
@@ -92,7 +129,20 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     fill = mix(theme.panel, theme.ink, strength)
     edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
     draw_rounded_box(screen, box, fill, edge=edge, radius=round(_CORNER_RADIUS_PX * scale))
-    left = box.left + round(_TEXT_LEFT_PX * scale)
-    for number, line in enumerate(lines):
-        top = box.top + round(_TEXT_TOP_PX * scale) + number * line_height
-        screen.blit(render_text(line, size, _TEXT_COLOR), (left, top))
+    left = box.left + round(_MARGIN_PX * scale)
+    top = box.top + distance
+    for line in lines:
+        screen.blit(render_text(line.text, size, TIP_TEXT_COLOR, line.is_title), (left, top))
+        top += line_height
+    if image is not None:
+        screen.blit(image, (left, top + distance), special_flags=BLEND_PREMULTIPLIED)
+
+
+def _list_lines(text: str, size: int, width: float) -> list[_Line]:
+    """Wrap a text into lines of limited width, px; the first of several paragraphs is the title."""
+    paragraphs = text.split("\n")
+    lines = []
+    for number, paragraph in enumerate(paragraphs):
+        is_title = number == 0 and len(paragraphs) > 1
+        lines += [_Line(line, is_title) for line in wrap_text(paragraph, size, width, is_title)]
+    return lines

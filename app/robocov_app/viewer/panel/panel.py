@@ -23,6 +23,7 @@ from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
 from robocov_app.viewer.explanation.sentences import ReportLine
 from robocov_app.viewer.panel.parameters import NumberParameter, OptionParameter, Parameter
+from robocov_app.viewer.panel.sketches import get_sketch
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import MAX_PANES
 
@@ -272,8 +273,12 @@ class ViewerPanel(CommandPanel):
         if parameter.is_unlimited:
             columns = _UNLIMITED_PX
         ui.row(0, *columns, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=0)
-        tip = f"{parameter.meaning} ({unit})" if unit else parameter.meaning
-        ui.label(parameter.label, tip=f"{parameter.symbol}: {tip}", note=choose_note(parameter))
+        ui.label(
+            parameter.label,
+            tip=_build_tip(parameter, unit),
+            note=choose_note(parameter),
+            sketch=get_sketch(name),
+        )
         text = ui.text_field(name, parameter.format())
         if text is not None:
             self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
@@ -295,7 +300,7 @@ class ViewerPanel(CommandPanel):
         fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
         ui.row(_LABEL_PX, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
-        ui.label(parameter.label, tip=f"{parameter.symbol}: {parameter.meaning}")
+        ui.label(parameter.label, tip=_build_tip(parameter))
         if fits:
             for choice in choices:
                 is_on = choice == parameter.value
@@ -469,3 +474,9 @@ def _load_label(name: str) -> str:
         return str(load_controller_class(name).label)
     except ParameterError:  # its file has been changed in the meantime
         return get_controller_label(name)
+
+
+def _build_tip(parameter: Parameter, unit: str = "") -> str:
+    """Return the tool tip of a parameter: its name and symbol as the title, its meaning and its unit."""
+    meaning = f"{parameter.meaning} ({unit})" if unit else parameter.meaning
+    return f"{parameter.label} ({parameter.symbol})\n{meaning[:1].upper()}{meaning[1:]}"

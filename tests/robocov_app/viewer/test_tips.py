@@ -1,0 +1,72 @@
+"""Tool tips of the tool rail and of parameters, with and without a sketch."""
+
+from __future__ import annotations
+
+import pygame
+import pytest
+from driven_window import Driver
+
+from robocov_app.look.theme import LIGHT
+from robocov_app.toolkit.widgets import tool_tip
+from robocov_app.toolkit.widgets.tool_tip import draw_tool_tip
+from robocov_app.viewer.panel.sketches import get_sketch
+
+WIDGET = pygame.Rect(100, 80, 36, 36)
+
+
+def find_tip_box(text: str, **options) -> pygame.Rect:
+    """Draw a tip for `WIDGET` on a blank surface, and return the box of the changed pixels."""
+    blank = pygame.Color(1, 2, 3)
+    screen = pygame.Surface((600, 400))
+    screen.fill(blank)
+    draw_tool_tip(screen, text, LIGHT, 1.0, x=WIDGET.left, widget=WIDGET, **options)
+    mask = pygame.mask.from_threshold(screen, blank, (1, 1, 1))
+    mask.invert()
+    (box,) = mask.get_bounding_rects()
+    return box
+
+
+@pytest.fixture
+def quick_tips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Show tips at once."""
+    monkeypatch.setattr(tool_tip, "TIP_DELAY_S", 0.0)
+
+
+@pytest.mark.usefixtures("driver")
+def test_tips_are_below_or_beside_their_widget() -> None:
+    assert find_tip_box("Wall").top > WIDGET.bottom
+    beside = find_tip_box("Wall (W)\nDrag.", is_beside=True)
+    assert beside.left > WIDGET.right
+    assert beside.top < WIDGET.centery < beside.bottom
+
+
+@pytest.mark.usefixtures("driver")
+@pytest.mark.parametrize("parameter", ["k_rep", "k_att", "team.sensing_range"])
+def test_sketches_are_below_the_text(parameter: str) -> None:
+    sketch = get_sketch(parameter)
+    assert sketch is not None
+    assert sketch(1.0).get_bounding_rect().width > 100
+    plain = find_tip_box("Strength\nWhat it is")
+    assert find_tip_box("Strength\nWhat it is", sketch=sketch).height > plain.height + 80
+
+
+def test_three_parameters_have_sketches(driver: Driver) -> None:
+    for label in ("Repulsion strength", "Attraction strength", "Sensing range"):
+        assert driver.get_widget("label", label).sketch is not None
+    assert driver.get_widget("label", "Radius").sketch is None
+    assert get_sketch("radius") is None
+
+
+@pytest.mark.usefixtures("quick_tips")
+def test_every_button_of_the_rail_shows_a_tip_with_its_key_beside_it(driver: Driver) -> None:
+    rail = driver.window.tool_rail.ui
+    for widget in rail.widgets.values():
+        command = driver.window.commands[widget.key]
+        assert command.key_text in widget.tip
+        driver.move(*driver.find_pixel((0.1, 0.1)))
+        driver.window.draw()
+        before = driver.copy_frame()
+        driver.move(*widget.rect.center)
+        driver.window.draw()
+        differs = (driver.copy_frame() != before).any(axis=2)
+        assert differs[:, rail.box.right : rail.box.right + 60].any(), widget.key
