@@ -56,7 +56,9 @@ def test_names_and_titles_of_commands_are_unique(commands: list[Command]) -> Non
 
 def test_every_command_has_a_key_or_an_argument_and_a_group(commands: list[Command]) -> None:
     for command in commands:
-        assert command.keys or command.argument, command.name
+        # The menu of the share button has a key, but its rows do not.
+        is_row_of_menu = command.name.startswith("share:")
+        assert command.keys or command.argument or is_row_of_menu, command.name
         assert command.title[0].isupper()
         assert not command.title.endswith(".")
         assert command.group in GROUPS
