@@ -182,14 +182,16 @@ class Verification:
         ]
         if self.comparison is not None:
             lines.append(self._describe_new_maps(self.comparison))
-        lines.append(f"All choices are by --seed {self.seed}.")
+        elif not self.new_maps:
+            lines.append(f"No new maps tried. They require runs on generated maps of the track {TRACK}.")
+        lines.append(f"Random choices: --seed {self.seed} repeats them.")
         return lines
 
     def _describe_missing(self) -> str:
         """Return a sentence with the probabilities of missing changed rows."""
         many = max(1, round(CHANGED_FRACTION * self.rows))
         one_missed = self.compute_miss_probability(1)
-        text = f"One changed row passes with a probability of {one_missed:.1%}"
+        text = f"A single changed row goes unnoticed with a probability of {one_missed:.1%}"
         if many > 1:
             text += f", {many} of them with {self.compute_miss_probability(many):.1%}"
         return f"{text}."
@@ -198,12 +200,13 @@ class Verification:
         """Yield sentences on the robots and teams whose decisions were repeated."""
         if self.robots:
             robots = format_count(self.robots, "robot")
-            yield f"{robots} repeated in processes that receive only the observations of one robot."
+            yield f"Decisions of {robots} repeated in processes that receive only the robot's observations."
         if self.teams:
             teams = format_count(self.teams, "team")
             yield (
-                f"{teams} repeated in processes that receive the observations of all robots, because the "
-                "robots read the maps of others, or decide together: limits of communication are not checked."
+                f"Decisions of {teams} repeated in processes that receive the observations of all robots, "
+                "because the robots read the maps of others, or decide together: limits of communication are "
+                "not checked."
             )
 
     def _describe_new_maps(self, comparison: NewMapComparison) -> str:

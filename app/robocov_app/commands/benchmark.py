@@ -22,6 +22,12 @@ _OPTIONS_BY_ACTION = {
     "references": ("out", "workers"),
 }
 """The options of each action, in addition to --json."""
+_LEGEND = """\
+Gap: excess of the final cost over the best placement known (median, interval, worst). To 5 %: time from
+which the cost stays within 5 % of its final value. Path: mean path length of a robot. Contacts: runs in which
+a robot touched something. At rest: runs that settled. B/s, µs/s: bytes sent and computing time per robot.
+robocov benchmark page explains all columns."""
+"""Explanation of the columns of the table of ratings."""
 
 
 @dataclass
@@ -167,6 +173,7 @@ def _print_ratings(result: dict[str, Any]) -> None:
     columns = [(first_title, BOLD)]
     columns += [(title, RIGHT) for title in titles]
     print_table(columns, rows)
+    echo(_LEGEND)
 
 
 def _print_suite(options: Arguments) -> int:

@@ -8,6 +8,7 @@ from typing import TextIO
 
 MIN_WIDTH = 40
 """Minimum width of wrapped text, characters. tyro's boxes have the same minimum."""
+_EMPTY_BOX_LINE = re.compile(r"│ *│")
 _NO_BREAK_SPACE = "\u00a0"
 _ITEM_TEXT = re.compile(r"^ *\S+(?: \S+)* {2,}(?=\S)")
 """The beginning of an item of a list, up to its text, which follows two spaces or more."""
@@ -59,7 +60,10 @@ def insert_description(help_text: str, docstring: str, width: int) -> str:
 
     usage, _, options = help_text.partition("\n\n")
     usage = _wrap_usage(Text.from_ansi(usage).plain, max(width, MIN_WIDTH))
-    return f"{usage}\n\n{wrap_description(docstring, width)}\n\n{options}"
+    lines = options.splitlines()
+    plain_lines = [Text.from_ansi(line).plain for line in lines]
+    kept = [line for row, line in enumerate(lines) if not _is_superfluous(plain_lines, row)]
+    return f"{usage}\n\n{wrap_description(docstring, width)}\n\n" + "\n".join(kept) + "\n"
 
 
 def wrap_description(docstring: str, width: int) -> str:
@@ -92,6 +96,17 @@ def wrap_description(docstring: str, width: int) -> str:
         else:
             wrapped.append(_wrap(" ".join(lines), width, ""))
     return "\n\n".join(wrapped)
+
+
+def _is_superfluous(lines: list[str], row: int) -> bool:
+    """Return whether a line is empty, but does not separate two groups of options.
+
+    tyro adds such a line to a text that fills its last line. Groups are boxes; without characters for boxes,
+    options are indented by two spaces, and titles of groups by one.
+    """
+    if lines[row].strip():
+        return _EMPTY_BOX_LINE.fullmatch(lines[row]) is not None
+    return row + 1 < len(lines) and lines[row + 1].startswith("  ") and bool(lines[row + 1].strip())
 
 
 def _wrap_usage(usage: str, width: int) -> str:

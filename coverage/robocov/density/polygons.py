@@ -51,7 +51,7 @@ class WeightedArea:
     holes : tuple of rings
         Rings like `vertices`.
     name : str or None
-        Name of the area, for people.
+        Displayed name of the area.
 
     Raises
     ------

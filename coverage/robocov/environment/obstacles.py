@@ -33,7 +33,7 @@ class PolygonObstacle:
     holes : sequence of (k, 2) sequences, m
         Rings like `vertices`.
     name : str or None
-        Name of the obstacle, for people.
+        Displayed name of the obstacle.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 
@@ -70,7 +70,7 @@ class CircleObstacle:
     center : (2,) sequence, m
     radius : float, m
     name : str or None
-        Name of the obstacle, for people.
+        Displayed name of the obstacle.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 
@@ -119,7 +119,7 @@ class WallObstacle:
     width : float, m
         Thickness of the wall.
     name : str or None
-        Name of the obstacle, for people.
+        Displayed name of the obstacle.
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 

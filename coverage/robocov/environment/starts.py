@@ -34,7 +34,7 @@ _DISC_QUADRANT_SEGMENTS = 64
 
 @dataclass(frozen=True)
 class DiscStart:
-    """The robots start somewhere in a disc, as if the team had been unloaded in one place.
+    """The robots start at random positions in a disc, as if they had been unloaded there.
 
     Attributes
     ----------

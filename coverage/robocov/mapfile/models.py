@@ -155,7 +155,7 @@ class KeySpecification(NamedTuple):
 
 
 KEYS = {
-    "name": KeySpecification(Label, "Name, for people", "desk", (LABEL_EXPECTED,)),
+    "name": KeySpecification(Label, "Displayed name", "desk", (LABEL_EXPECTED,)),
     "center": KeySpecification(Vertex, "Center [x, y] in meters", [7.5, 3], _POINT_EXPECTED),
     "radius": KeySpecification(Size, "Radius in meters", 0.5, (_SIZE_EXPECTED,)),
     "sigma": KeySpecification(Size, "Standard deviation of a round peak in meters", 1.5, (_SIZE_EXPECTED,)),
@@ -258,7 +258,7 @@ class RasterModel(Model, title="raster density"):
         None,
     )
     interpolation: Interpolation = _describe(
-        "bilinear between the centers of the cells, or constant in each cell", "bilinear", "bilinear"
+        "Bilinear between the centers of the cells, or constant in each cell", "bilinear", "bilinear"
     )
     rows: Rows | None = _describe("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
     picture: FileName | None = _describe(
@@ -310,17 +310,17 @@ class MapModel(Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in meters."""
 
     schema_: Text | None = _describe(
-        "Address of this schema, for editors", "./map.json", None, alias="$schema"
+        "Address of the schema, for text editors", "./map.json", None, alias="$schema"
     )
     format: Literal["robocov-map"] = _describe("Format of the file", FORMAT)
     version: Literal[1] = _describe("Version of the format", VERSION)
-    name: Label = _describe("Name of the map, for people", "Two rooms")
+    name: Label = _describe("Displayed name of the map", "Two rooms")
     description: Description = _describe("Description of the map", "A wall with one door.", "")
     boundary: VertexRing = _describe(
         "Outer boundary, convex or not; robots know its convex hull", [[0, 0], [10, 0], [10, 6], [0, 6]]
     )
     obstacles: list[ObstacleModel] = _describe(
-        "Obstacles, which may overlap, touch, and stick out of the boundary", [_EXAMPLE_WALL], []
+        "Obstacles, which may overlap, touch, and extend beyond the boundary", [_EXAMPLE_WALL], []
     )
     starts: dict[Label, StartModel] = _describe("Named starts; the first is the default", _EXAMPLE_STARTS, {})
     density: DensityModel | None = _describe(

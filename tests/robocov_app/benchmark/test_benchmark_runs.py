@@ -23,6 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from swept import HEAD, PULL, DirectExecutor
 
+from robocov.controllers import load_controller_class
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.page import ParetoPoint, build_page, find_pareto_front, place_labels
@@ -107,6 +108,9 @@ def test_bundled_results_are_complete() -> None:
     for result in results:
         # `verify` needs no file for controllers that are part of robocov.
         assert result["entry"]["source_sha256"] is None
+        controller = result["entry"]["controller"]
+        if controller != "oracle":
+            assert result["entry"]["label"] == load_controller_class(controller).label
         assert {(row["track"], row["map"], row["seed"]) for row in result["rows"]} == runs
         for row in result["rows"]:
             assert "error" in row or row.items() >= compute_gaps(row["track"], row["map"], row).items()

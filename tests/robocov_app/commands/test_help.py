@@ -25,6 +25,7 @@ def test_no_line_is_longer_than_the_terminal(
     main([name, "--help"])
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if len(line) > columns] == []
+    assert [line for line in lines if re.fullmatch("│ *│", line)] == [], "boxes have no empty lines"
 
 
 @pytest.mark.parametrize("name", COMMANDS)

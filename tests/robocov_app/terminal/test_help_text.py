@@ -43,10 +43,23 @@ def test_texts_of_items_stay_in_their_column() -> None:
 
 
 def test_an_option_of_the_usage_stays_on_one_line() -> None:
-    help_text = "usage: robocov try [--first VALUE] [--second VALUE]\n\noptions"
+    help_text = "usage: robocov try [--first VALUE] [--second VALUE]\n\noptions\n"
     assert insert_description(help_text, "Try it.", 40) == (
-        "usage: robocov try [--first VALUE]\n       [--second VALUE]\n\nTry it.\n\noptions"
+        "usage: robocov try [--first VALUE]\n       [--second VALUE]\n\nTry it.\n\noptions\n"
     )
+
+
+def test_only_empty_lines_between_groups_remain() -> None:
+    options = " options\n ---\n  --first  Fills its line.\n    \n  --second\n   \n others\n"
+    text = insert_description(f"usage: robocov try\n\n{options}", "Try it.", 80)
+    assert text.partition("Try it.\n\n")[2].splitlines() == [
+        " options",
+        " ---",
+        "  --first  Fills its line.",
+        "  --second",
+        "   ",
+        " others",
+    ]
 
 
 def test_the_help_has_the_description_before_the_options(capsys: pytest.CaptureFixture[str]) -> None:
