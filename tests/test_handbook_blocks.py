@@ -85,7 +85,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
             exec(code, names)
         else:
             assert kind == "sh"
-            for line in code.splitlines():
+            for line in code.replace("\\\n", " ").splitlines():
                 if line.startswith("robocov "):
                     words = words_of(line)
                     if words[0] in _SHOWN:
