@@ -792,7 +792,19 @@ class AtlasShared(Atlas):
     is_staggered = False
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
-        """Return the memory of robots that know neither walls nor other robots; see `Atlas.begin`."""
+        """Return the memory of robots that know neither walls nor other robots.
+
+        Parameters
+        ----------
+        region : Region
+            The known outer boundary.
+        team : Team
+
+        Returns
+        -------
+        AtlasMemory
+            With an exchange of scans in which no robot has received any.
+        """
         memory = super().begin(region, team)
         n = len(team)
         unknown_map = memory.states[0].known_map
