@@ -96,13 +96,13 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         moments[i, MASS] += 0.5 * cross + area
         moments[i, MOMENT_X] += middle_x * (cross / 3.0 + area) + first_moment * normal_x
         moments[i, MOMENT_Y] += middle_y * (cross / 3.0 + area) + first_moment * normal_y
-        # The polar moment is that of the triangle, cross * squares / 12, plus that of the segment, which the
-        # parallel axis theorem shifts from the middle of the chord to the generator.
-        squares = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
+        # The polar moment of the triangle with the corners 0, s and e is cross (s·s + s·e + e·e) / 12. That
+        # of the segment is shifted from the middle of the chord to the generator (parallel axis theorem).
+        sum_of_products = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
         shift = first_moment * (middle_x * normal_x + middle_y * normal_y)
         squared_middle = middle_x * middle_x + middle_y * middle_y
         moments[i, POLAR_MOMENT] += (
-            cross * squares / 12.0 + polar_moment + 2.0 * shift + area * squared_middle
+            cross * sum_of_products / 12.0 + polar_moment + 2.0 * shift + area * squared_middle
         )
     return moments
 

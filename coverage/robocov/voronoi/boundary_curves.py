@@ -72,7 +72,7 @@ _LEAVE = 1
 """Columns of a crossing: values of t at which a curve enters and leaves the cell's side of another one."""
 
 _SPARE_PIECES = 64
-"""Initial room for pieces, in addition to one for each edge."""
+"""Initial space for pieces, in addition to one for each edge."""
 
 _MIN_SQUARED_SINE = 1e-29
 """Smallest sin² of the angle between two curves for which their intersections are computed.
@@ -138,17 +138,15 @@ def trace_boundaries(
     """
     pieces = np.empty((len(edges) + _SPARE_PIECES, PIECE_COLUMNS))
     piece_count = 0
-    end_pair = 0
-    end_edge = 0
+    first_pair = 0
+    first_edge = 0
     for i in range(len(points)):
-        first_pair = end_pair
-        first_edge = end_edge
-        while end_pair < len(pairs) and pairs[end_pair, PAIR_ROBOT] == i:
-            end_pair += 1
-        while end_edge < len(edges) and edges[end_edge, EDGE_CELL] == i:
-            end_edge += 1
+        end_pair = _find_end_of_group(pairs, PAIR_ROBOT, i, first_pair)
+        end_edge = _find_end_of_group(edges, EDGE_CELL, i, first_edge)
         own_pairs = pairs[first_pair:end_pair]
         own_edges = edges[first_edge:end_edge]
+        first_pair = end_pair
+        first_edge = end_edge
         if _is_cell_empty(own_pairs):
             is_straight[i] = False
             continue
@@ -158,25 +156,37 @@ def trace_boundaries(
         # Without circles, the cell is the polygon that the edges bound.
         is_straight[i] = curve_count == line_count
         if is_straight[i]:
-            pieces = _make_room(pieces, piece_count, line_count)
+            pieces = _reserve(pieces, piece_count, line_count)
             piece_count = _add_edges(own_edges, pieces, piece_count)
         else:
             _write_lines(curves, own_pairs, own_edges, sides, points[i])
             crossings = np.empty((curve_count, curve_count, 2))
+            gaps = np.empty((curve_count, 2))
             _find_crossings(curves[:curve_count], line_count, crossings)
+            # Each other curve cuts at most one gap into a curve, which leaves at most `curve_count` sections.
+            # A section becomes at most two pieces.
+            max_new_pieces = 2 * curve_count + 2
             for c in range(curve_count):
-                # Each other curve cuts out at most one gap, and each section is divided at most once.
-                pieces = _make_room(pieces, piece_count, 2 * curve_count + 2)
-                piece_count = _add_boundary(curves[c], crossings[c], pieces, piece_count)
+                pieces = _reserve(pieces, piece_count, max_new_pieces)
+                piece_count = _add_boundary(curves[c], crossings[c], gaps, pieces, piece_count)
     return pieces[:piece_count]
 
 
 @kernel
-def _make_room(pieces: Array, piece_count: int, room: int) -> Array:
-    """Return an array with the pieces so far and room for more; the same array if it is large enough."""
-    if piece_count + room <= len(pieces):
+def _find_end_of_group(table: Array, column: int, value: int, first_row: int) -> int:
+    """Return the end of the rows, from `first_row` on, in which a column of a sorted table has a value."""
+    row = first_row
+    while row < len(table) and table[row, column] == value:
+        row += 1
+    return row
+
+
+@kernel
+def _reserve(pieces: Array, piece_count: int, new_pieces: int) -> Array:
+    """Return the array of pieces if it has space for more of them, and otherwise a larger copy."""
+    if piece_count + new_pieces <= len(pieces):
         return pieces
-    larger = np.empty((2 * (piece_count + room), PIECE_COLUMNS))
+    larger = np.empty((2 * (piece_count + new_pieces), PIECE_COLUMNS))
     larger[:piece_count] = pieces[:piece_count]
     return larger
 
@@ -392,8 +402,12 @@ def _intersect(first: Array, second: Array) -> _Intersection:
         # falls, and leaves where it rises.
         numerator = -b_leftward - np.copysign(np.sqrt(squared_sine), b_leftward)
         if b_leftward >= 0.0:
-            return _Intersection(numerator / quadratic, constant / numerator, False, False)
-        return _Intersection(constant / numerator, numerator / quadratic, False, False)
+            enter = numerator / quadratic
+            leave = constant / numerator
+        else:
+            enter = constant / numerator
+            leave = numerator / quadratic
+        return _Intersection(enter, leave, is_first_outside=False, is_second_outside=False)
     # The curves do not intersect: the function has the same sign on the whole first curve. If g >= 1, one of
     # the curves is on the cell's side of the other one; if g <= -1, both are, or neither is.
     is_first_outside = quadratic + constant > 0.0
@@ -434,13 +448,13 @@ def _compute_equation(curve: Array) -> _Equation:
 
 
 @kernel
-def _add_boundary(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
+def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, piece_count: int) -> int:
     """Add the sections of a curve on the cell's side of all other curves; return the new number of pieces.
 
     `crossings`, (k, 2), are the values of the parameter t at which the curve enters and leaves the cell's
     side of each other curve. If it enters first, it is on that side between the two. If it leaves first, it
     is on that side everywhere except between the two: there is a gap. The sections are the intersection of
-    the intervals without the gaps. `crossings` is overwritten.
+    the intervals without the gaps. `gaps`, (k, 2), is working memory with the columns of `crossings`.
     """
     # The crossings with curves that do not intersect this one are nan. Comparisons with nan are false, so
     # these curves neither limit the interval nor add a gap.
@@ -450,30 +464,33 @@ def _add_boundary(curve: Array, crossings: Array, pieces: Array, piece_count: in
         if crossings[k, _ENTER] <= crossings[k, _LEAVE]:
             start = max(start, crossings[k, _ENTER])
             end = min(end, crossings[k, _LEAVE])
-    # The gaps within the interval are sorted by their start. They overwrite crossings that were already read.
+    # List the gaps within the interval, sorted by their start.
     gap_count = 0
     for k in range(len(crossings)):
         enter = crossings[k, _ENTER]
         leave = crossings[k, _LEAVE]
         if leave < enter and leave < end and enter > start:
-            _insert_gap(crossings, gap_count, enter, leave)
+            _insert_gap(gaps, gap_count, enter, leave)
             gap_count += 1
+    # Add the section before each gap, and the one after the last gap. Sections between gaps that overlap are
+    # empty, and add nothing.
     for gap in range(gap_count):
-        piece_count = _add_pieces(curve, start, min(crossings[gap, _LEAVE], end), pieces, piece_count)
-        start = max(start, crossings[gap, _ENTER])
+        piece_count = _add_pieces(curve, start, min(gaps[gap, _LEAVE], end), pieces, piece_count)
+        start = max(start, gaps[gap, _ENTER])
     return _add_pieces(curve, start, end, pieces, piece_count)
 
 
 @kernel
 def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None:
-    """Insert a gap, from t = leave to t = enter, into the first rows of `gaps`, sorted by their start."""
-    k = gap_count
-    while k > 0 and gaps[k - 1, _LEAVE] > leave:
-        gaps[k, _ENTER] = gaps[k - 1, _ENTER]
-        gaps[k, _LEAVE] = gaps[k - 1, _LEAVE]
-        k -= 1
-    gaps[k, _ENTER] = enter
-    gaps[k, _LEAVE] = leave
+    """Insert a gap, from t = leave to t = enter, into the first `gap_count` rows, sorted by their start."""
+    # Move the gaps that start later by one row.
+    row = gap_count
+    while row > 0 and gaps[row - 1, _LEAVE] > leave:
+        gaps[row, _ENTER] = gaps[row - 1, _ENTER]
+        gaps[row, _LEAVE] = gaps[row - 1, _LEAVE]
+        row -= 1
+    gaps[row, _ENTER] = enter
+    gaps[row, _LEAVE] = leave
 
 
 @kernel
@@ -531,7 +548,8 @@ def _find_parameter(curve: Array, x: float, y: float) -> float:
 
     The point may lie off the curve because of rounding.
     """
-    # With the formula of q(t), both quotients below are equal to t. The larger divisor is more accurate.
+    # Insert q(t): its components are outward = -2 k t² / (1 + k² t²) and leftward = 2 t / (1 + k² t²). Both
+    # quotients below are then equal to t. If the divisor of the first one is small, the second is accurate.
     curvature = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]

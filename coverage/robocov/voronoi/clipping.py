@@ -46,7 +46,7 @@ EDGE_OTHER_CELL = 5
 EDGE_COLUMNS = 6
 
 _NO_VERTEX = -1
-"""Returned instead of a vertex if no vertex is beyond a bisector."""
+"""Used in place of a vertex where there is none."""
 _NOT_CUT = -1
 """Returned instead of a number of vertices if a bisector does not cut a polygon."""
 
@@ -71,6 +71,17 @@ class CellPolygon(NamedTuple):
     vertex_count: int
     start: int
     """Index of the first vertex."""
+
+
+class _CutVertices(NamedTuple):
+    """Which vertices of a convex polygon a bisector cuts off: a consecutive range, which may pass index 0."""
+
+    previous: int
+    """The vertex before the range, which remains."""
+    first: int
+    last: int
+    following: int
+    """The vertex after the range, which remains; `_NO_VERTEX` if all vertices are cut off."""
 
 
 class CellArrays(NamedTuple):
@@ -252,43 +263,53 @@ def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: 
     farthest = _compute_excess(polygon, count, neighbor_rows, row)
     if farthest == _NO_VERTEX:
         return _NOT_CUT
-    # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
-    # are those from `first_cut` to `last_cut`. The others, from `first_kept` to `last_kept`, are kept.
-    last_cut = farthest
-    first_kept = _get_next_vertex(last_cut, count)
-    while first_kept != farthest and polygon[first_kept, _EXCESS] > 0.0:
-        last_cut = first_kept
-        first_kept = _get_next_vertex(last_cut, count)
-    if first_kept == farthest:
-        # All vertices are beyond the bisector.
+    cut = _find_cut_vertices(polygon, count, farthest)
+    if cut.following == _NO_VERTEX:
         return 0
-    first_cut = farthest
-    last_kept = _get_previous_vertex(first_cut, count)
-    while polygon[last_kept, _EXCESS] > 0.0:
-        first_cut = last_kept
-        last_kept = _get_previous_vertex(first_cut, count)
+    # Copy the vertices that remain.
     new_count = 0
-    k = first_kept
-    while k != first_cut:
+    k = cut.following
+    while k != cut.first:
         for column in (X, Y, OTHER_CELL):
             cut_polygon[new_count, column] = polygon[k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
-    # The new edge begins where the edge from `last_kept` to `first_cut` crosses the bisector.
+    # The new edge begins where the outline leaves the generator's side of the bisector.
     robot = neighbor_rows[row, ROBOT]
-    if polygon[last_kept, _EXCESS] == 0.0:
-        # The crossing is at `last_kept` itself, which is already in `cut_polygon`.
+    if polygon[cut.previous, _EXCESS] == 0.0:
+        # That is at the vertex before, the last one that was copied.
         cut_polygon[new_count - 1, OTHER_CELL] = robot
     else:
-        _add_crossing(polygon, cut_polygon, new_count, last_kept, first_cut, robot)
+        _add_crossing(polygon, cut_polygon, new_count, cut.previous, cut.first, robot)
         new_count += 1
-    # The new edge ends where the edge from `last_cut` to `first_kept` crosses the bisector. If the crossing
-    # is at `first_kept` itself, no vertex is needed.
-    if polygon[first_kept, _EXCESS] < 0.0:
-        # The rest of the edge from `last_cut` to `first_kept` still borders on the same cell.
-        _add_crossing(polygon, cut_polygon, new_count, first_kept, last_cut, polygon[last_cut, OTHER_CELL])
+    # The new edge ends where the outline returns. If that is at the following vertex, which was copied first,
+    # no vertex is added. Otherwise the rest of the edge borders on the same cell as before.
+    if polygon[cut.following, _EXCESS] < 0.0:
+        other_cell = polygon[cut.last, OTHER_CELL]
+        _add_crossing(polygon, cut_polygon, new_count, cut.following, cut.last, other_cell)
         new_count += 1
     return new_count
+
+
+@inlined_kernel
+def _find_cut_vertices(polygon: Array, count: int, farthest: int) -> _CutVertices:
+    """Return the range of vertices with a positive excess; `farthest` is one of them.
+
+    They are consecutive, up to rounding, because the polygon is convex.
+    """
+    last = farthest
+    following = _get_next_vertex(last, count)
+    while following != farthest and polygon[following, _EXCESS] > 0.0:
+        last = following
+        following = _get_next_vertex(last, count)
+    first = farthest
+    previous = _get_previous_vertex(first, count)
+    if following == farthest:
+        return _CutVertices(previous, first, last, _NO_VERTEX)
+    while polygon[previous, _EXCESS] > 0.0:
+        first = previous
+        previous = _get_previous_vertex(first, count)
+    return _CutVertices(previous, first, last, following)
 
 
 @inlined_kernel

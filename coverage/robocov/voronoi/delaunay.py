@@ -308,9 +308,16 @@ def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: f
 def _flip_from(
     mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, first_half_edge: int, flip_count: int
 ) -> tuple[int, bool]:
-    """Flip the edge of a half-edge if it is not Delaunay, then the edges around it, until all of them are.
+    r"""Flip the edge of a half-edge if it is not Delaunay, then the edges around it, until all of them are.
 
-    A flip replaces the edge between two triangles by the other diagonal of the quadrilateral that they form.
+    A flip replaces the edge between two triangles by the other diagonal of the quadrilateral that they form::
+
+             c                    c
+           / | \                /   \
+          a  |  b      ->      a-----b
+           \ | /                \   /
+             d                    d
+
     Afterwards, the four sides of the quadrilateral may have to be flipped; the stack contains the edges that
     are still to be tested. Return the number of flips so far, or `_FAILED`, and whether all new triangles are
     counter-clockwise.

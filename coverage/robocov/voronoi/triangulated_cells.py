@@ -191,10 +191,10 @@ def _find_cell(
     """
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
     clearance = _compute_clearance(sides, points[i, 0], points[i, 1])
-    # If all vertices of the cell are nearer than the sides of the region, no side cuts it. In any case, the
-    # cell starts at the neighbor with the lowest number, so that it does not depend on the order of the
-    # triangles.
-    if clearance > 0.0 and fan.squared_reach < clearance * clearance:
+    # In both cases below, the cell starts at the neighbor with the lowest number, so that its last bits do
+    # not depend on the order of the triangles.
+    is_within_region = clearance > 0.0 and fan.squared_reach < clearance * clearance
+    if is_within_region:
         return CellPolygon(vertex_count=fan.neighbor_count, start=fan.lowest_index)
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
@@ -223,8 +223,8 @@ def _walk_around(
     mesh = triangulation.mesh
     polygon = workspace.polygon
     n = len(points)
-    # The neighbor with the lowest number is remembered: cells start there, whichever triangle comes first.
     count = 0
+    # Cells start at the neighbor with the lowest number, whichever triangle comes first.
     lowest_robot = n
     half_edge_to_lowest = first_half_edge
     lowest_index = 0
