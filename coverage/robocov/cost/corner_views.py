@@ -17,7 +17,16 @@ from robocov.geodesic.angular_index import (
     is_box_hidden,
     is_visible,
 )
-from robocov.geodesic.box_tree import END_OF_TREE, LEAF_SIZE, LOW_X, ROOT, skip_subtree
+from robocov.geodesic.box_tree import (
+    END_OF_TREE,
+    LEAF_SIZE,
+    LOW_X,
+    ROOT,
+    get_first_child,
+    get_first_item,
+    is_leaf,
+    skip_subtree,
+)
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
@@ -134,19 +143,17 @@ def _add_views(
     A search in the box tree of the tiles skips boxes that are entirely hidden by walls, and empty ones, which
     start at infinity.
     """
-    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     tree = tiles.tree
-    first_leaf = len(tree) // 2
     node = ROOT
     while node != END_OF_TREE:
         is_empty = tree[node, LOW_X] == np.inf
         if is_empty or is_box_hidden(tree, node, wall_index, ONLY_SOURCE):
             node = skip_subtree(node)
             continue
-        if node < first_leaf:
-            node = 2 * node
+        if not is_leaf(tree, node):
+            node = get_first_child(node)
             continue
-        first_tile = (node - first_leaf) * LEAF_SIZE
+        first_tile = get_first_item(tree, node)
         for tile in range(first_tile, min(first_tile + LEAF_SIZE, len(tiles.boxes))):
             if row_count == len(indices):
                 return NO_SPACE

@@ -32,6 +32,7 @@ from robocov.geodesic.box_tree import (
     LOW_X,
     LOW_Y,
     compute_squared_box_distance,
+    get_leaf,
 )
 from robocov.geodesic.corner_graph import NO_CORNER, CornerGraph, CornerPaths, CornerQueue, relax_paths
 from robocov.geodesic.walls import Walls, can_bend_at_corner
@@ -181,18 +182,27 @@ def find_site_paths(
         if not _find_team_paths(cost_map, search, teams[team], is_covered[team]):
             return False
         for tile in range(len(tiles.boxes)):
-            for slot in range(SLOTS):
-                site = tiles.site[tile, slot]
-                if site != NO_SITE:
-                    last_corner = search.site_corner[tile, slot]
-                    first_corner = NO_CORNER
-                    if last_corner != NO_CORNER:
-                        first_corner = search.corner_paths.first_corner[last_corner]
-                    paths.distance[team, site] = search.site_length[tile, slot] * unit
-                    paths.owner[team, site] = search.site_robot[tile, slot]
-                    paths.first_corner[team, site] = first_corner
-                    paths.last_corner[team, site] = last_corner
+            _write_tile_paths(tiles, search, tile, team, unit, paths)
     return True
+
+
+@kernel
+def _write_tile_paths(
+    tiles: Tiles, search: Search, tile: int, team: int, unit: float, paths: SitePaths
+) -> None:
+    """Write the paths that a search has found to the sites of a tile to the row of a team."""
+    for slot in range(SLOTS):
+        site = tiles.site[tile, slot]
+        if site == NO_SITE:
+            continue
+        last_corner = search.site_corner[tile, slot]
+        first_corner = NO_CORNER
+        if last_corner != NO_CORNER:
+            first_corner = search.corner_paths.first_corner[last_corner]
+        paths.distance[team, site] = search.site_length[tile, slot] * unit
+        paths.owner[team, site] = search.site_robot[tile, slot]
+        paths.first_corner[team, site] = first_corner
+        paths.last_corner[team, site] = last_corner
 
 
 @kernel
@@ -375,17 +385,16 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
     contains `LEAF_SIZE` consecutive corners. Return the number of corners in the queue.
     """
     boxes = walls.corner_boxes
-    first_leaf = len(boxes) // 2
     paths = search.corner_paths
     # While corners are searched, there is no group of tiles, and its scratch space is free.
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
-        if corner % LEAF_SIZE == 0:
-            leaf = first_leaf + corner // LEAF_SIZE
+        is_first_in_leaf = corner % LEAF_SIZE == 0
+        if is_first_in_leaf:
             candidate_count = _list_nearest_candidates(
-                boxes, leaf, robots, search.all_robots, len(robots), leaf_robots
+                boxes, get_leaf(boxes, corner), robots, search.all_robots, len(robots), leaf_robots
             )
         # No path to the corner is known yet; its source is the index of no robot.
         paths.length[corner] = np.inf
@@ -411,13 +420,13 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
     corners in the queue.
     """
     boxes = walls.corner_boxes
-    first_leaf = len(boxes) // 2
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
-        if corner % LEAF_SIZE == 0:
-            leaf = first_leaf + corner // LEAF_SIZE
+        is_first_in_leaf = corner % LEAF_SIZE == 0
+        if is_first_in_leaf:
+            leaf = get_leaf(boxes, corner)
             max_length = 0.0
             for leaf_corner in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
                 max_length = max(max_length, search.corner_paths.length[leaf_corner])
@@ -557,6 +566,7 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
         unseen_slots = hidden_slots & ~views.visible_slots[row]
         if unseen_slots == 0:
             max_length = min(max_length, paths.length[views.corner[row]] + views.farthest[row])
+    # Try each corner, unless even the nearest site that it sees is too far away.
     for row in range(first_row, end_row):
         corner = views.corner[row]
         seen_slots = hidden_slots & views.visible_slots[row]
@@ -565,7 +575,7 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
             continue
         robot = paths.source[corner]
         for slot in range(SLOTS):
-            if (seen_slots >> slot) & 1:
+            if _contains_slot(seen_slots, slot):
                 dx = tiles.x[tile, slot] - corners[corner, 0]
                 dy = tiles.y[tile, slot] - corners[corner, 1]
                 length = to_corner + np.sqrt(dx * dx + dy * dy)
@@ -573,6 +583,12 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
                     search.site_length[tile, slot] = length
                     search.site_robot[tile, slot] = robot
                     search.site_corner[tile, slot] = corner
+
+
+@kernel
+def _contains_slot(slots: int, slot: int) -> bool:
+    """Return whether a bit mask of the slots of a tile contains a slot."""
+    return (slots >> slot) & 1 != 0
 
 
 @kernel
@@ -587,7 +603,7 @@ def _compute_max_hidden_length(search: Search, tile: int) -> float:
     hidden_slots = search.hidden_slots[tile]
     max_length = 0.0
     for slot in range(SLOTS):
-        if (hidden_slots >> slot) & 1:
+        if _contains_slot(hidden_slots, slot):
             max_length = max(max_length, search.site_length[tile, slot])
     return max_length
 
@@ -605,7 +621,7 @@ def _try_straight_paths_to_sites(cost_map: CostMap, search: Search, tile: int, r
         return
     hidden_slots = search.hidden_slots[tile]
     for slot in range(SLOTS):
-        if (hidden_slots >> slot) & 1:
+        if _contains_slot(hidden_slots, slot):
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
             dx = x - wall_index.positions[robot, 0]

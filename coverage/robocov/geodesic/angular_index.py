@@ -23,6 +23,9 @@ from robocov.geodesic.box_tree import (
     LOW_Y,
     ROOT,
     compute_squared_box_distance,
+    get_first_child,
+    get_first_item,
+    is_leaf,
     skip_subtree,
 )
 from robocov.geodesic.grid import cross
@@ -44,7 +47,7 @@ _DISTANCE_PADDING = 1e-9
 """Relative margin by which squared distances are lowered or raised, far larger than rounding."""
 
 _MAX_CHAIN = 16
-"""Maximum number of consecutive walls that are examined together."""
+"""Maximum number of walls that are followed after one that ends within a bin."""
 
 _MAX_SIDE_ERROR = 2.0**55
 """Bound on the rounding error of sums of products of grid coordinates."""
@@ -183,10 +186,19 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     first_bin = int(np.floor((angle - half_angle) * bins_per_unit))
     last_bin = int(np.floor((angle + half_angle) * bins_per_unit))
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
-        k = unwrapped_bin & (bin_count - 1)
+        k = _wrap_bin(unwrapped_bin, bin_count)
         if index.squared_horizon[source, k] >= squared_distance:
             return False
     return True
+
+
+@kernel
+def _wrap_bin(unwrapped_bin: int, bin_count: int) -> int:
+    """Return the bin that has the same directions, whole turns apart, from 0 up to `bin_count`.
+
+    `bin_count` is a power of 2, so that this is the remainder of the division by it, also of negative bins.
+    """
+    return unwrapped_bin & (bin_count - 1)
 
 
 @kernel
@@ -223,10 +235,8 @@ def add_walls(
     int
         New number of entries, or `NO_SPACE`.
     """
-    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
     stack = index.stack
-    first_leaf = len(boxes) // 2
     bin_count = index.head.shape[1]
     _reset_source(index, source, x, y, squared_reach)
     stack[0] = ROOT
@@ -238,19 +248,20 @@ def add_walls(
             continue
         if is_box_hidden(boxes, node, index, source):
             continue
-        if node < first_leaf:
+        if not is_leaf(boxes, node):
             # Visit the nearer child first: boxes that its walls hide need not be visited.
-            nearer = 2 * node
-            farther = 2 * node + 1
+            nearer = get_first_child(node)
+            farther = nearer + 1
             nearer_distance = compute_squared_box_distance(boxes, nearer, x, y)
             farther_distance = compute_squared_box_distance(boxes, farther, x, y)
             if farther_distance < nearer_distance:
                 nearer, farther = farther, nearer
+            # The last node on the stack is visited next.
             stack[stack_size] = farther
             stack[stack_size + 1] = nearer
             stack_size += 2
             continue
-        first_wall = (node - first_leaf) * LEAF_SIZE
+        first_wall = get_first_item(boxes, node)
         for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
             # A wall may need an entry in every bin.
             if entry_count + bin_count > len(index.entry_wall):
@@ -327,23 +338,23 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
         end_angle += _FULL_TURN
     first_bin = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
     last_bin = int(np.floor((end_angle + _ANGLE_PADDING) * bins_per_unit))
-    # The wall covers the bins from `covered_first` up to `covered_end` completely.
-    covered_first = int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit))
-    covered_end = int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit))
+    # The wall covers the bins from `first_covered` up to `end_covered` completely.
+    first_covered = int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit))
+    end_covered = int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit))
     # Bins beyond a full turn wrap around. No bin is visited twice.
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
-        k = unwrapped_bin & (bin_count - 1)
+        k = _wrap_bin(unwrapped_bin, bin_count)
         if min_squared_distance > index.squared_horizon[source, k]:
             continue
         _add_to_bin(index, source, k, wall, min_squared_distance, entry_count)
         entry_count += 1
-        if covered_first <= unwrapped_bin < covered_end:
+        if first_covered <= unwrapped_bin < end_covered:
             index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_distance)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
-    k = covered_end & (bin_count - 1)
-    has_partial_bin = covered_first <= covered_end < first_bin + bin_count
+    k = _wrap_bin(end_covered, bin_count)
+    has_partial_bin = first_covered <= end_covered < first_bin + bin_count
     if has_partial_bin and max_squared_distance < index.squared_horizon[source, k]:
-        bin_end_angle = (covered_end + 1) / bins_per_unit
+        bin_end_angle = (end_covered + 1) / bins_per_unit
         max_squared_chain_distance = _compute_max_squared_chain_distance(
             walls, wall, x, y, end_angle, bin_end_angle, max_squared_distance
         )
@@ -544,17 +555,15 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
     Only walls whose boxes in the tree meet the segment between the two points are tested.
     """
-    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
-    first_leaf = len(boxes) // 2
     node = ROOT
     while node != END_OF_TREE:
         if _is_box_off_segment(boxes, node, x, y, dx, dy):
             node = skip_subtree(node)
-        elif node < first_leaf:
-            node = 2 * node
+        elif not is_leaf(boxes, node):
+            node = get_first_child(node)
         else:
-            first_wall = (node - first_leaf) * LEAF_SIZE
+            first_wall = get_first_item(boxes, node)
             for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                 if (
                     walls.can_hide_free_space[wall]

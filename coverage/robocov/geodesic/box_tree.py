@@ -4,8 +4,8 @@ A tree is a (nodes, 4) array. Row i is the box of node i, with the columns `LOW_
 `HIGH_Y`. Node 1 is the root, and node i has the children 2 i and 2 i + 1. The second half of the nodes are
 leaves of `LEAF_SIZE` consecutive items each; the boxes of empty leaves start at infinity. Row 0 is not used.
 
-A search starts at the `ROOT`. It descends from a node to its first child, and skips the nodes below a box
-that is too far away: `skip_subtree` returns the next node, or `END_OF_TREE`.
+A search starts at the `ROOT`. It descends from a node to its first child (`get_first_child`), and skips the
+nodes below a box that is too far away: `skip_subtree` returns the next node, or `END_OF_TREE`.
 """
 
 import numpy as np
@@ -83,6 +83,73 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
         key |= ((column >> bit) & 1) << (2 * bit)
         key |= ((row >> bit) & 1) << (2 * bit + 1)
     return key
+
+
+@kernel
+def is_leaf(boxes: Array, node: int) -> bool:
+    """Return whether a node is a leaf.
+
+    Parameters
+    ----------
+    boxes : (nodes, 4) array
+    node : int
+
+    Returns
+    -------
+    bool
+    """
+    first_leaf = len(boxes) // 2
+    return node >= first_leaf
+
+
+@kernel
+def get_first_item(boxes: Array, leaf: int) -> int:
+    """Return the index of the first of the `LEAF_SIZE` items of a leaf.
+
+    Parameters
+    ----------
+    boxes : (nodes, 4) array
+    leaf : int
+
+    Returns
+    -------
+    int
+        It may exceed the last item of the tree.
+    """
+    first_leaf = len(boxes) // 2
+    return (leaf - first_leaf) * LEAF_SIZE
+
+
+@kernel
+def get_leaf(boxes: Array, item: int) -> int:
+    """Return the leaf that contains an item.
+
+    Parameters
+    ----------
+    boxes : (nodes, 4) array
+    item : int
+
+    Returns
+    -------
+    int
+    """
+    first_leaf = len(boxes) // 2
+    return first_leaf + item // LEAF_SIZE
+
+
+@kernel
+def get_first_child(node: int) -> int:
+    """Return the first child of a node that is not a leaf. The second child follows it.
+
+    Parameters
+    ----------
+    node : int
+
+    Returns
+    -------
+    int
+    """
+    return 2 * node
 
 
 @kernel

@@ -16,7 +16,16 @@ from robocov.geodesic.angular_index import (
     is_box_hidden,
     is_visible,
 )
-from robocov.geodesic.box_tree import END_OF_TREE, LEAF_SIZE, LOW_X, ROOT, skip_subtree
+from robocov.geodesic.box_tree import (
+    END_OF_TREE,
+    LEAF_SIZE,
+    LOW_X,
+    ROOT,
+    get_first_child,
+    get_first_item,
+    is_leaf,
+    skip_subtree,
+)
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 NO_CORNER = -1
@@ -137,21 +146,20 @@ def find_visible_corners(
     int
         Number of corners that were found.
     """
-    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     corners = walls.corners
     boxes = walls.corner_boxes
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    first_leaf = len(boxes) // 2
     count = 0
     node = ROOT
     while node != END_OF_TREE:
-        if boxes[node, LOW_X] == np.inf or is_box_hidden(boxes, node, index, source):
+        is_empty = boxes[node, LOW_X] == np.inf
+        if is_empty or is_box_hidden(boxes, node, index, source):
             node = skip_subtree(node)
-        elif node < first_leaf:
-            node = 2 * node
+        elif not is_leaf(boxes, node):
+            node = get_first_child(node)
         else:
-            first_in_leaf = (node - first_leaf) * LEAF_SIZE
+            first_in_leaf = get_first_item(boxes, node)
             end_of_leaf = min(first_in_leaf + LEAF_SIZE, len(corners))
             for corner in range(max(first_in_leaf, first_corner), end_of_leaf):
                 if can_bend_at_corner(corners, walls.corner_walls, corner, x, y) and is_visible(
@@ -237,12 +245,13 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
     waiting_count : int
         Number of corners in the queue.
     """
+    # The queue is a ring: the corners from `head` up to `tail` wait, and indices wrap around at its end.
     size = len(queue.corners)
     head = 0
     tail = waiting_count
     while head != tail:
         corner = queue.corners[head]
-        head = head + 1 if head + 1 < size else 0
+        head = _get_next_slot(head, size)
         queue.is_waiting[corner] = False
         for link in range(graph.first_link[corner], graph.first_link[corner + 1]):
             neighbor = graph.neighbor[link]
@@ -256,4 +265,10 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
                 if not queue.is_waiting[neighbor]:
                     queue.is_waiting[neighbor] = True
                     queue.corners[tail] = neighbor
-                    tail = tail + 1 if tail + 1 < size else 0
+                    tail = _get_next_slot(tail, size)
+
+
+@kernel
+def _get_next_slot(slot: int, size: int) -> int:
+    """Return the index after `slot` in a ring buffer."""
+    return slot + 1 if slot + 1 < size else 0

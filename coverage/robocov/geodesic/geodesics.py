@@ -283,7 +283,8 @@ class Geodesics:
         """Return the nearest grid point of the closed free space, accurate to a few steps."""
         line = shapely.shortest_line(self.free, shapely.Point(grid_position))
         foot = np.rint(shapely.get_coordinates(line)[0])
-        # The nearest point of a slanted wall is not a grid point: take the nearest one not behind the wall.
+        # The nearest point of a slanted wall is rarely a grid point, and rounded it may be behind the wall.
+        # Take the nearest of the free grid points around it.
         steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         free = around[(self.count_windings(around) > 0).any(axis=1)]
@@ -388,17 +389,20 @@ class Geodesics:
         _combine_distances(self.walls, index, from_source, ends[1:], to_target, distance)
         if np.isinf(distance[0, 0]):
             return np.empty((0, 2))
-        via_corner = from_source[0] + to_target[0]
-        # Follow the path backwards from its last corner, if it is not straight.
+        # The lengths of the paths that bend last at each corner. If none is a shortest path, the straight
+        # line is.
+        lengths = from_source[0] + to_target[0]
         corner = NO_CORNER
-        if via_corner.min(initial=np.inf) <= distance[0, 0]:
-            corner = int(via_corner.argmin())
+        if lengths.min(initial=np.inf) <= distance[0, 0]:
+            corner = int(lengths.argmin())
+        # Follow the path backwards from its last corner.
         bends = []
         while corner != NO_CORNER:
             bends.append(corner)
             corner = int(paths.previous_corner[corner])
+        bends.reverse()
         points = self.grid.to_meters(ends)
-        return np.concatenate([points[:1], self.corners[bends[::-1]], points[1:]])
+        return np.concatenate([points[:1], self.corners[bends], points[1:]])
 
 
 @kernel

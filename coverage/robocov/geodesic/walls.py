@@ -21,6 +21,9 @@ from robocov.geodesic.box_tree import (
     Z_ORDER_BITS,
     build_box_tree,
     compute_z_order,
+    get_first_child,
+    get_first_item,
+    is_leaf,
     skip_subtree,
 )
 from robocov.geodesic.grid import GRID_BITS, compute_crosses, cross
@@ -383,9 +386,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
     windings : (n, c) int array
         Result: 1 inside the component, more than 1 on its boundary, 0 outside.
     """
-    # Node i of the tree has the children 2 i and 2 i + 1. The second half of the nodes are leaves.
     boxes = walls.boxes
-    first_leaf = len(boxes) // 2
     for i in range(len(points)):
         x = points[i, 0]
         y = points[i, 1]
@@ -395,10 +396,10 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
         while node != END_OF_TREE:
             if boxes[node, LOW_Y] > y or boxes[node, HIGH_Y] < y or boxes[node, HIGH_X] < x:
                 node = skip_subtree(node)
-            elif node < first_leaf:
-                node = 2 * node
+            elif not is_leaf(boxes, node):
+                node = get_first_child(node)
             else:
-                first_wall = (node - first_leaf) * LEAF_SIZE
+                first_wall = get_first_item(boxes, node)
                 for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                     windings[i, walls.component[wall]] += _count_winding(walls.ends, wall, x, y)
                 node = skip_subtree(node)

@@ -19,8 +19,9 @@ from robocov.compiled import kernel
 from robocov.geodesic.angular_index import (
     NO_ENTRY,
     NO_SPACE,
+    ONLY_SOURCE,
     AngularWallIndex,
-    compute_pseudo_angle,
+    find_bin,
     index_walls,
 )
 from robocov.geodesic.grid import Grid
@@ -163,7 +164,11 @@ def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tupl
 
 
 def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position: Array) -> _Sectors:
-    """Return the sectors of the view from a position; the first `entries` of the index are in use."""
+    """Return the sectors of the view from a position; the first `entries` of the index are in use.
+
+    The visible wall can only change in the directions of the ends of walls. In each sector between two such
+    directions, the visible wall is therefore the one that a ray through the middle hits first.
+    """
     facing_walls = np.unique(index.entry_wall[:entries])
     ends = walls.ends[facing_walls].reshape(-1, 2) - position
     start = np.unique(np.arctan2(ends[:, 1], ends[:, 0]))
@@ -190,14 +195,13 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
         y = rays[m, 1]
         nearest[m] = NO_WALL
         min_distance = np.inf
-        # The pseudo-angle of a full turn is 4.
-        unwrapped_bin = int(compute_pseudo_angle(x, y) * (_BINS * 0.25))
-        entry = index.head[0, unwrapped_bin & (_BINS - 1)]
+        # The walls of a bin are a linked list, from its last entry to the first one.
+        entry = index.head[ONLY_SOURCE, find_bin(_BINS, x, y)]
         while entry != NO_ENTRY:
             wall = index.entry_wall[entry]
-            # From the source to the first end a, and from there along the wall u.
-            ax = ends[wall, START_X] - index.positions[0, 0]
-            ay = ends[wall, START_Y] - index.positions[0, 1]
+            # From the source to the start a of the wall, and from there along the wall u.
+            ax = ends[wall, START_X] - index.positions[ONLY_SOURCE, 0]
+            ay = ends[wall, START_Y] - index.positions[ONLY_SOURCE, 1]
             ux = ends[wall, END_X] - ends[wall, START_X]
             uy = ends[wall, END_Y] - ends[wall, START_Y]
             # The ray meets the line of the wall where a + s u = t (x, y).
