@@ -43,6 +43,17 @@ class _NearestSources(NamedTuple):
     second_distance: Array
 
 
+class _Swap(NamedTuple):
+    """The best replacement of one source."""
+
+    cost: float
+    """Cost before the swap."""
+    swapped_cost: float
+    """Cost after the swap; infinite if no swap is possible."""
+    sources: IntArray
+    """(k,) The sources after the swap."""
+
+
 def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray:
     """Choose random sources that are far from each other.
 
@@ -65,8 +76,9 @@ def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray
     distance = np.ones(len(table))
     is_chosen = np.zeros(table.shape[1], dtype=bool)
     for _ in range(count):
+        # Draw a target with a probability proportional to its distance from the sources so far; the nearest
+        # column becomes a source. If all distances are zero, the last target is as good as any other.
         cumulative = np.cumsum(distance)
-        # If all targets are at distance zero, the last one is chosen, which is as good as any other.
         target = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
         target = min(target, len(distance) - 1)
         source = int(np.where(is_chosen, np.inf, table[target]).argmin())
@@ -149,8 +161,8 @@ def apply_best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold
     (k,) int array
         The same array, if no swap saves enough.
     """
-    cost, swapped_cost, swapped = _find_best_swap(table, sources, fixed)
-    return swapped if swapped_cost < cost * (1.0 - threshold) else sources
+    swap = _find_best_swap(table, sources, fixed)
+    return swap.sources if swap.swapped_cost < swap.cost * (1.0 - threshold) else sources
 
 
 def apply_best_swaps(table: Array, sources: IntArray, heartbeat: Heartbeat = lambda: None) -> IntArray:
@@ -315,7 +327,7 @@ def _apply_lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tupl
         has_targets[k] = True
         for column in range(table.shape[1]):
             sums[k, column] += table[t, column]
-    # A source without targets does not change, and no two sources may become equal.
+    # Sources that are fixed or have no targets keep their columns. No two sources may become equal.
     is_taken = np.zeros(table.shape[1], dtype=np.bool_)
     for k in range(len(sources)):
         is_taken[sources[k]] |= fixed[k] or not has_targets[k]
@@ -340,11 +352,14 @@ def _find_smallest(sums: Array, is_taken: BoolArray) -> int:
 
 
 @kernel
-def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, IntArray]:
-    """Return the cost of the sources, the cost after the best swap, and the sources after it."""
+def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> _Swap:
+    """Return the replacement of one source by another column that leads to the lowest cost.
+
+    The cost after a swap is the cost with the new column added to all sources, plus the increase for the
+    targets of the removed source: they go to the new column or to their second nearest source. One pass over
+    the table computes both for all swaps.
+    """
     nearest = _find_nearest_sources(table, sources)
-    # The cost after a swap is the cost with the new column added to all sources, plus the increase for the
-    # targets of the removed source: they go to the new column or to their second nearest source.
     cost_with_column = np.zeros(table.shape[1])
     increase = np.zeros((len(sources), table.shape[1]))
     cost = 0.0
@@ -371,10 +386,10 @@ def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[
                 best_cost = swapped_cost
                 best_k = k
                 best_column = column
-    swapped = sources.copy()
+    swapped_sources = sources.copy()
     if best_k >= 0:
-        swapped[best_k] = best_column
-    return cost, best_cost, swapped
+        swapped_sources[best_k] = best_column
+    return _Swap(cost=cost, swapped_cost=best_cost, sources=swapped_sources)
 
 
 @kernel

@@ -203,16 +203,18 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
         return sums
     starts = np.empty(count_starts(n), np.intp)
     order = np.empty(n, np.intp)
-    left, low, scale, columns, rows = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
+    bins = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
     for i in range(n):
         # Robots in range are in the same bin or in one of the eight around it. The bins of a row follow each
-        # other, and so do the robots in them.
-        column = find_bin(positions[i, 0] - left, scale)
-        row = find_bin(positions[i, 1] - low, scale)
+        # other, and so do the robots in them, in `order`.
+        column = find_bin(positions[i, 0] - bins.left, bins.scale)
+        row = find_bin(positions[i, 1] - bins.bottom, bins.scale)
         first_column = max(column - 1, 0)
-        stop_column = min(column + 2, columns)
-        for r in range(max(row - 1, 0), min(row + 2, rows)):
-            for k in range(starts[r * columns + first_column], starts[r * columns + stop_column]):
+        stop_column = min(column + 2, bins.columns)
+        for bin_row in range(max(row - 1, 0), min(row + 2, bins.rows)):
+            first_bin = bin_row * bins.columns + first_column
+            stop_bin = bin_row * bins.columns + stop_column
+            for k in range(starts[first_bin], starts[stop_bin]):
                 j = order[k]
                 if j != i:
                     dx = positions[i, 0] - positions[j, 0]
@@ -240,7 +242,10 @@ def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: Pot
 
 @kernel
 def _compute_separation(i: int, j: int) -> tuple[float, float]:
-    """Return the unit vector in which robot i is pushed away from robot j at the same position."""
+    """Return the unit vector in which robot i is pushed away from robot j at the same position.
+
+    The direction differs between pairs, and is opposite for j and i.
+    """
     angle = GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
     sign = 1.0 if i < j else -1.0
     return sign * np.cos(angle), sign * np.sin(angle)

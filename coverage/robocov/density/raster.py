@@ -28,11 +28,24 @@ _MAX_CACHED_GRIDS = 4
 """A grid takes ten times the memory of its image. While a user paints a raster, a new grid is built for each
 change, but only the last few are still in use."""
 
-_ONE, _U, _V, _UU, _VV = range(5)
+_ONE = 0
+_U = 1
+_V = 2
+_UU = 3
+_VV = 4
 """Columns of the integrals of φ times 1, u, v, u² and v² over cells."""
+_INTEGRAL_COLUMNS = 5
 
-_CONSTANT, _SLOPE_X, _SLOPE_Y, _TWIST = range(4)
+_CONSTANT = 0
+_SLOPE_X = 1
+_SLOPE_Y = 2
+_TWIST = 3
 """Rows of the coefficients of a grid; see `_Grid`."""
+
+_TIMES_ONE = 0
+_TIMES_U = 1
+_TIMES_UU = 2
+"""Rows of the integrals of φ times 1, u and u² along rows; see `_Grid`."""
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of the Gauss rule with three points on [0, 1] from the middle one."""
@@ -186,7 +199,8 @@ class Raster(Density):
         y = integrals[:, _V] * step_y
         xx = integrals[:, _UU] * (step_x * step_x)
         yy = integrals[:, _VV] * (step_y * step_y)
-        # Convert moments about the origin of the grid to moments about the origins of the cells.
+        # Convert moments about the origin of the grid to moments about the origins of the cells, at offsets a
+        # from there: the integral of (x - a)² is that of x² - a (2 x - a).
         offset_x, offset_y = offsets.T
         polar = xx - offset_x * (2.0 * x - offset_x * mass) + yy - offset_y * (2.0 * y - offset_y * mass)
         return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
@@ -227,15 +241,17 @@ class _Grid(NamedTuple):
     origin, step : (2,) arrays, m
     coefficients : (4, rows, columns) array
         Constants, slopes in x, slopes in y, and twists; see `_CONSTANT` and the following constants.
-    left : (3, 2, rows, columns) array
-        Integrals of φ, u φ and u² φ along the part of a row to the left of each square, at η = 0, and
-        their increase to η = 1.
+    left : (3, rows, columns) array
+        Integrals of φ, u φ and u² φ along a row, from the left side of the grid to each square, at η = 0.
+    left_change : (3, rows, columns) array
+        Change of these integrals from η = 0 to η = 1. In between, they are linear in η.
     """
 
     origin: Array
     step: Array
     coefficients: Array
     left: Array
+    left_change: Array
 
 
 class _Edge(NamedTuple):
@@ -274,23 +290,24 @@ def _build_grid(raster: Raster) -> _Grid:
         slope_x = np.zeros_like(values)
         slope_y = np.zeros_like(values)
         twist = np.zeros_like(values)
-    coefficients = np.stack([constant, slope_x, slope_y, twist])
-    return _Grid(origin, step, coefficients, _integrate_rows(coefficients))
+    # φ = (constant + slope_x ξ) + η (slope_y + twist ξ): the first term is φ at η = 0, and the second one its
+    # change to η = 1.
+    return _Grid(
+        origin=origin,
+        step=step,
+        coefficients=np.stack([constant, slope_x, slope_y, twist]),
+        left=_integrate_rows(constant, slope_x),
+        left_change=_integrate_rows(slope_y, twist),
+    )
 
 
-def _integrate_rows(coefficients: Array) -> Array:
-    """Return the integrals of φ, u φ and u² φ along a row, from the left edge of the grid to each square.
+def _integrate_rows(start: Array, slope: Array) -> Array:
+    """Integrate f, u f and u² f along rows, from the left side of the grid to each square.
 
-    In a square, φ is the polynomial of `_Grid`, with u = i + ξ in column i. The result has the shape
-    (3, 2, rows, columns): index 0 of the second axis holds the integrals at η = 0, and index 1 their change
-    from η = 0 to η = 1; see `_Grid.left`.
+    In the square of column i, f is start + slope ξ, with u = i + ξ. The result is (3, rows, columns).
     """
-    constant, slope_x, slope_y, twist = coefficients
-    i = np.arange(constant.shape[1])
-    # Along a row, φ is start + slope ξ. Index 0 is the value at η = 0, index 1 the change to η = 1.
-    start = np.stack([constant, slope_y])
-    slope = np.stack([slope_x, twist])
-    # Integrals over ξ from 0 to 1 of φ, ξ φ and ξ² φ.
+    i = np.arange(start.shape[1])
+    # Integrals over ξ from 0 to 1 of f, ξ f and ξ² f.
     zeroth = start + slope / 2
     first = start / 2 + slope / 3
     second = start / 3 + slope / 4
@@ -310,7 +327,7 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
     section.
     """
     _, rows, columns = grid.coefficients.shape
-    sums = np.zeros((cell_count, 5))
+    sums = np.zeros((cell_count, _INTEGRAL_COLUMNS))
     for e in range(len(cell)):
         edge = _Edge(start[e, 0], start[e, 1], end[e, 0] - start[e, 0], end[e, 1] - start[e, 1])
         if edge.dv == 0.0:
@@ -345,7 +362,9 @@ def _add_section(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, en
     """
     coefficients = grid.coefficients
     left = grid.left
+    left_change = grid.left_change
     _, rows, columns = coefficients.shape
+    # The square, in column i and row j, that contains the middle of the section.
     middle = 0.5 * (start + end)
     i = min(max(int(np.floor(edge.u + middle * edge.du)), 0), columns - 1)
     j = min(max(int(np.floor(edge.v + middle * edge.dv)), 0), rows - 1)
@@ -368,9 +387,12 @@ def _add_section(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, en
         first = xi * xi * (row_start / 2.0 + xi * row_slope / 3.0)
         second = xi * xi * xi * (row_start / 3.0 + xi * row_slope / 4.0)
         # The integrals of φ times 1, u and u² start at the left side of the image.
-        row_one = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
-        row_u = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
-        row_uu = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
+        left_one = left[_TIMES_ONE, j, i] + eta * left_change[_TIMES_ONE, j, i]
+        left_u = left[_TIMES_U, j, i] + eta * left_change[_TIMES_U, j, i]
+        left_uu = left[_TIMES_UU, j, i] + eta * left_change[_TIMES_UU, j, i]
+        row_one = left_one + zeroth
+        row_u = left_u + i * zeroth + first
+        row_uu = left_uu + i * (i * zeroth + 2.0 * first) + second
         sums[k, _ONE] += weight * row_one
         sums[k, _U] += weight * row_u
         sums[k, _V] += weight * v * row_one

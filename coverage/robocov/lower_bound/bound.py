@@ -246,6 +246,7 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
     best: _Proof | None = None
     smoothing = _SMOOTHING
+    # As many rounds as it takes to reach the final smoothing, if each one halves it.
     round_count = max(1, math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision))))
     for k in range(round_count):
         fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / round_count
@@ -382,9 +383,10 @@ class _Dual:
 
     def _thin_out(self, candidates: Array) -> Array:
         """Return the first position in each square of a grid with half the spacing `candidate_spacing`."""
-        squares = np.floor(candidates * 2.0 / self.candidate_spacing)
+        squares = np.floor(candidates / (self.candidate_spacing / 2.0))
         _, first = np.unique(squares, axis=0, return_index=True)
-        return candidates[np.sort(first)]
+        in_original_order = np.sort(first)
+        return candidates[in_original_order]
 
     def add_candidates(self, candidates: Array) -> None:
         """Add positions, (p, 2) grid steps, to the table."""
@@ -567,8 +569,13 @@ def _triangulate(area: shapely.Geometry) -> Array:
 
 
 def _compute_initial_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
-    """Return maximum and initial prices, (m,) m each, for robots and sites in grid steps."""
+    """Return maximum and initial prices, (m,) m each, for robots and sites in grid steps.
+
+    The maximum price of a site is its distance to the robot of rank `_MAX_PRICE_RANK`, and infinite if there
+    are fewer robots.
+    """
     distances = geodesics.compute_grid_distances(robots, sites) * geodesics.grid.unit
+    # Infinitely distant robots are added, so that there is one of every rank.
     missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
     distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
     nearest = distances[0]

@@ -14,7 +14,7 @@ _SIDE_MARGIN = 1.000001
 
 
 class Bins(NamedTuple):
-    """A grid of square bins that covers a set of points."""
+    """A grid of square bins that covers a set of points. Bins are numbered row by row."""
 
     left: float
     """x at which the first column begins, m."""
@@ -64,10 +64,44 @@ def count_starts(point_count: int) -> int:
 
 
 @kernel
+def _fit_bins(points: Array, first: int, stop: int, reach: float) -> Bins:
+    """Return the bins that cover ``points[first:stop]``, with sides a little longer than the reach.
+
+    The number of bins is limited in proportion to the number of points.
+    """
+    count = stop - first
+    left = points[first, 0]
+    right = points[first, 0]
+    bottom = points[first, 1]
+    top = points[first, 1]
+    for i in range(first, stop):
+        left = min(left, points[i, 0])
+        right = max(right, points[i, 0])
+        bottom = min(bottom, points[i, 1])
+        top = max(top, points[i, 1])
+    width = right - left
+    height = top - bottom
+    side = max(_SIDE_MARGIN * reach, np.sqrt(width * height / count), max(width, height) / count)
+    # With a scale of 0, all points are in one bin.
+    scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0
+    columns = find_bin(width, scale) + 1
+    rows = find_bin(height, scale) + 1
+    return Bins(left, bottom, scale, columns, rows)
+
+
+@kernel
+def _find_bin_of_point(bins: Bins, points: Array, i: int) -> int:
+    """Return the bin that contains point i."""
+    row = find_bin(points[i, 1] - bins.bottom, bins.scale)
+    column = find_bin(points[i, 0] - bins.left, bins.scale)
+    return row * bins.columns + column
+
+
+@kernel
 def sort_into_bins(
     points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
 ) -> Bins:
-    """Sort points into square bins, which are numbered row by row.
+    """Sort points into square bins.
 
     Points within reach of each other are in the same bin or in adjacent ones. This is a counting sort: it
     counts the points in each bin, computes where each bin starts in `order`, and then writes the points
@@ -89,36 +123,21 @@ def sort_into_bins(
     -------
     Bins
     """
-    count = stop - first
-    left = points[first, 0]
-    right = points[first, 0]
-    bottom = points[first, 1]
-    top = points[first, 1]
-    for i in range(first, stop):
-        left = min(left, points[i, 0])
-        right = max(right, points[i, 0])
-        bottom = min(bottom, points[i, 1])
-        top = max(top, points[i, 1])
-    width = right - left
-    height = top - bottom
-    # The number of bins is limited in proportion to the number of points.
-    side = max(_SIDE_MARGIN * reach, np.sqrt(width * height / count), max(width, height) / count)
-    scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0
-    columns = find_bin(width, scale) + 1
-    rows = find_bin(height, scale) + 1
+    bins = _fit_bins(points, first, stop, reach)
+    bin_count = bins.columns * bins.rows
     # Count the points: starts[b + 2] is the number of points in bin b.
-    for b in range(columns * rows + 2):
+    for b in range(bin_count + 2):
         starts[b] = 0
     for i in range(first, stop):
-        b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
+        b = _find_bin_of_point(bins, points, i)
         starts[b + 2] += 1
     # Add up the counts: starts[b + 1] becomes the number of points in the bins before b, where bin b begins.
-    for b in range(columns * rows):
+    for b in range(bin_count):
         starts[b + 2] += starts[b + 1]
     # Write each point at starts[b + 1], and advance that index. Once bin b is full, the index has moved to
     # its end, where bin b + 1 begins, as described above for `starts`.
     for i in range(first, stop):
-        b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
+        b = _find_bin_of_point(bins, points, i)
         order[starts[b + 1]] = i
         starts[b + 1] += 1
-    return Bins(left, bottom, scale, columns, rows)
+    return bins

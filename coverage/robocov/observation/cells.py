@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.density.base import Density, Uniform
-from robocov.density.cell_edges import CellEdges
+from robocov.density.cell_edges import POLAR_MOMENT, CellEdges
 
 
 @dataclass(eq=False)
@@ -52,4 +52,4 @@ class Cells(ABC):
     def polar_moment(self) -> Array:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moment of each cell about its generator."""
         density = self.density or Uniform()
-        return density.compute_moments(self.edges, self.generators)[:, 3]
+        return density.compute_moments(self.edges, self.generators)[:, POLAR_MOMENT]

@@ -74,6 +74,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     bins = sort_into_bins(points, 0, n, ranges.max(), starts, order)
     total = 0
     for i in range(n):
+        # A point may have all others in range.
         if total + n > len(second):
             capacity = 2 * (total + n)
             first = _enlarge(first, total, capacity)
@@ -82,11 +83,12 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
         begin = total
         row = find_bin(points[i, 1] - bins.bottom, bins.scale)
         column = find_bin(points[i, 0] - bins.left, bins.scale)
-        for r in range(max(row - 1, 0), min(row + 2, bins.rows)):
-            # The bins of adjacent columns are contiguous in `order`.
-            first_in_row = starts[r * bins.columns + max(column - 1, 0)]
-            stop_in_row = starts[r * bins.columns + min(column + 2, bins.columns)]
-            for k in range(first_in_row, stop_in_row):
+        # Points in range are in the same bin or in one of the eight around it. The bins of a row follow each
+        # other, and so do the points in them, in `order`.
+        for bin_row in range(max(row - 1, 0), min(row + 2, bins.rows)):
+            first_bin = bin_row * bins.columns + max(column - 1, 0)
+            stop_bin = bin_row * bins.columns + min(column + 2, bins.columns)
+            for k in range(starts[first_bin], starts[stop_bin]):
                 j = order[k]
                 dx = points[j, 0] - points[i, 0]
                 dy = points[j, 1] - points[i, 1]

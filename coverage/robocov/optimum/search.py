@@ -305,8 +305,10 @@ class _Search:
     def _spread_candidates(self, covered: list[int]) -> list[Array]:
         """Return candidate positions in each of the covered components, (c, 2) m each."""
         areas = [self.space.components[k] for k in covered]
+        total_area = sum(area.area for area in areas)
         count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robot_count)
-        spacing = max(math.sqrt(sum(area.area for area in areas) / count), self.space.spacing)
+        # Each candidate gets a square of the same area, but robots at adjacent candidates must not overlap.
+        spacing = max(math.sqrt(total_area / count), self.space.spacing)
         return [_spread_points(area, spacing) for area in areas]
 
     def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
@@ -328,16 +330,21 @@ class _Search:
     def _group_sites(self, site_component: IntArray, is_covered: BoolArray) -> _SiteGroups:
         """Group the covered sites by component, in square blocks of lattice cells."""
         cost = self.cost
+        # The side of a block, in cells.
         side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
         row, column = np.divmod(cost.cells, cost.lattice)
-        square = row // side * cost.lattice + column // side
-        group = square * len(self.space.components) + site_component
-        # A group is represented by the site nearest to the middle of its square. Integer offsets make ties
-        # exact, such as between all cells of a two by two square; ties are broken at random.
-        row_offset = 2 * (row % side) - side + 1
-        column_offset = 2 * (column % side) - side + 1
+        # A group is numbered by its block, and within a block by its component.
+        block = row // side * cost.lattice + column // side
+        group = block * len(self.space.components) + site_component
+        # A group is represented by the site nearest to the middle of its block. Offsets from the middle are
+        # counted in half cells, so that they are whole numbers and ties are exact, such as between all cells
+        # of a two by two block; ties are broken at random.
+        row_offset = 2 * (row % side) - (side - 1)
+        column_offset = 2 * (column % side) - (side - 1)
         squared_offset = row_offset**2 + column_offset**2
         tie_breaker = np.random.default_rng(0).random(len(group))
+        # Sort the covered sites by group (`lexsort` expects the most important key last). The first site of
+        # each group is its representative.
         sites = np.flatnonzero(is_covered)
         sites = sites[np.lexsort((tie_breaker[sites], squared_offset[sites], group[sites]))]
         _, starts, counts = np.unique(group[sites], return_index=True, return_counts=True)
@@ -365,11 +372,15 @@ class _Search:
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:
-    """Return points in an area, (p, 2), at least `spacing` apart: a coarse grid with its gaps filled."""
+    """Return points in an area, (p, 2), at least `spacing` apart: a coarse grid with its gaps filled.
+
+    Every third row and column of a fine grid form the coarse grid. The other points of the fine grid fill the
+    gaps between the coarse grid and the walls.
+    """
     low_x, low_y, high_x, high_y = area.bounds
-    step = spacing / _STEPS_PER_SPACING
-    step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS))
-    # Rows and columns of a fine grid, counted from the middle of the bounding box.
+    min_step = math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS)
+    step = max(spacing / _STEPS_PER_SPACING, min_step)
+    # Rows and columns of the fine grid are counted from the middle of the bounding box.
     max_column = int((high_x - low_x) / 2.0 / step)
     max_row = int((high_y - low_y) / 2.0 / step)
     row_grid, column_grid = np.mgrid[-max_row : max_row + 1, -max_column : max_column + 1]
