@@ -24,12 +24,13 @@ _MAX_WIDENING_GAPS = 1.2
 _MIN_WIDENING_SHARE = 0.4
 """Widening of the last streets, and of those along the boundary, relative to that of the first."""
 _CHAMFER_PROBABILITY = 0.25
-_CHAMFER_FRACTIONS = (0.2, 0.45)
 _NOTCH_PROBABILITY = 0.2
+"""Probability that a corner of a block is cut off by a line, or by a notch."""
+_CHAMFER_FRACTIONS = (0.2, 0.45)
 _NOTCH_FRACTIONS = (0.35, 0.6)
 """Smallest and largest fraction of an edge that is cut off; see `Trim`."""
 _MAX_CORNERS = 12
-"""Upper limit of the random number that, modulo the number of corners, selects the corner to trim."""
+"""The corner to trim is a random number below this one, modulo the number of corners."""
 _MAX_UNEVENNESS = 0.25
 """Largest offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
@@ -163,8 +164,10 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         if count == 1:
             cells.append(cell)
             continue
+        # If the number of blocks is odd, either part may get one more.
         first_count = count // 2 if rng.random() < 0.5 else count - count // 2
         fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+        # `np.ptp` is the difference between maximum and minimum.
         width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
         if max(width, height) < 2.0 * street_width:
             return None
@@ -291,6 +294,7 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     for k, edge in enumerate(cell):
         following = cell[(k + 1) % len(cell)]
         length = math.hypot(following.x - edge.x, following.y - edge.y)
+        # The outward normal: cells are counter-clockwise.
         normal = ((following.y - edge.y) / length, (edge.x - following.x) / length)
         distance = edge.setback + widening * edge.widening_share
         origin = (edge.x - normal[0] * distance, edge.y - normal[1] * distance)

@@ -21,10 +21,13 @@ from robocov.generator.request import AREA_TOLERANCE, Request
 
 # A unit is the side of a chamber of mean area, `Request.unit`. A side is the shorter side of the map.
 _WAVES = 48
+"""Number of waves whose sum is the random field."""
 _MIN_WAVELENGTH_UNITS = 0.7
 _MAX_WAVELENGTH_UNITS = 1.7
+"""Range of their lengths."""
 _MAX_MESH_STEPS_PER_UNIT = 12
 _MIN_MESH_STEPS_PER_UNIT = 6
+"""Range of the resolution of the mesh on which the field is evaluated."""
 _MAX_MESH_STEPS_PER_SIDE = 160
 """Number of steps along the longer side from which the mesh becomes coarser."""
 _RIM_SIDES = 0.012
@@ -167,7 +170,8 @@ class _CaveBuilder:
         spike = _SPIKE_UNITS * unit
         inner_rectangle = _build_inner_rectangle(self.request, 0.0)
         # Dilating too far, then eroding by the difference, removes spikes of rock.
-        space = core.buffer(radius + spike).buffer(-spike).intersection(inner_rectangle) | self.start_area
+        dilated_core = core.buffer(radius + spike).buffer(-spike)
+        space = dilated_core.intersection(inner_rectangle).union(self.start_area)
         largest = max(shapely.get_parts(space), key=lambda polygon: float(polygon.area))
         min_area = _MIN_PILLAR_UNIT_AREAS * unit**2
         pillars = [ring for ring in largest.interiors if Polygon(ring).area >= min_area]
@@ -355,6 +359,7 @@ def build_tunnels(components: Array, rng: np.random.Generator) -> list[LineStrin
     extent = np.ptp(shapely.total_bounds(components).reshape(2, 2), axis=0)
     distance = float(extent.max()) / len(components)
     while joined.n_subsets > 1:
+        # Pairs of components within the distance, each pair once.
         i, j = index.query(components, "dwithin", distance)
         is_ordered = i < j
         i = i[is_ordered]

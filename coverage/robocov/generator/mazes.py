@@ -48,6 +48,7 @@ _DEAD_END_PROBABILITY = 0.7
 _USED_AREA_TOLERANCE = 0.8 * AREA_TOLERANCE
 """The rest of the tolerance is left for rounding errors."""
 _GAP_TOLERANCE_M = 1e-9
+"""Allowance for rounding errors of the width of corridors."""
 
 
 def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -183,7 +184,9 @@ def _clear_disc(
     segments = _list_segments(walls)
     starts = np.column_stack([np.take(x, segments.columns), np.take(y, segments.rows)])
     ends = np.column_stack([np.take(x, segments.end_columns), np.take(y, segments.end_rows)])
-    half_widths = thickness / 2.0 * np.column_stack([~segments.is_horizontal, segments.is_horizontal])
+    # A wall extends by half its thickness to both sides: in x if it is vertical, in y if it is horizontal.
+    is_wide = np.column_stack([~segments.is_horizontal, segments.is_horizontal])
+    half_widths = thickness / 2.0 * is_wide
     lower_left = starts - half_widths
     upper_right = ends + half_widths
     boxes = shapely.box(*lower_left.T, *upper_right.T)
@@ -287,11 +290,14 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 
 
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Remove a random wall, preferably one that is attached to other walls at both ends: that makes a loop.
+    """Remove a random wall, preferably one that is attached to other walls at both ends.
 
-    With the probability `_DEAD_END_PROBABILITY`, it is one at a dead end, if there is any.
+    Otherwise, a wall would remain that ends in the open. With the probability `_DEAD_END_PROBABILITY`, the
+    wall is one at a dead end, if there is any.
     """
     segments = _list_segments(walls)
+    # The posts at which walls start and end, as indices of arrays by column and row. `wall_counts` contains
+    # the number of walls at each post.
     starts = (segments.columns, segments.rows)
     ends = (segments.end_columns, segments.end_rows)
     wall_counts = np.zeros(walls.shape[:2], dtype=int)

@@ -23,6 +23,7 @@ _MAX_MOVES = 12
 _MAX_OUTLINES = 8
 """Number of outlines that are tried for one obstacle."""
 _POSITIONS_PER_OUTLINE = 128
+"""Number of positions that are tested for each of these outlines."""
 _MAX_REDRAWS = 8
 """Number of times that a shape is drawn until it is suitable."""
 _VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
@@ -43,7 +44,8 @@ _U_RIGHT_HEIGHTS = (0.7, 1.0)
 """Smallest and largest dimensions of a U, relative to the height of its left arm."""
 _MIN_ROUNDNESS = 0.52
 """Smallest area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
-_TOLERANCE_M = 1e-9
+_ROUNDING_M = 1e-9
+"""Allowance for rounding errors of distances."""
 
 
 def scatter_polygons(
@@ -63,8 +65,9 @@ def scatter_polygons(
     list of Obstacle or None
         None if the obstacles do not fit.
     """
-    areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.count)
-    areas = np.sort(areas)[::-1]  # The largest obstacle is placed first.
+    area_ratios = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.count)
+    # The largest obstacle is placed first.
+    areas = np.sort(area_ratios)[::-1]
     areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
         return None
@@ -94,7 +97,7 @@ def scatter_polygons(
 
 
 def _are_too_large(areas: Array, request: Request) -> bool:
-    """Return whether obstacles fill too much of the map even as discs, which need the least room."""
+    """Return whether obstacles fill too much of the map even as discs, which need the least space."""
     radii = np.sqrt(areas / np.pi) + request.gap / 2.0
     filled_area = float((np.pi * radii**2).sum())
     max_filled_area = _MAX_FILLED_FRACTION * (request.width - request.gap) * (request.height - request.gap)
@@ -119,22 +122,26 @@ def _place_shape(
     tree = shapely.STRtree(placed_outlines)
     for _ in range(_MAX_OUTLINES):
         outline = _draw_shape(request, shape, area, rng)
-        free_size = size - 2.0 * gap - np.ptp(outline, axis=0)
+        outline_size = np.ptp(outline, axis=0)
+        free_size = size - 2.0 * gap - outline_size
         if (free_size < 0.0).any():
             continue
         offsets = rng.random((_POSITIONS_PER_OUTLINE, 2)) - 0.5
         centers = size / 2.0 + offsets * free_size
         candidates = shapely.polygons(request.round_points(centers[:, None] + outline))
+        # Lower left and upper right corners of the bounding boxes, (k, 2) m each.
         low, high = np.split(shapely.bounds(candidates), 2, axis=1)
-        is_free = shapely.disjoint(candidates, start_disc) & shapely.is_valid(candidates)
-        is_free &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
+        is_inside = ((low >= gap - _ROUNDING_M) & (high <= size - gap + _ROUNDING_M)).all(axis=1)
+        is_free = shapely.disjoint(candidates, start_disc) & shapely.is_valid(candidates) & is_inside
+        # Measure the distances to the obstacles whose bounding boxes are within the gap.
         search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
         candidate_indices, placed_indices = tree.query(search_boxes)
         distances = shapely.distance(candidates[candidate_indices], placed_outlines[placed_indices])
         is_too_close = distances < gap
         is_free[candidate_indices[is_too_close]] = False
         if is_free.any():
-            return candidates[int(is_free.argmax())]
+            first_free = int(is_free.argmax())
+            return candidates[first_free]
     return None
 
 

@@ -222,6 +222,8 @@ class FloorPlan:
             openings[door.wall] += [door.start, door.end]
         pieces = []
         for wall in self.walls:
+            # Pieces start at the start of the wall and at the ends of doors, and end at the starts of doors
+            # and at the end of the wall.
             ends = [wall.start, *openings[wall], wall.end]
             for start, end in zip(ends[::2], ends[1::2], strict=True):
                 pieces.append(wall.build_piece(start, end, self.thickness))
@@ -316,6 +318,7 @@ def _divide_by_wall(
     width, height = box.sides
     # The axis that the wall crosses.
     axis = 1 if height > width else 0
+    # If the number of rooms is odd, either part may get one more.
     first_count = count // 2 if rng.random() < 0.5 else count - count // 2
     fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
     low, high = box.get_range(axis)
@@ -395,6 +398,7 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
     room_groups = DisjointSet(range(len(plan.rooms)))
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
     shared_walls = _find_shared_walls(plan)
+    # Random numbers for each wall: its place in the order, whether it closes a loop, and where the door is.
     order_keys, loop_draws, relative_positions = rng.random((3, len(shared_walls)))
     widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(shared_walls))
 
@@ -467,13 +471,14 @@ def _place_furniture(
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
         for room in door.rooms:
             occupied[room].append(opening.polygon)
-    # A room is drawn with a probability that is proportional to its area. Because of rounding, the cumulative
-    # sum may end next to 1.
+    # A room is drawn with a probability that is proportional to its area. Dividing by the last sum makes the
+    # largest cumulative probability exactly 1; because of rounding, it might be a little less.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
     cumulative_probabilities = cumulative_areas / cumulative_areas[-1]
     mean_piece_area = area / (_PIECES_PER_ROOM * len(inner_rooms))
     failures = 0
     furniture: list[Obstacle] = []
+    # `area` is the area that is still to be blocked.
     while area > min_area:
         room = int(np.searchsorted(cumulative_probabilities, rng.random(), side="right"))
         shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failures)

@@ -202,12 +202,17 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
            [0, 1, 0]])
     """
     rows, columns = is_blocked.shape
+    # A view of the padded array that starts at (margin + up, margin + right) contains, for each cell, the one
+    # that is `up` rows above it and `right` columns to the right.
     margin = int(reach)
     padded = np.pad(is_blocked, margin, constant_values=True)
     is_close = np.zeros_like(is_blocked)
-    row, column = np.mgrid[-margin : margin + 1, -margin : margin + 1]
-    for up, right in np.argwhere(row**2 + column**2 <= reach * reach).tolist():
-        is_close |= padded[up : up + rows, right : right + columns]
+    for up in range(-margin, margin + 1):
+        for right in range(-margin, margin + 1):
+            if up**2 + right**2 <= reach * reach:
+                first_row = margin + up
+                first_column = margin + right
+                is_close |= padded[first_row : first_row + rows, first_column : first_column + columns]
     return is_close
 
 

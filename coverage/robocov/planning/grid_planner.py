@@ -146,7 +146,9 @@ class GridPlanner(MapWindow):
         max_sources = max(_MAX_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
-            sources = np.flatnonzero(self.has_clearance & (row % k == k // 2) & (column % k == k // 2))
+            # One node in the middle of each block of k rows and k columns.
+            is_middle = (row % k == k // 2) & (column % k == k // 2)
+            sources = np.flatnonzero(self.has_clearance & is_middle)
             if len(sources) <= max_sources:
                 break
         return sources
@@ -333,11 +335,14 @@ class GridPlanner(MapWindow):
         if not len(close):
             return np.array(position[None])
         is_visible = self.find_clear_lines(goal, self.nodes[close], self.is_tight)
-        # From the node nearest to the goal, if possible in sight of it, back to the first node.
-        path = [int(close[is_visible.argmax()])]
+        # The last node is the nearest one in sight of the goal, or simply the nearest one if none is in sight
+        # (`argmax` returns the first True, or 0 if there is none).
+        last = int(close[is_visible.argmax()])
+        path = [last]
         while path[-1] != first:
             path.append(int(predecessor[path[-1]]))
-        points = self.nodes[path[::-1]]
+        path.reverse()
+        points = self.nodes[path]
         if is_visible.any():
             points = np.vstack([points, goal])
         return self._remove_detours(position, points)

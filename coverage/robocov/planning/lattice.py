@@ -157,8 +157,10 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
         up = moves.rows[move]
         right = moves.columns[move]
         crossed_count = moves.first_crossed[move + 1] - moves.first_crossed[move]
+        # From these rows and columns, the move stays on the lattice. `up` is never negative.
         for row in range(rows - up):
             for column in range(max(0, -right), columns - max(0, right)):
+                # The node is in the middle of a square block of cells.
                 node_row = stride // 2 + row * stride
                 node_column = stride // 2 + column * stride
                 is_passable, is_without_wall, unknown_count = _examine_crossed_cells(
@@ -266,23 +268,11 @@ def compute_distances(
             front_size += 1
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
-        # Find the distance of the nearest node of the front.
-        nearest = np.inf
-        for k in range(front_size):
-            nearest = min(nearest, distance[front[k]])
-        # Divide the front into the nodes to settle and those that remain.
-        settled_count = 0
-        remaining_count = 0
-        for k in range(front_size):
-            node = front[k]
-            if distance[node] < nearest + shortest_edge:
-                settled[settled_count] = node
-                is_in_front[node] = False
-                settled_count += 1
-            else:
-                front[remaining_count] = node
-                remaining_count += 1
+        remaining_count = _settle_nearest_nodes(distance, front, front_size, shortest_edge, settled)
+        settled_count = front_size - remaining_count
         front_size = remaining_count
+        for k in range(settled_count):
+            is_in_front[settled[k]] = False
         # Shorten the distances of the neighbors of settled nodes.
         for k in range(settled_count):
             node = settled[k]
@@ -296,6 +286,31 @@ def compute_distances(
                         is_in_front[end] = True
                         front_size += 1
     return distance
+
+
+@kernel
+def _settle_nearest_nodes(
+    distance: Array, front: IntArray, front_size: int, shortest_edge: float, settled: IntArray
+) -> int:
+    """Move the nodes to settle from the front to `settled`; return the number of nodes that remain.
+
+    These are the nodes whose distance exceeds that of the nearest one by less than the shortest edge. The
+    nodes that remain become the first entries of `front`.
+    """
+    nearest = np.inf
+    for k in range(front_size):
+        nearest = min(nearest, distance[front[k]])
+    settled_count = 0
+    remaining_count = 0
+    for k in range(front_size):
+        node = front[k]
+        if distance[node] < nearest + shortest_edge:
+            settled[settled_count] = node
+            settled_count += 1
+        else:
+            front[remaining_count] = node
+            remaining_count += 1
+    return remaining_count
 
 
 @kernel

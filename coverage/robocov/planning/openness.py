@@ -18,9 +18,12 @@ WALK_LENGTH_BLOCKS = 30.0
 MAX_BLOCKS = 1000
 """Default maximum number of blocks in a map."""
 
-_RELAXATION_FACTOR = 1.9  # converges fastest for walks of `WALK_LENGTH_BLOCKS`
+_RELAXATION_FACTOR = 1.9
+"""Factor of the overrelaxation that converges fastest for walks of `WALK_LENGTH_BLOCKS`."""
 _MAX_ITERATIONS = 1000
+"""Maximum number of iterations of the relaxation."""
 _TOLERANCE = 1e-5
+"""The relaxation ends when no openness changes by more than this in an iteration."""
 _OUTSIDE = 255
 """State that marks cells outside the region."""
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.map_window import SIDES
 
@@ -43,23 +43,16 @@ def find_viewpoint(
     (2,) array or None, m
         Center of a free cell at the border of the patch. None if no patch is worth a visit.
 
-    Notes ----- The expected cost of a patch is its contribution to the coverage cost: the sum, over its
-    cells, of the probability that the cell is free times the distance from the robot's goal in meters. For
-    example, 50 cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost of
-    120. It is close to zero for the inside of an obstacle. The viewpoint maximizes the expected cost of the
-    patch, divided by (1 m + path length).
+    Notes
+    -----
+    The expected cost of a patch is its contribution to the coverage cost: the sum, over its cells, of the
+    probability that the cell is free times the distance from the robot's goal in meters. For example, 50
+    cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost of 120. It is
+    close to zero for the inside of an obstacle. The viewpoint maximizes the expected cost of the patch,
+    divided by (1 m + path length).
     """
-    window = planner.window
-    raster = planner.known_map.raster
     frontier = planner.frontier
-    unknown = planner.unknown_area
-    # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
-    patch_costs = np.bincount(
-        unknown.patches,
-        cell_distances[unknown.nodes] * unknown.expected_free_counts,
-        minlength=1 + unknown.patches.max(initial=0),
-    )
-    frontier_costs = patch_costs[frontier.patches]
+    frontier_costs = _compute_patch_costs(planner, cell_distances)[frontier.patches]
     is_worth_visiting = frontier_costs > min_stake
     if not is_worth_visiting.any():
         return None
@@ -68,14 +61,13 @@ def find_viewpoint(
     rows_up, columns_right = np.array(SIDES).T
     side_rows = frontier.rows[is_worth_visiting, None] + rows_up
     side_columns = frontier.columns[is_worth_visiting, None] + columns_right
-    side_nodes = side_rows // window.stride * window.columns + side_columns // window.stride
-    # A cell beyond the window is not free: its node does not matter, but must exist.
-    side_nodes = np.clip(side_nodes, 0, len(path_lengths) - 1)
-    increased_lengths = _ADDED_LENGTH_M + path_lengths[side_nodes]
-    cost_per_length = frontier_costs[is_worth_visiting, None] / increased_lengths
+    lengths = _get_path_lengths(planner, path_lengths, side_rows, side_columns)
+    cost_per_length = frontier_costs[is_worth_visiting, None] / (_ADDED_LENGTH_M + lengths)
     values = frontier.is_side_free[is_worth_visiting] * cost_per_length
+    # Rows and columns are counted from the first cell of the window. The same unit is used for positions.
+    window = planner.window
+    raster = planner.known_map.raster
     first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
-    # Previous viewpoints in units of cells, from the center of the first cell of the window.
     previous_cells = (np.array(previous_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
     for previous_column, previous_row in previous_cells:
@@ -86,3 +78,22 @@ def find_viewpoint(
         return None
     cell = np.array([side_columns.flat[best], side_rows.flat[best]])
     return np.asarray(first_center + cell * raster.cell_size)
+
+
+def _compute_patch_costs(planner: GridPlanner, cell_distances: Array) -> Array:
+    """Return the expected cost of each unknown patch, by label; see `find_viewpoint`."""
+    # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
+    unknown = planner.unknown_area
+    return np.bincount(
+        unknown.patches,
+        cell_distances[unknown.nodes] * unknown.expected_free_counts,
+        minlength=1 + unknown.patches.max(initial=0),
+    )
+
+
+def _get_path_lengths(planner: GridPlanner, path_lengths: Array, rows: IntArray, columns: IntArray) -> Array:
+    """Return the lengths of the paths, (m,) by node, to the nodes of cells in the given rows and columns."""
+    window = planner.window
+    nodes = rows // window.stride * window.columns + columns // window.stride
+    # A cell beyond the window is not free: its node does not matter, but must exist.
+    return np.asarray(path_lengths[np.clip(nodes, 0, len(path_lengths) - 1)])

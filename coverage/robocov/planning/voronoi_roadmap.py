@@ -28,6 +28,8 @@ _SIDE_STEPS = _NEIGHBOR_STEPS[::2]
 """Rows and columns from a cell to the four neighbors that share a side with it."""
 _FORWARD_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """Rows and columns from a cell to half of its neighbors, so that each pair of neighbors is visited once."""
+_CELL_STEP = 1.0
+"""Distance between two adjacent cells, in cells."""
 NO_VERTEX = -1
 """Vertex, or group, of a cell that does not belong to any."""
 _UP = 0
@@ -114,9 +116,9 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         # The distance between the wall cells that are nearest to two adjacent cells.
         gap = np.sqrt((np.diff(walls, axis=1) ** 2).sum(axis=0))
         # Two walls at a distance r from a cell, in directions that differ by an angle α, are 2 r sin(α/2)
-        # apart.
+        # apart. Two adjacent cells along the same wall already have nearest wall cells that are one apart.
         distance = np.maximum(distances[:-1], distances[1:])
-        is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + 1.0
+        is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + _CELL_STEP
         is_between[:-1] |= is_facing
         is_between[1:] |= is_facing
     order = np.flatnonzero(is_in_graph)
@@ -235,6 +237,7 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
     rows, columns = group.shape
     pairs = []
     for up, right in _FORWARD_STEPS:
+        # Two views of the array: `second` contains the neighbors, one step away, of the cells in `first`.
         first = group[: rows - up, max(0, -right) : columns - max(0, right)]
         second = group[up:, max(0, right) : columns + min(0, right)]
         is_border = (first != NO_VERTEX) & (second != NO_VERTEX) & (first != second)
