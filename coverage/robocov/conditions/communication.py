@@ -112,6 +112,28 @@ class Outbox:
         """
         return cls(queues=((),) * count, credits=np.zeros(count), sent_position=np.zeros(count, dtype=bool))
 
+    def append(self, messages: Sequence[Sequence[Message]], working: BoolArray) -> Outbox:
+        """Return the outbox with new messages at the ends of the queues.
+
+        Parameters
+        ----------
+        messages : sequence of sequence of Message
+            New messages of each robot; empty if there are none.
+        working : (n,) bool array
+            Mask of the robots that work. The queues of the others are emptied.
+
+        Returns
+        -------
+        Outbox
+        """
+        queues = list(self.queues)
+        for robot in np.flatnonzero(~working).tolist():
+            queues[robot] = ()
+        if messages:
+            for robot in np.flatnonzero(working).tolist():
+                queues[robot] = (*queues[robot], *messages[robot])
+        return replace(self, queues=tuple(queues))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inbox:
@@ -188,6 +210,8 @@ class Inbox:
         -------
         Inbox
         """
+        # A pair is new if either of its robots is; no message has been sent between the two. The row of a new
+        # robot in this team does not matter.
         is_new = np.asarray(rows) < 0
         is_new_pair = is_new[:, None] | is_new
         old_rows = np.maximum(rows, 0)
@@ -253,7 +277,6 @@ class Radio:
         -------
         Inbox
         """
-        in_flight = inbox.in_flight
         if self._is_sending(step):
             is_received = self._find_receivers(step, true_positions, working)
             if self._period_bytes is not None:
@@ -265,11 +288,16 @@ class Radio:
                 positions=np.array(reported_positions),
                 is_received=is_received,
             )
-            in_flight = (*in_flight, broadcast)
+            inbox = replace(inbox, in_flight=(*inbox.in_flight, broadcast))
+        return self._deliver_positions(inbox, step)
+
+    @staticmethod
+    def _deliver_positions(inbox: Inbox, step: int) -> Inbox:
+        """Return the inbox after the positions that are due in a step have arrived."""
         # Messages are in flight in the order in which they arrive, so those that are due come first.
-        due = [broadcast for broadcast in in_flight if broadcast.arrival_step <= step]
+        due = [broadcast for broadcast in inbox.in_flight if broadcast.arrival_step <= step]
         if len(due) == 0:
-            return replace(inbox, in_flight=in_flight)
+            return inbox
         sent_steps = inbox.sent_steps.copy()
         arrival_steps = inbox.arrival_steps.copy()
         newest_positions = inbox.positions.copy()
@@ -283,7 +311,7 @@ class Radio:
             sent_steps=sent_steps,
             arrival_steps=arrival_steps,
             positions=newest_positions,
-            in_flight=in_flight[len(due) :],
+            in_flight=inbox.in_flight[len(due) :],
         )
 
     def receive_messages(
@@ -366,14 +394,8 @@ class Radio:
             return None, 0
         if inbox is None:
             inbox = Inbox.create_empty(len(working))
-        queues = list(inbox.outbox.queues)
-        for robot in np.flatnonzero(~working).tolist():
-            queues[robot] = ()
-        if messages:
-            for robot in np.flatnonzero(working).tolist():
-                queues[robot] = (*queues[robot], *messages[robot])
-        outbox = replace(inbox.outbox, queues=tuple(queues))
-        if not (self._is_sending(step) and any(queues)):
+        outbox = inbox.outbox.append(messages, working)
+        if not (self._is_sending(step) and any(outbox.queues)):
             return replace(inbox, outbox=outbox), 0
         outbox, departing = self._take_from_queues(outbox)
         links = Neighbors.from_ranges(true_positions, self._ranges).restrict_to_working(working)
@@ -390,6 +412,9 @@ class Radio:
 
     def _pay_for_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
         """Add the bytes of one sending period to the credits, and subtract the positions that are sent.
+
+        A robot cannot save more than the bytes of one period. It does not send its position if that was what
+        it sent last and messages wait, because the two take turns.
 
         Returns
         -------
@@ -415,11 +440,13 @@ class Radio:
         queues = []
         departing = []
         for robot, queue in enumerate(outbox.queues):
+            # A message is sent as soon as there is any credit, which it may overdraw.
             count = 0
             while count < len(queue) and available[robot] > 0.0:
                 available[robot] -= queue[count].size
                 count += 1
-            sent_position[robot] &= count == 0
+            if count > 0:
+                sent_position[robot] = False
             departing.append(queue[:count])
             queues.append(queue[count:])
         return Outbox(tuple(queues), available, sent_position), departing

@@ -261,6 +261,7 @@ class Conditions:
         (n,) or (k, n) bool array
         """
         _, stops = self.compute_working_periods(count)
+        # The last axis is that of the robots.
         return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
     def find_present(self, time: float | Array, count: int) -> BoolArray:
@@ -277,6 +278,7 @@ class Conditions:
         (n,) or (k, n) bool array
         """
         starts, _ = self.compute_working_periods(count)
+        # The last axis is that of the robots.
         return np.asarray(starts <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
     def to_dict(self) -> dict[str, Any]:

@@ -61,7 +61,11 @@ class ObstaclePath:
     def _round_trip(self) -> tuple[Array, Array]:
         """Points of one round trip, (k, 2) m, and the path length to each of them, (k,) m."""
         outward = np.array(self.points, dtype=float)
-        back = outward[:1] if self.repeat == "loop" else outward[-2::-1]
+        if self.repeat == "loop":
+            back = outward[:1]
+        else:
+            # In reverse order, without the last point, at which the obstacle turns around.
+            back = outward[:-1][::-1]
         points = np.concatenate([outward, back])
         lengths = compute_lengths(np.diff(points, axis=0))
         return points, np.concatenate([[0.0], np.cumsum(lengths)])

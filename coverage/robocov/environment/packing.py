@@ -29,7 +29,7 @@ _MIN_DARTS = 64
 _DARTS_PER_POINT = 4
 """Expected number of darts inside the area that are thrown for each missing point."""
 _MAX_DARTS_PER_HIT = 100
-"""Throwing ends when fewer than one in this number of darts inside the area finds room."""
+"""Throwing ends when fewer than one in this number of darts inside the area finds space."""
 _MIN_AREA_FRACTION = 1e-3
 """Lower limit of the fraction of its bounding box that an area is assumed to fill."""
 
@@ -191,6 +191,7 @@ def _build_lattice(steps: int) -> Array:
     """Return the hexagonal lattice of spacing 1 with `steps` rows and columns on each side of the origin."""
     numbers = np.arange(-steps, steps + 1)
     columns, rows = np.meshgrid(numbers, numbers)
+    # Every other row is shifted by half a step.
     x = (columns + 0.5 * (rows % 2)).ravel()
     y = (rows * _ROW_SPACING).ravel()
     return np.column_stack([x, y])

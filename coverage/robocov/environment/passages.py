@@ -26,11 +26,14 @@ _MITRE_LIMIT = 100.0
 _CORNERS_AT_ONCE = 256
 """Corners that are examined together; limits the use of memory."""
 _CANDIDATES_AT_ONCE = 512
+"""Candidates that are examined together, the narrowest first: most searches end after the first batch."""
 _FIRST_RANGE_FRACTION = 1 / 4096
 """First range of the search around each corner, as a fraction of the diagonal; it is then doubled."""
 _COSINE_TOLERANCE = 1e-9
+"""Cosines up to this value count as those of right angles."""
 _DISC_RELATIVE_TOLERANCE = 1e-9
 _DISC_TOLERANCE_M = 1e-12
+"""Discs are smaller by these amounts, so that rounding does not put the two walls that they touch inside."""
 _DIGITS = 6
 """Results are rounded to the grid of the derived geometry, a micrometer."""
 
@@ -78,7 +81,8 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     narrowest: Gap | None = None
     low = _MAX_CRACK_M / 2
     high = diagonal * _FIRST_RANGE_FRACTION
-    # On most maps, the narrowest gap is far narrower than the map: search near each corner first.
+    # On most maps, the narrowest gap is far narrower than the map: search near each corner first, for widths
+    # between `low` and `high`, and double the range until a gap is found.
     while narrowest is None and low < diagonal:
         for corners in search.split_corners():
             limit = high if narrowest is None else narrowest.width
@@ -268,6 +272,7 @@ class PassageSearch:
         radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
         # Unlike `shapely.distance`, this uses the prepared boundary, which is faster with thousands of walls.
         is_empty: BoolArray = ~shapely.dwithin(self._boundary, middles, radii)
+        # A disc that touches no wall may still lie entirely inside an obstacle.
         is_empty[is_empty] = shapely.contains_properly(self.free, middles[is_empty])
         return is_empty
 
@@ -279,6 +284,7 @@ class PassageSearch:
         ring = self._ring[corner]
         if ring != self._ring[edge]:
             return True
+        # The points of the ring, starting at the corner; the cut ends after the first `cut` of them.
         first = self._first[ring]
         points = np.roll(self.edge_starts[first : self._stop[ring]], first - corner, axis=0)
         cut = (edge - corner) % len(points) + 1

@@ -176,7 +176,7 @@ class Start:
 
         The result depends only on the start and the radius: it is the number of robots in the densest packing
         that is found, with the same gaps as in `sample`. `sample` finds positions for that many robots with
-        any seed; by chance, one or two more may fit. If there is room for thousands, the result is estimated
+        any seed; by chance, one or two more may fit. If there is space for thousands, the result is estimated
         from the area. For a `PointsStart`, it is the number of its positions.
 
         Parameters

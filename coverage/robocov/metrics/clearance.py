@@ -138,7 +138,8 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
 def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Array) -> int:
     """Write the smallest gap of each time step to `min_gaps`, (T,) m; return the number of contacts.
 
-    `order`, (T, n), lists the robots by x. Robots that do not work, with positions of nan, come last.
+    `order`, (T, n), lists the robots by x. Robots that do not work, with positions of nan, come last. Each
+    robot is compared with those after it, until they are too far away in x. A contact counts when it starts.
     """
     max_diameter = 0.0
     for i in range(len(radius)):
@@ -158,10 +159,10 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
                 contact_distance = radii + MAX_CONTACT_GAP_M
                 distance = _compute_distance(positions, t, i, j)
                 min_gaps[t] = min(min_gaps[t], distance - radii)
-                if distance <= contact_distance:
-                    was_in_contact = t > 0 and _compute_distance(positions, t - 1, i, j) <= contact_distance
-                    if not was_in_contact:
-                        contacts += 1
+                is_in_contact = distance <= contact_distance
+                was_in_contact = t > 0 and _compute_distance(positions, t - 1, i, j) <= contact_distance
+                if is_in_contact and not was_in_contact:
+                    contacts += 1
     return contacts
 
 

@@ -60,6 +60,7 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     component_count, _ = connected_components(adjacency, directed=False)
     if n == 1 or component_count > 1:
         return Connectivity(int(component_count), 0.0)
+    # The number of neighbors of each robot on the diagonal, and -1 for each pair of neighbors.
     laplacian = np.diag(np.bincount(robot).astype(float))
     laplacian[robot, neighbor] = -1.0
     second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])

@@ -189,6 +189,8 @@ def compute_run_metrics(
         if on_sample is not None:
             on_sample()
     integrals = _integrate(record)
+    # The clearances of a sample are the smallest ones since the previous sample. Each interval starts with
+    # the step after that sample.
     interval_starts = np.concatenate([[0], steps[:-1] + 1])
     wall_gaps = compute_clearances(record).min(axis=1)
     robot_gaps = measure_robot_gaps(record).min_gaps
@@ -223,8 +225,9 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
     """
     cost = history.mean_distance
     is_near_final = np.abs(cost - cost[-1]) <= tolerance * cost[-1]
-    first_near = int(np.flatnonzero(~is_near_final).max(initial=-1)) + 1
-    return float(history.time[min(first_near, len(cost) - 1)])
+    # The sample after the last one that is not near; the first sample if all are.
+    last_not_near = int(np.flatnonzero(~is_near_final).max(initial=-1))
+    return float(history.time[min(last_not_near + 1, len(cost) - 1)])
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:

@@ -83,6 +83,8 @@ def find_settling_time(
     window_steps = round(window / dt) if dt > 0 else 0
     if window_steps == 0 or len(time) <= window_steps:
         return None
+    # Entry k says whether the team moves in the window that starts with step k.
     is_moving = ~is_team_at_rest(positions[:-window_steps], positions[window_steps:], distance)
-    first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
+    last_moving = int(np.flatnonzero(is_moving).max(initial=-1))
+    first_at_rest = last_moving + 1
     return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None

@@ -36,6 +36,8 @@ def select_nearest_steps(time: Array, rate: float) -> IntArray:
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:
         return np.arange(last + 1)
+    # Sort the steps by their nearest multiple of the period, and by their distance from it. The first step of
+    # each multiple is then the nearest one.
     periods = (time - time[0]) * rate
     nearest_multiple = np.rint(periods)
     deviation = np.round(np.abs(periods - nearest_multiple), _TIE_DECIMALS)

@@ -168,7 +168,7 @@ class Scenario:
             **_describe_controller(controller, gains),
         }
         for name, value in values.items():
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, value)  # Attributes of a frozen object cannot be assigned.
         if conditions is not None:
             require_type("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(self.team))

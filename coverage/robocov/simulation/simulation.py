@@ -540,13 +540,14 @@ class Simulation:
         )
         twin.joined = self.joined
         twin.sent_bytes = self.sent_bytes
-        if len(new_team) == len(self.team):
-            if conditions is None:
-                twin.inbox = self.inbox
-            if controller is None:
-                twin.memory = deepcopy(self.memory)
-            elif twin.inbox is not None:
-                twin.inbox = twin.inbox.drop_messages()
+        has_same_robots = len(new_team) == len(self.team)
+        if has_same_robots and conditions is None:
+            twin.inbox = self.inbox
+        if has_same_robots and controller is None:
+            twin.memory = deepcopy(self.memory)
+        elif has_same_robots and twin.inbox is not None:
+            # Another controller would not understand the messages of this one.
+            twin.inbox = twin.inbox.drop_messages()
         return twin
 
 

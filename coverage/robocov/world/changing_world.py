@@ -148,6 +148,7 @@ class ChangingWorld:
         self.working = working
         self.velocities[~working] = 0.0
         if self.steering is not None:
+            # Robots that do not work do not turn.
             self.steering = self.steering.copy()
             self.steering[:, _TURNING_RATE] *= working
         self._build_world()

@@ -24,6 +24,7 @@ MAX_PENETRATION = 1e-3
 farther than this in one substep."""
 
 _MAX_SUBSTEPS = 64
+"""Maximum number of substeps of a step; very fast robots may then sink in farther."""
 _COLLISION_SLOP_M = 1e-4
 """Overlap with a wall that pymunk does not correct."""
 _MOVER_COLLISION_BIAS = 1e-9

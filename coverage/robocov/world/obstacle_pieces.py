@@ -160,7 +160,11 @@ def _triangulate(polygon: BaseGeometry) -> list[Loop]:
 
 
 def _merge_loops(loops: list[Loop]) -> list[Loop]:
-    """Merge triangles across their common edges as long as the result is convex."""
+    """Merge triangles across their common edges as long as the result is convex.
+
+    An edge is a pair of points. Since all loops are counter-clockwise, the edge from a to b of one piece is
+    the edge from b to a of the piece on its other side.
+    """
     pieces = dict(enumerate(loops))
     piece_of_edge: dict[tuple[Point, Point], int] = {}
     for number, (a, b, c) in pieces.items():
@@ -175,9 +179,10 @@ def _merge_loops(loops: list[Loop]) -> list[Loop]:
         union = _unite_if_convex(pieces[first], pieces[second], a, b)
         if union is None:
             continue
-        for k, corner in enumerate(pieces[second]):
-            piece_of_edge[pieces[second][k - 1], corner] = first
-        del pieces[second]
+        # The edges of the second piece now belong to the first one, except for the common edge.
+        second_loop = pieces.pop(second)
+        for k, corner in enumerate(second_loop):
+            piece_of_edge[second_loop[k - 1], corner] = first
         del piece_of_edge[a, b]
         del piece_of_edge[b, a]
         pieces[first] = union
@@ -186,10 +191,13 @@ def _merge_loops(loops: list[Loop]) -> list[Loop]:
 
 def _unite_if_convex(first: Loop, second: Loop, a: Point, b: Point) -> Loop | None:
     """Return the union of two loops across the edge a→b of `first`, or None if it is not convex."""
+    # The corners of the first loop from b to a, and those of the second one from a to b. Chained together,
+    # they go once around the union.
     index_of_b = first.index(b)
     index_of_a = second.index(a)
     b_to_a = first[index_of_b:] + first[:index_of_b]
     a_to_b = second[index_of_a:] + second[:index_of_a]
+    # The union can only be concave where the loops meet: at a, between its two neighbors, and at b.
     is_convex_at_a = _compute_doubled_area(b_to_a[-2], a, a_to_b[1]) > 0.0
     is_convex_at_b = _compute_doubled_area(a_to_b[-2], b, b_to_a[1]) > 0.0
     if is_convex_at_a and is_convex_at_b:

@@ -185,27 +185,20 @@ def compute_drive_command(
             max_turning_rate=wheels.max_turning_rate[i],
         )
 
-        # The change of velocity of a point robot, along the heading and to the left of it.
-        loss = response.velocity_loss[i]
-        gain = response.velocity_per_force[i]
-        dx = gain * forces[i, 0] - loss * motion.speed * hx
-        dy = gain * forces[i, 1] - loss * motion.speed * hy
-        scale = compute_clip_factor(dx, dy, limits.max_change)
-        forward_change = (dx * hx + dy * hy) * scale
-        sideways_change = (dy * hx - dx * hy) * scale
-
+        forward_change, sideways_change = _compute_point_change(forces, response, i, motion.speed, hx, hy)
         target = _choose_motion(motion, forward_change, sideways_change, limits, dt)
         motion = _approach_motion(motion, target, limits)
+        new_heading = _wrap_angle(heading + motion.turning_rate * dt)
+        new_steering[i, 0] = new_heading
         new_steering[i, 1] = motion.turning_rate
-        heading += new_steering[i, 1] * dt
-        new_steering[i, 0] = _wrap_angle(heading)
+        # The force that gives the robot exactly this motion, and the response without viscosity or limits.
+        force_per_velocity = response.force_per_velocity[i]
+        new_forces[i, 0] = (motion.speed * math.cos(new_heading) - vx) * force_per_velocity
+        new_forces[i, 1] = (motion.speed * math.sin(new_heading) - vy) * force_per_velocity
         velocity_loss[i] = 0.0
-        velocity_per_force[i] = 1.0 / response.force_per_velocity[i]
+        velocity_per_force[i] = 1.0 / force_per_velocity
         max_velocity_change[i] = np.inf
         max_speed[i] = np.inf
-        force_per_velocity = response.force_per_velocity[i]
-        new_forces[i, 0] = (motion.speed * math.cos(new_steering[i, 0]) - vx) * force_per_velocity
-        new_forces[i, 1] = (motion.speed * math.sin(new_steering[i, 0]) - vy) * force_per_velocity
     new_response = MotionResponse(
         velocity_loss=velocity_loss,
         velocity_per_force=velocity_per_force,
@@ -214,6 +207,23 @@ def compute_drive_command(
         max_speed=max_speed,
     )
     return DriveCommand(new_forces, new_steering, new_response)
+
+
+@kernel
+def _compute_point_change(
+    forces: Array, response: MotionResponse, i: int, speed: float, hx: float, hy: float
+) -> tuple[float, float]:
+    """Return the change of velocity of a point robot in place of robot i, m/s.
+
+    The robot has the given speed in the direction (hx, hy) of its heading. The first component of the change
+    is along the heading, the second one to the left of it.
+    """
+    loss = response.velocity_loss[i]
+    gain = response.velocity_per_force[i]
+    dx = gain * forces[i, 0] - loss * speed * hx
+    dy = gain * forces[i, 1] - loss * speed * hy
+    scale = compute_clip_factor(dx, dy, response.max_velocity_change[i])
+    return (dx * hx + dy * hy) * scale, (dy * hx - dx * hy) * scale
 
 
 @kernel
@@ -242,6 +252,7 @@ def _choose_motion(
     damping = min(1.0, math.hypot(future_forward, future_sideways) / damping_speed)
     turning_rate = _choose_turning_rate(angle_error, damping, limits, dt)
 
+    # The current turning rate, if the turn is toward the target.
     turning_rate_to_target = max(motion.turning_rate * math.copysign(1.0, angle_error), 0.0)
     change_by_turning = motion.speed * turning_rate_to_target * dt
     braking = max(abs(sideways_change) - change_by_turning, 0.0)
