@@ -84,11 +84,9 @@ def _compute_patch_costs(planner: GridPlanner, cell_distances: Array) -> Array:
     """Return the expected cost of each unknown patch, by label; see `find_viewpoint`."""
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
     unknown = planner.unknown_area
-    return np.bincount(
-        unknown.patches,
-        cell_distances[unknown.nodes] * unknown.expected_free_counts,
-        minlength=1 + unknown.patches.max(initial=0),
-    )
+    costs = cell_distances[unknown.nodes] * unknown.expected_free_counts
+    label_count = 1 + unknown.patches.max(initial=0)
+    return np.asarray(np.bincount(unknown.patches, costs, minlength=label_count))
 
 
 def _get_path_lengths(planner: GridPlanner, path_lengths: Array, rows: IntArray, columns: IntArray) -> Array:
