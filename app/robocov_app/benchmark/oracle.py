@@ -20,7 +20,7 @@ from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.geodesic_lloyd import GeodesicPlanner
-from robocov.controllers.route_following import follow_routes
+from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.environment import Environment, find_nearest_inside
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning
@@ -104,11 +104,9 @@ class Oracle(BaseController):
         forces, goals, legs = follow_routes(
             seen,
             memory.team,
-            routes=memory.routes,
-            legs=memory.legs,
-            returns=returns,
-            k_prop=self.k_prop,
-            response_time=self.response_time,
+            RouteProgress(memory.routes, memory.legs),
+            returns,
+            RouteGains(self.k_prop, self.response_time),
         )
         memory = replace(memory, legs=legs, returns=returns)
         return Decision(forces, goals, {"attraction": forces}, memory=memory)

@@ -25,7 +25,7 @@ from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
-from robocov.controllers.route_following import follow_routes
+from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.scan_exchange import ScanExchange
 from robocov.controllers.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S, build_unknown_map
 from robocov.controllers.teammates import TeammateReport, Teammates, receive_reports
@@ -303,11 +303,9 @@ class Atlas(BaseController):
         command = follow_routes(
             conservative,
             memory.team,
-            routes=memory.routes,
-            legs=memory.legs,
-            returns=returns,
-            k_prop=self.k_prop,
-            response_time=self.response_time,
+            RouteProgress(memory.routes, memory.legs),
+            returns,
+            RouteGains(self.k_prop, self.response_time),
         )
         return Decision(
             forces=command.forces,

@@ -237,6 +237,7 @@ class Barrier(BaseController):
 
 def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
     """Return the reported positions of near neighbors."""
+    # One number for each pair, so that the reports of two steps can be matched.
     pair = near.robot * len(seen.positions) + near.neighbor
     return NeighborReports(seen.time, pair, seen.positions[near.robot] - near.offset)
 

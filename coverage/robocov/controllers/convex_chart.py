@@ -192,6 +192,7 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
     starts = coordinates[:-1][is_segment]
     ends = coordinates[1:][is_segment]
     inner = _build_inner_points(region, walls, spacing)
+    # Halve the segments that are not edges of the triangulation, until all are.
     for _ in range(_MAX_REFINEMENTS):
         vertices = np.concatenate([starts, ends, inner])
         points = np.unique(np.round(vertices / _ROUNDING_M) * _ROUNDING_M, axis=0)
@@ -231,6 +232,8 @@ def _find_edges(points: Array, triangles: IntArray, starts: Array, ends: Array) 
 
 def _find_indices(points: Array, selected: Array) -> IntArray:
     """Return the indices of selected points, (m, 2) m, among (k, 2) m sorted ones."""
+    # Rounded, the selected points are among the others, so that the unique points are `points` again, and
+    # the inverse indices of the selected points refer to these.
     rounded = np.round(selected / _ROUNDING_M) * _ROUNDING_M
     _, indices = np.unique(np.concatenate([points, rounded]), axis=0, return_inverse=True)
     return np.asarray(indices.ravel()[len(points) :])
@@ -246,6 +249,8 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     weights = _build_weights(mesh, stiffness)
     inner = np.flatnonzero(~mesh.is_fixed)
     fixed = np.flatnonzero(mesh.is_fixed)
+    # At an inner vertex i, sum_j w_ij (x_i - x_j) = 0. The terms of the fixed vertices are known, and become
+    # the right-hand side.
     right_side = weights[inner][:, fixed] @ mesh.points[fixed]
     laplacian = diags_array(weights.sum(axis=1)) - weights
     system = laplacian.tocsr()[inner][:, inner].tocoo()

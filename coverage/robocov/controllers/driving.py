@@ -274,6 +274,7 @@ def find_nearest_allowed(
     for i in range(len(points)):
         r = radius[i]
         slack = _RELATIVE_SLACK * max(r, 1.0)
+        # Without half planes, the optimum is the desired point, moved into the disc.
         x = points[i, 0]
         y = points[i, 1]
         length = math.sqrt(x * x + y * y)
@@ -287,30 +288,47 @@ def find_nearest_allowed(
             # Neither a half plane that contains the disc nor nan is a constraint.
             if not (offset < r and nx * x + ny * y - offset > slack):
                 continue
-            # The new optimum is on the line offset (nx, ny) + t (-ny, nx), with t from `low` to `high`. An
-            # infinite `low` means that no point is allowed.
-            high = math.sqrt(max(r * r - offset * offset, 0.0))
-            low = -high
-            if offset < -r:
-                low = math.inf
-            for j in range(k):
-                slope = normals[i, j, 1] * nx - normals[i, j, 0] * ny
-                rest = offsets[i, j] - offset * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
-                if slope >= _MIN_SLOPE:
-                    high = min(high, rest / slope)
-                elif slope <= -_MIN_SLOPE:
-                    low = max(low, rest / slope)
-                elif rest < -slack:
-                    low = math.inf
+            low, high = _find_allowed_interval(normals[i], offsets[i], k, r, slack)
             if low > high + slack:
                 is_feasible[i] = False
                 break
+            # The point of the line that is nearest to the desired one, moved into the interval.
             t = min(max(points[i, 1] * nx - points[i, 0] * ny, min(low, high)), high)
             x = offset * nx - t * ny
             y = offset * ny + t * nx
         nearest[i, 0] = x
         nearest[i, 1] = y
     return nearest, is_feasible
+
+
+@kernel
+def _find_allowed_interval(
+    normals: Array, offsets: Array, k: int, radius: float, slack: float
+) -> tuple[float, float]:
+    """Return the interval of t in which the edge of half plane k is in the disc and in those before it.
+
+    With (nx, ny) the normal of half plane k, the points of its edge are offset (nx, ny) + t (-ny, nx). The
+    lower end of the interval is infinite if no point is allowed.
+    """
+    nx = normals[k, 0]
+    ny = normals[k, 1]
+    offset = offsets[k]
+    high = math.sqrt(max(radius * radius - offset * offset, 0.0))
+    low = -high
+    if offset < -radius:
+        low = math.inf
+    for j in range(k):
+        # Half plane j allows the points with slope t <= max_rise.
+        slope = normals[j, 1] * nx - normals[j, 0] * ny
+        max_rise = offsets[j] - offset * (normals[j, 0] * nx + normals[j, 1] * ny)
+        if slope >= _MIN_SLOPE:
+            high = min(high, max_rise / slope)
+        elif slope <= -_MIN_SLOPE:
+            low = max(low, max_rise / slope)
+        elif max_rise < -slack:
+            # The edges are parallel, and no point of this one is allowed.
+            low = math.inf
+    return low, high
 
 
 def list_neighbor_offsets(seen: Observations, reach: float) -> Array:
@@ -343,8 +361,10 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
            [0., 0.],
            [6., 7.]])
     """
+    # The column of a value is its index minus the index of the first value of the same robot.
     count = np.bincount(robot, minlength=n)
-    column = np.arange(len(robot)) - np.repeat(np.cumsum(count) - count, count)
+    first = np.cumsum(count) - count
+    column = np.arange(len(robot)) - np.repeat(first, count)
     rows = np.full((n, int(count.max(initial=0)), *values.shape[1:]), fill)
     rows[robot, column] = values
     return rows

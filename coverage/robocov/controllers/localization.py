@@ -162,7 +162,8 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     dt = seen.time - previous.time
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
     squared_residual = ((seen.positions - predicted) ** 2).sum(axis=1)
-    # A residual that is too large for noise means that something has displaced the robot: start again.
+    # A residual that is too large for noise means that something has displaced the robot: start again. The
+    # variance is that of one of the two coordinates.
     max_squared_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
     was_displaced = (squared_residual > max_squared_residual) & (previous.fix_counts >= _MIN_FIXES)
     fix_counts = np.where(was_displaced, 1.0, previous.fix_counts + 1.0)
@@ -263,6 +264,8 @@ def _update_track(
     j = messages.sender[m]
     dt = messages.sent_times[m] - tracks.sent_times[i, j]
     k = tracks.counts[i, j] + 1.0
+    # The steady-state gains of an alpha-beta filter (Kalata 1984), from the ratio of the uncertainty by
+    # maneuvers to that by noise.
     tracking_index = maneuver * dt * dt / max(sigma, _MIN_SIGMA_M)
     discriminant = 8.0 * tracking_index + tracking_index * tracking_index
     root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0

@@ -41,6 +41,28 @@ _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances in divisions."""
 
 
+class RouteProgress(NamedTuple):
+    """The routes of robots, and how far each robot has come."""
+
+    routes: Sequence[Array]
+    """Waypoints of each robot, (w, 2) m each; the last one is the goal."""
+    legs: IntArray
+    """(n,) Index of the waypoint that each robot heads for."""
+
+    def get_waypoints(self) -> Array:
+        """Return the waypoint that each robot heads for, (n, 2) m."""
+        return np.array([route[leg] for route, leg in zip(self.routes, self.legs, strict=True)])
+
+
+class RouteGains(NamedTuple):
+    """How robots follow their routes."""
+
+    k_prop: float
+    """Speed per meter of distance to the goal, 1/s."""
+    response_time: float
+    """Time constant of the approach to the desired velocities, s."""
+
+
 class RouteCommand(NamedTuple):
     """Forces that lead robots along their routes in one step."""
 
@@ -53,14 +75,7 @@ class RouteCommand(NamedTuple):
 
 
 def follow_routes(
-    seen: Observations,
-    team: Team,
-    *,
-    routes: Sequence[Array],
-    legs: IntArray,
-    returns: Array | None,
-    k_prop: float,
-    response_time: float,
+    seen: Observations, team: Team, progress: RouteProgress, returns: Array | None, gains: RouteGains
 ) -> RouteCommand:
     """Compute the forces that lead robots along their routes, away from walls and other robots.
 
@@ -68,34 +83,21 @@ def follow_routes(
     ----------
     seen : Observations
     team : Team
-    routes : sequence of (w, 2) arrays, m
-        Waypoints of each robot; the last one is the goal.
-    legs : (n,) int array
-        Index of the waypoint that each robot headed for.
+    progress : RouteProgress
+        The routes, and the waypoint that each robot headed for at the last step.
     returns : (n, rays, 2) array or None, m
         Points of the last scans, as `driving.update_returns` returns them.
-    k_prop : float, 1/s
-        Speed per meter of distance to the goal.
-    response_time : float, s
-        Time constant of the approach to the desired velocities.
+    gains : RouteGains
 
     Returns
     -------
     RouteCommand
     """
-    last_legs = np.array([len(route) - 1 for route in routes])
-    targets = _select_waypoints(routes, legs)
-    is_reached = np.hypot(*(targets - seen.positions).T) < _WAYPOINT_RADIUS_M
-    legs = legs + ((legs < last_legs) & is_reached)
-    offsets = _select_waypoints(routes, legs) - seen.positions
-
-    speed_limit = _compute_speed_limits(seen, team)
-    to_waypoint = compute_approach_velocities(offsets, math.inf, speed_limit)
-    to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
-    velocities = np.where((legs == last_legs)[:, None], to_goal, to_waypoint)
+    progress = _advance_legs(progress, seen.positions)
+    desired = _compute_desired_velocities(seen, team, progress, gains.k_prop)
     # Turning must not use up the acceleration that is needed for braking.
-    max_change = _STEERING_FRACTION * team.max_acceleration * response_time
-    velocities = seen.velocities + clip_lengths(velocities - seen.velocities, max_change)
+    max_change = _STEERING_FRACTION * team.max_acceleration * gains.response_time
+    velocities = seen.velocities + clip_lengths(desired - seen.velocities, max_change)
     # A robot does not know how large others are: it assumes its own size.
     separation = 2.0 * team.radius + _ROBOT_GAP_M
     velocities = velocities + _compute_evasion(seen, team, velocities, separation)
@@ -108,15 +110,34 @@ def follow_routes(
     obstacle_points = collect_obstacle_points(seen, returns)
     velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
     return RouteCommand(
-        forces=compute_drive_forces(velocities, seen, team, response_time),
-        goals=np.array([route[-1] for route in routes]),
-        legs=legs,
+        forces=compute_drive_forces(velocities, seen, team, gains.response_time),
+        goals=np.array([route[-1] for route in progress.routes]),
+        legs=progress.legs,
     )
 
 
-def _select_waypoints(routes: Sequence[Array], legs: IntArray) -> Array:
-    """Return the waypoint that each robot heads for, (n, 2) m."""
-    return np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
+def _get_last_legs(progress: RouteProgress) -> IntArray:
+    """Return the index of the last waypoint of each route, the goal, (n,)."""
+    return np.array([len(route) - 1 for route in progress.routes])
+
+
+def _advance_legs(progress: RouteProgress, positions: Array) -> RouteProgress:
+    """Return the progress after robots that have reached a waypoint head for the next one."""
+    is_reached = np.hypot(*(progress.get_waypoints() - positions).T) < _WAYPOINT_RADIUS_M
+    has_next = progress.legs < _get_last_legs(progress)
+    return progress._replace(legs=progress.legs + (has_next & is_reached))
+
+
+def _compute_desired_velocities(
+    seen: Observations, team: Team, progress: RouteProgress, k_prop: float
+) -> Array:
+    """Return the velocities toward the waypoints, (n, 2) m/s; robots slow down only before their goals."""
+    offsets = progress.get_waypoints() - seen.positions
+    speed_limit = _compute_speed_limits(seen, team)
+    to_waypoint = compute_approach_velocities(offsets, math.inf, speed_limit)
+    to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
+    is_on_last_leg = progress.legs == _get_last_legs(progress)
+    return np.where(is_on_last_leg[:, None], to_goal, to_waypoint)
 
 
 def _compute_speed_limits(seen: Observations, team: Team) -> Array:
@@ -143,6 +164,8 @@ def _compute_evasion(seen: Observations, team: Team, velocities: Array, separati
     excess = np.nan_to_num(excess, nan=-np.inf)
     rows = np.arange(len(velocities))
     worst = excess.argmax(axis=1)
+    # The normal points from the other robot to this one. Turned clockwise, it points to the left of the way
+    # to the other robot.
     left = np.nan_to_num(normals[rows, worst])[:, ::-1] * [1.0, -1.0]
     speed = np.clip(excess[rows, worst], 0.0, _MAX_EVASION_SPEED)
     return np.asarray(left * speed[:, None])

@@ -14,7 +14,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Information
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.route_following import follow_routes
+from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.scan_exchange import ScanExchange
 from robocov.density import Density
 from robocov.k_median import run_lloyd
@@ -247,11 +247,9 @@ class SharedMapController(BaseController):
         command = follow_routes(
             seen,
             memory.team,
-            routes=routes,
-            legs=memory.legs,
-            returns=returns,
-            k_prop=self.k_prop,
-            response_time=self.response_time,
+            RouteProgress(routes, memory.legs),
+            returns,
+            RouteGains(self.k_prop, self.response_time),
         )
         return Decision(
             forces=command.forces,

@@ -172,21 +172,23 @@ def find_cells_in_view(
         Whether no neighbor that sees the point has a lower power |q - p|² - R² there.
     """
     is_own = np.ones(depths.shape, dtype=np.bool_)
-    for m in range(len(pairs.robot)):
-        i = pairs.robot[m]
-        neighbor_x = -pairs.offset[m, 0]
-        neighbor_y = -pairs.offset[m, 1]
-        neighbor_reach = reach[pairs.neighbor[m]]
-        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[i]):
+    for pair in range(len(pairs.robot)):
+        robot = pairs.robot[pair]
+        # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
+        neighbor_x = -pairs.offset[pair, 0]
+        neighbor_y = -pairs.offset[pair, 1]
+        neighbor_reach = reach[pairs.neighbor[pair]]
+        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
-        for r in range(len(directions)):
-            for c in range(depths.shape[2]):
-                x = depths[i, r, c] * directions[r, 0]
-                y = depths[i, r, c] * directions[r, 1]
+        for ray in range(len(directions)):
+            for k in range(depths.shape[2]):
+                x = depths[robot, ray, k] * directions[ray, 0]
+                y = depths[robot, ray, k] * directions[ray, 1]
                 dx = neighbor_x - x
                 dy = neighbor_y - y
+                # The neighbor can only see points with a power of at most 0, which are within its reach.
                 power = dx * dx + dy * dy - neighbor_reach * neighbor_reach
-                own_power = depths[i, r, c] ** 2 - reach[i] ** 2
-                if power <= 0.0 and power < own_power and is_own[i, r, c]:
-                    is_own[i, r, c] = not is_path_clear(x, y, dx, dy, wall_distances[i])
+                own_power = depths[robot, ray, k] ** 2 - reach[robot] ** 2
+                if power <= 0.0 and power < own_power and is_own[robot, ray, k]:
+                    is_own[robot, ray, k] = not is_path_clear(x, y, dx, dy, wall_distances[robot])
     return is_own
