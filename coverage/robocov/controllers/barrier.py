@@ -109,6 +109,7 @@ class Barrier(BaseController):
         desired = (velocities - seen.velocities) / self.response_time
         accelerations, memory = self.certify(seen, memory, desired)
         forces = accelerations * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
+        # The correction by the barriers is counted from the part of Lloyd's acceleration that is possible.
         scale = team.max_acceleration / np.maximum(np.hypot(*desired.T), _MIN_NORM)
         attainable = desired * np.minimum(1.0, scale)[:, None]
         corrections = (accelerations - attainable) * team.mass[:, None]
@@ -173,7 +174,12 @@ class Barrier(BaseController):
     def _keep_off_robots(
         self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: Array
     ) -> HalfPlanes:
-        """Return the half planes that keep robots apart."""
+        """Return the half planes that keep robots apart.
+
+        With n the unit vector from the neighbor to the robot, the two may approach with an acceleration of at
+        most the limit of `_limit_approach` plus v²/d, because moving past each other at the sideways speed v
+        and the distance d turns n away. The robot takes its share alpha_i / (alpha_i + alpha_j) of it.
+        """
         n = len(seen.positions)
         robot, neighbor, offset, distance = near
         alpha = self._compute_braking_limits(team)

@@ -270,6 +270,7 @@ class Boosting(BaseController):
         gradient = memory.gradient
         speed_fraction = memory.speed_fraction
         ascents = memory.ascents
+        # Robots follow the same gradient until the next scan.
         if gradient is None or speed_fraction is None or seen.scans is not None:
             contributions = self.compute_contributions(seen, view, reach)
             ascents = self._update_ascents(ascents, seen, contributions.value)

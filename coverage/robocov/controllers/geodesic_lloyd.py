@@ -194,6 +194,7 @@ class GeodesicPlanner:
         distances = result.distances[sites]
         first_lengths = np.hypot(*(first_waypoints - positions[owner]).T)
         first_lengths = np.maximum(first_lengths, _MIN_FIRST_LENGTH_FRACTION * self.cost.spacing)
+        # The weight d^(s-1) / |c - p| of each first waypoint c.
         weights = np.maximum(distances, first_lengths) ** (exponent - 1.0) / first_lengths
         if result.weights is not None:
             weights *= result.weights[sites]

@@ -150,6 +150,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     neighbor_positions = (
         tracks.positions[robot, neighbor] + ages[:, None] * tracks.velocities[robot, neighbor]
     )
+    # The sensor measures the offset of the obstacle point from the robot.
     obstacle_points = seen.obstacle_points - seen.positions + positions
     estimated = replace(
         seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbor_positions

@@ -434,12 +434,18 @@ class Poduri(BaseController):
     def _is_critical_by_reports(
         self, seen: Observations, links: NearNeighbors, link_ranges: Array, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbor, according to the received positions."""
+        """Return whether links are critical for the neighbor, according to the received positions.
+
+        The conditions are those of `_is_critical_for_neighbor`. Here the robot knows its neighbors only from
+        messages, so that each link is tested with the positions that this robot has received.
+        """
         is_critical = np.zeros(len(selected), dtype=bool)
         for k, link in enumerate(selected.tolist()):
             robot = links.robot[link]
             neighbor_positions = seen.get_neighbor_positions(robot)
             index = int(np.flatnonzero(seen.neighbors.list_neighbors(robot) == links.neighbor[link])[0])
+            # The distances of the robot's other neighbors from this one. The robot itself is near it as well
+            # if the link is short enough.
             offsets = np.delete(neighbor_positions, index, axis=0) - neighbor_positions[index]
             distances = np.hypot(*offsets.T)
             near_range = self.eta * link_ranges[link]

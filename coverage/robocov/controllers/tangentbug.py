@@ -362,6 +362,7 @@ class ObstacleView:
         blocked_distance = self.compute_free_distance(direction)
         ends = {}
         for turn in (COUNTERCLOCKWISE, CLOCKWISE):
+            # All rays, in the order in which a turn from the first one passes them.
             rays = (first_ray + turn * np.arange(len(self.directions))) % len(self.directions)
             distances = self.free_distances[rays]
             previous = np.append(blocked_distance, distances[:-1])

@@ -97,6 +97,7 @@ class Visibility(BaseController):
         speed_fraction = memory.speed_fraction
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)
+        # Robots follow the same gradient until the next scan.
         if gradient is None or speed_fraction is None or seen.scans is not None:
             gradient = self.compute_gradient(seen, view, reach)
             speed_fraction = compute_speed_fractions(gradient, memory.gradient, speed_fraction)

@@ -171,12 +171,8 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
         if max(width, height) < 2.0 * street_width:
             return None
-        # Apart from its tilt, the street runs across the longer side of the cell, and its normal along it.
-        deviations = float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
-        tilt = tilt_deviation * deviations
-        angle = tilt + math.pi / 2.0 if height > width else tilt
         street = _Street(
-            normal=(math.cos(angle), math.sin(angle)),
+            normal=_draw_normal(rng, tilt_deviation, is_upright=height > width),
             width=street_width,
             widening_share=_compute_widening_share(count, request.count),
         )
@@ -202,6 +198,17 @@ class _Street(NamedTuple):
     normal: Point
     width: float
     widening_share: float
+
+
+def _draw_normal(rng: np.random.Generator, tilt_deviation: float, *, is_upright: bool) -> Point:
+    """Draw the normal of a street across a cell that is taller than wide (`is_upright`), or wider than tall.
+
+    Apart from its tilt, the street runs across the longer side of the cell, and its normal along it.
+    """
+    deviations = float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
+    tilt = tilt_deviation * deviations
+    angle = tilt + math.pi / 2.0 if is_upright else tilt
+    return math.cos(angle), math.sin(angle)
 
 
 def _compute_widening_share(count: int, total_count: int) -> float:

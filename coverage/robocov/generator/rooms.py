@@ -466,11 +466,7 @@ def _place_furniture(
         return None
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
     # The polygons of the doors and of the furniture in each room. More furniture must keep the gap from them.
-    occupied: list[list[Polygon]] = [[] for _ in inner_rooms]
-    for door in plan.doors:
-        opening = door.wall.build_piece(door.start, door.end, plan.thickness)
-        for room in door.rooms:
-            occupied[room].append(opening.polygon)
+    occupied = _list_door_openings(plan)
     # A room is drawn with a probability that is proportional to its area. Dividing by the last sum makes the
     # largest cumulative probability exactly 1; because of rounding, it might be a little less.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
@@ -495,6 +491,16 @@ def _place_furniture(
             furniture.append(obstacle)
             area -= obstacle.polygon.area
     return furniture
+
+
+def _list_door_openings(plan: FloorPlan) -> list[list[Polygon]]:
+    """List the openings of the doors of each room; that of a door is listed for both of its rooms."""
+    openings: list[list[Polygon]] = [[] for _ in plan.rooms]
+    for door in plan.doors:
+        opening = door.wall.build_piece(door.start, door.end, plan.thickness)
+        for room in door.rooms:
+            openings[room].append(opening.polygon)
+    return openings
 
 
 def _find_inner_room(request: Request, room: Box, thickness: float) -> Box:

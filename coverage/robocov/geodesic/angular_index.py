@@ -124,6 +124,17 @@ class AngularWallIndex(NamedTuple):
         )
 
 
+class _SpannedBins(NamedTuple):
+    """The angular bins that a wall spans, seen from a source."""
+
+    first: int
+    last: int
+    first_covered: int
+    """The first bin that the wall covers completely."""
+    end_covered: int
+    """The bin after the last one that the wall covers completely."""
+
+
 @kernel
 def compute_pseudo_angle(dx: float, dy: float) -> float:
     """Compute a number from 0 to 4 that grows with the angle of a direction, without trigonometry.
@@ -249,17 +260,7 @@ def add_walls(
         if is_box_hidden(boxes, node, index, source):
             continue
         if not is_leaf(boxes, node):
-            # Visit the nearer child first: boxes that its walls hide need not be visited.
-            nearer = get_first_child(node)
-            farther = nearer + 1
-            nearer_distance = compute_squared_box_distance(boxes, nearer, x, y)
-            farther_distance = compute_squared_box_distance(boxes, farther, x, y)
-            if farther_distance < nearer_distance:
-                nearer, farther = farther, nearer
-            # The last node on the stack is visited next.
-            stack[stack_size] = farther
-            stack[stack_size + 1] = nearer
-            stack_size += 2
+            stack_size = _push_children(stack, stack_size, boxes, node, x, y)
             continue
         first_wall = get_first_item(boxes, node)
         for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
@@ -273,6 +274,23 @@ def add_walls(
         for k in range(bin_count):
             index.squared_clear_distance[source, k] = _MUST_CHECK_SECTORS
     return entry_count
+
+
+@kernel
+def _push_children(stack: IntArray, stack_size: int, boxes: Array, node: int, x: float, y: float) -> int:
+    """Push the two children of a node on the stack, the nearer one last; return the new size of the stack.
+
+    The last node on the stack is visited first. Boxes that its walls hide need not be visited.
+    """
+    nearer = get_first_child(node)
+    farther = nearer + 1
+    nearer_distance = compute_squared_box_distance(boxes, nearer, x, y)
+    farther_distance = compute_squared_box_distance(boxes, farther, x, y)
+    if farther_distance < nearer_distance:
+        nearer, farther = farther, nearer
+    stack[stack_size] = farther
+    stack[stack_size + 1] = nearer
+    return stack_size + 2
 
 
 @kernel
@@ -331,35 +349,44 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
     max_squared_distance = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _DISTANCE_PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
     bin_count = index.head.shape[1]
-    bins_per_unit = bin_count / _FULL_TURN
     start_angle = compute_pseudo_angle(ax, ay)
     end_angle = compute_pseudo_angle(bx, by)
     if end_angle < start_angle:
         end_angle += _FULL_TURN
-    first_bin = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
-    last_bin = int(np.floor((end_angle + _ANGLE_PADDING) * bins_per_unit))
-    # The wall covers the bins from `first_covered` up to `end_covered` completely.
-    first_covered = int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit))
-    end_covered = int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit))
-    # Bins beyond a full turn wrap around. No bin is visited twice.
-    for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
+    bins = _span_bins(start_angle, end_angle, bin_count)
+    for unwrapped_bin in range(bins.first, bins.last + 1):
         k = _wrap_bin(unwrapped_bin, bin_count)
         if min_squared_distance > index.squared_horizon[source, k]:
             continue
         _add_to_bin(index, source, k, wall, min_squared_distance, entry_count)
         entry_count += 1
-        if first_covered <= unwrapped_bin < end_covered:
+        if bins.first_covered <= unwrapped_bin < bins.end_covered:
             index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_distance)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
-    k = _wrap_bin(end_covered, bin_count)
-    has_partial_bin = first_covered <= end_covered < first_bin + bin_count
+    k = _wrap_bin(bins.end_covered, bin_count)
+    has_partial_bin = bins.first_covered <= bins.end_covered < bins.first + bin_count
     if has_partial_bin and max_squared_distance < index.squared_horizon[source, k]:
-        bin_end_angle = (end_covered + 1) / bins_per_unit
+        bin_end_angle = (bins.end_covered + 1) / (bin_count / _FULL_TURN)
         max_squared_chain_distance = _compute_max_squared_chain_distance(
             walls, wall, x, y, end_angle, bin_end_angle, max_squared_distance
         )
         index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_chain_distance)
     return entry_count
+
+
+@kernel
+def _span_bins(start_angle: float, end_angle: float, bin_count: int) -> _SpannedBins:
+    """Return the bins between two pseudo-angles. Bins beyond a full turn are not wrapped around."""
+    bins_per_unit = bin_count / _FULL_TURN
+    first = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
+    last = int(np.floor((end_angle + _ANGLE_PADDING) * bins_per_unit))
+    return _SpannedBins(
+        first=first,
+        # No bin appears twice.
+        last=min(last, first + bin_count - 1),
+        first_covered=int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit)),
+        end_covered=int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit)),
+    )
 
 
 @inlined_kernel

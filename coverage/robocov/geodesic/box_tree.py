@@ -51,13 +51,15 @@ def build_box_tree(low: Array, high: Array) -> Array:
     # With the upper bounds negated, all four bounds are minima.
     items = np.full((leaf_count * LEAF_SIZE, 4), np.inf)
     items[: len(low)] = np.hstack([low, -high])
+    # Each level has half as many boxes as the one below: one for each pair. The last level is the root.
     level = items.reshape(-1, LEAF_SIZE, 4).min(axis=1)
     levels = [level]
     while len(level) > 1:
         level = level.reshape(-1, 2, 4).min(axis=1)
         levels.append(level)
-    unused = np.full((1, 4), np.inf)
-    return np.concatenate([unused, *levels[::-1]]) * [1.0, 1.0, -1.0, -1.0]
+    levels.reverse()
+    unused_row = np.full((1, 4), np.inf)
+    return np.concatenate([unused_row, *levels]) * [1.0, 1.0, -1.0, -1.0]
 
 
 def compute_z_order(column: IntArray, row: IntArray) -> IntArray:

@@ -217,7 +217,8 @@ def find_links(
         for k in range(count):
             visible_x = corners[visible[k], 0]
             visible_y = corners[visible[k], 1]
-            # A shortest path must be able to bend at both ends of the link.
+            # The visible corners are those at which a path from this one can bend. A path from there must
+            # also be able to bend at this one.
             if can_bend_at_corner(corners, walls.corner_walls, corner, visible_x, visible_y):
                 dx = visible_x - x
                 dy = visible_y - y

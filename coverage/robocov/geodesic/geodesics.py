@@ -427,31 +427,40 @@ def _find_corner_distances(
     squared_reach = np.inf
     entry_count = 0
     for i in range(len(points)):
-        x = points[i, 0]
-        y = points[i, 1]
-        entry_count = add_walls(walls, index, i, x, y, squared_reach, entry_count)
+        entry_count = add_walls(walls, index, i, points[i, 0], points[i, 1], squared_reach, entry_count)
         if entry_count == NO_SPACE:
             return False
-        for corner in range(corner_count):
-            paths.length[corner] = np.inf
-            paths.source[corner] = 0
-            paths.first_corner[corner] = corner
-            paths.previous_corner[corner] = NO_CORNER
-            queue.is_waiting[corner] = False
-        # There are straight paths to the visible corners. The queue of corners from which paths go on starts
-        # with them.
-        first_corner = 0
-        visible_count = find_visible_corners(walls, index, i, first_corner, queue.corners)
-        for k in range(visible_count):
-            corner = queue.corners[k]
-            dx = walls.corners[corner, 0] - x
-            dy = walls.corners[corner, 1] - y
-            paths.length[corner] = np.sqrt(dx * dx + dy * dy)
-            queue.is_waiting[corner] = True
+        visible_count = _start_straight_paths(walls, index, i, paths, queue)
         if not must_be_straight:
             relax_paths(graph, paths, queue, visible_count)
         distances[i] = paths.length
     return True
+
+
+@kernel
+def _start_straight_paths(
+    walls: Walls, index: AngularWallIndex, source: int, paths: CornerPaths, queue: CornerQueue
+) -> int:
+    """Write the straight paths from a source to the corners that it sees; return their number.
+
+    The length of the paths to all other corners is infinite. The queue of corners from which paths go on
+    starts with those that the source sees.
+    """
+    for corner in range(len(walls.corners)):
+        paths.length[corner] = np.inf
+        paths.source[corner] = 0
+        paths.first_corner[corner] = corner
+        paths.previous_corner[corner] = NO_CORNER
+        queue.is_waiting[corner] = False
+    first_corner = 0
+    visible_count = find_visible_corners(walls, index, source, first_corner, queue.corners)
+    for k in range(visible_count):
+        corner = queue.corners[k]
+        dx = walls.corners[corner, 0] - index.positions[source, 0]
+        dy = walls.corners[corner, 1] - index.positions[source, 1]
+        paths.length[corner] = np.sqrt(dx * dx + dy * dy)
+        queue.is_waiting[corner] = True
+    return visible_count
 
 
 @kernel

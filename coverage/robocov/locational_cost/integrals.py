@@ -208,7 +208,12 @@ def _sum_derivatives(
 
 @inlined_kernel
 def _add_edge(sums: CellDerivatives, i: int, edge: _RelativeEdge, integral: _EdgeIntegral) -> None:
-    """Add the contribution of an edge to the gradient and the Hessian of cell i."""
+    """Add the contribution of an edge to the gradient and the Hessian of cell i.
+
+    With the integral `total`, the normal n and the tangent t = (-n_y, n_x), an edge adds -n total to the
+    gradient. When the point moves by δ, d changes by -n·δ, and s by -t·δ, so that the edge adds
+    n (across n + along t)ᵀ to the Hessian.
+    """
     nx = edge.normal_x
     ny = edge.normal_y
     sums.x[i] -= nx * integral.total
@@ -346,9 +351,11 @@ def _sum_edge_costs(
         s1 = edge.start
         s2 = s1 + edge.length
         if kind == SQUARED_DISTANCE:
+            # F(r)/r² = r²/4.
             square = 3.0 * d * d + s1 * s1 + s1 * s2 + s2 * s2
             sums[i] += d * edge.length * square / 12.0
         elif kind == DISTANCE:
+            # F(r)/r² = r/3.
             r1 = np.sqrt(d * d + s1 * s1)
             r2 = np.sqrt(d * d + s2 * s2)
             inverse_integral = _integrate_inverse(d, s1, s2)

@@ -291,7 +291,9 @@ def _find_component_warnings(environment: Environment, radius: float) -> Iterato
     """Yield warnings about components of the free space that the largest one does not reach."""
     footprint = math.pi * radius * radius
     pockets = []
-    for component in list(environment.free.geoms)[1:]:
+    # The largest component comes first.
+    _, *other_components = environment.free.geoms
+    for component in other_components:
         if component.area < footprint:
             pockets.append(component.area)
             continue

@@ -155,10 +155,10 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
                 gap_bound = positions[t, j, 0] - positions[t, i, 0] - max_diameter
                 if not gap_bound <= max(min_gaps[t], MAX_CONTACT_GAP_M):
                     break
-                radii = radius[i] + radius[j]
-                contact_distance = radii + MAX_CONTACT_GAP_M
+                radius_sum = radius[i] + radius[j]
+                contact_distance = radius_sum + MAX_CONTACT_GAP_M
                 distance = _compute_distance(positions, t, i, j)
-                min_gaps[t] = min(min_gaps[t], distance - radii)
+                min_gaps[t] = min(min_gaps[t], distance - radius_sum)
                 is_in_contact = distance <= contact_distance
                 was_in_contact = t > 0 and _compute_distance(positions, t - 1, i, j) <= contact_distance
                 if is_in_contact and not was_in_contact:

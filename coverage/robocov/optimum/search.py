@@ -336,12 +336,9 @@ class _Search:
         # A group is numbered by its block, and within a block by its component.
         block = row // side * cost.lattice + column // side
         group = block * len(self.space.components) + site_component
-        # A group is represented by the site nearest to the middle of its block. Offsets from the middle are
-        # counted in half cells, so that they are whole numbers and ties are exact, such as between all cells
-        # of a two by two block; ties are broken at random.
-        row_offset = 2 * (row % side) - (side - 1)
-        column_offset = 2 * (column % side) - (side - 1)
-        squared_offset = row_offset**2 + column_offset**2
+        # A group is represented by the site nearest to the middle of its block. Ties, such as between all
+        # cells of a two by two block, are broken at random.
+        squared_offset = _compute_offsets(row, side) ** 2 + _compute_offsets(column, side) ** 2
         tie_breaker = np.random.default_rng(0).random(len(group))
         # Sort the covered sites by group (`lexsort` expects the most important key last). The first site of
         # each group is its representative.
@@ -369,6 +366,14 @@ class _Search:
         swapped_sources = apply_best_swaps(self.table, lloyd_sources, heartbeat)
         stages = [np.sort(sources) for sources in (swapped_sources, lloyd_sources, first_sources)]
         return min(stages, key=lambda sources: _get_rank(self.cost(self.candidates[sources])))
+
+
+def _compute_offsets(index: IntArray, side: int) -> IntArray:
+    """Return the offsets of rows, or of columns, from the middles of their blocks of `side` cells.
+
+    They are counted in half cells, so that they are whole numbers, and equal distances are exactly equal.
+    """
+    return 2 * (index % side) - (side - 1)
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:

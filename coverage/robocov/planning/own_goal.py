@@ -156,9 +156,10 @@ def _refine_goal(
 ) -> tuple[Array, float]:
     """Return the minimum of the parabolas around a node, and the excess cost of the previous goal over it.
 
-    In x and in y, a parabola leads through the costs of the node and of its two neighbors, with the distance
-    between nodes as unit. Along an axis on which a neighbor is missing, the goal stays at the node. The
-    excess is infinite beyond one spacing from the node, where the parabolas do not hold.
+    In x and in y, a parabola leads through the costs of the node and of its two neighbors: at the offset t
+    from the node, in spacings of nodes, the cost changes by slope t + curvature t² / 2. Along an axis on
+    which a neighbor is missing, the goal stays at the node. The excess is infinite beyond one spacing from
+    the node, where the parabolas do not hold.
     """
     # The order is that of `SIDES`. Axis 0 is x, and axis 1 is y.
     right, up, left, down = neighbors

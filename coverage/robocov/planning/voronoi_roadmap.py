@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -107,7 +108,21 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     """
     is_in_graph = np.pad(is_free, 1)
     wall_distance, nearest_wall = ndimage.distance_transform_edt(is_in_graph, return_indices=True)
-    is_between_walls = np.zeros_like(is_in_graph)
+    must_stay = _find_cells_between_walls(wall_distance, nearest_wall) & is_in_graph
+    # The cells nearest to walls are removed first.
+    order = np.flatnonzero(is_in_graph)
+    order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
+    _thin(is_in_graph, must_stay, order, _NEIGHBOR_STEPS)
+    return is_in_graph[1:-1, 1:-1]
+
+
+def _find_cells_between_walls(wall_distance: Array, nearest_wall: NDArray[np.int32]) -> BoolArray:
+    """Find the cells whose nearest wall is in a very different direction from that of an adjacent cell.
+
+    `wall_distance`, (rows, columns), is the distance of each cell from the nearest wall, and `nearest_wall`,
+    (2, rows, columns), the row and column of that wall. Cells are counted in both.
+    """
+    is_between_walls = np.zeros(wall_distance.shape, dtype=bool)
     for axis in (0, 1):
         # Views in which the axis is the first one of the array of cells.
         distances = np.swapaxes(wall_distance, 0, axis)
@@ -121,10 +136,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + _CELL_STEP
         is_between[:-1] |= is_facing
         is_between[1:] |= is_facing
-    order = np.flatnonzero(is_in_graph)
-    order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
-    _thin(is_in_graph, is_between_walls & is_in_graph, order, _NEIGHBOR_STEPS)
-    return is_in_graph[1:-1, 1:-1]
+    return is_between_walls
 
 
 @kernel

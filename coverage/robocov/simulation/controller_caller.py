@@ -106,6 +106,7 @@ class ControllerCaller:
         decide = self._informed_controller.decide
         if self._is_built_in:
             return check_decision(decide(observations, memory), robot_count, name, observations.time)
+        # The controller may change its arguments, and so receives copies.
         returned = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
         source = ""
         if not isinstance(self._informed_controller, IndividualControllerAdapter):

@@ -145,7 +145,8 @@ def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
     """
     step = edges.end - edges.start
     squared_length = np.maximum((step * step).sum(axis=1), _MIN_SQUARED_LENGTH)
-    # The edge is start + t step with t from 0 to 1; the disc contains it from middle - half to middle + half.
+    # The edge is start + t step with t from 0 to 1. Its line is nearest to the generator at t = middle, and
+    # the disc contains it from middle - half to middle + half.
     middle = -(edges.start * step).sum(axis=1) / squared_length
     nearest = edges.start + middle[:, None] * step
     squared_half = (radius * radius - (nearest * nearest).sum(axis=1)) / squared_length

@@ -121,6 +121,7 @@ class ChangingWorld:
     def _move_working_robots(
         self, forces: Array, dt: float, external_forces: Array | None, time: float
     ) -> None:
+        """Move the robots that work in their own world; all others stay where they are, at rest."""
         self.positions = self.positions.copy()
         self.velocities = np.zeros_like(self.velocities)
         if self._world is None:

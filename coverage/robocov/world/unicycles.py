@@ -178,13 +178,7 @@ def compute_drive_command(
         hy = math.sin(heading)
         # The wheels grip, so no sideways velocity remains.
         motion = _Motion(max(vx * hx + vy * hy, 0.0), steering[i, 1])
-        limits = _WheelLimits(
-            half_track=0.5 * wheels.track_width[i],
-            max_speed=response.max_speed[i],
-            max_change=response.max_velocity_change[i],
-            max_turning_rate=wheels.max_turning_rate[i],
-        )
-
+        limits = _get_wheel_limits(wheels, response, i)
         forward_change, sideways_change = _compute_point_change(forces, response, i, motion.speed, hx, hy)
         target = _choose_motion(motion, forward_change, sideways_change, limits, dt)
         motion = _approach_motion(motion, target, limits)
@@ -207,6 +201,17 @@ def compute_drive_command(
         max_speed=max_speed,
     )
     return DriveCommand(new_forces, new_steering, new_response)
+
+
+@kernel
+def _get_wheel_limits(wheels: Wheels, response: MotionResponse, i: int) -> _WheelLimits:
+    """Return the limits of unicycle i."""
+    return _WheelLimits(
+        half_track=0.5 * wheels.track_width[i],
+        max_speed=response.max_speed[i],
+        max_change=response.max_velocity_change[i],
+        max_turning_rate=wheels.max_turning_rate[i],
+    )
 
 
 @kernel
