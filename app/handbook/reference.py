@@ -44,7 +44,7 @@ OTHER_NAMES = {
         "robocov.environment.Start",
         "robocov.mapfile.check.MapReport",
         "robocov.environment.Gap",
-        "robocov.errors.Mistake",
+        "robocov.errors.Issue",
     ),
     "Controllers": (
         "robocov.controllers.get_gains",

@@ -2,7 +2,7 @@
 
     RobocovError
     ├── InputError            an input cannot be used (exit status 2)
-    │   ├── MapError          a map file, with line, column and JSON path of the mistake
+    │   ├── MapError          a map file, with line, column and JSON path of the first issue
     │   ├── StartError        a start without space for the team
     │   └── ParameterError    a gain, a limit, the name of a controller
     ├── ControllerEndedError  a user's controller ended Python (exit status 1)
@@ -72,8 +72,8 @@ class InputError(RobocovError):
     """
 
 
-class Mistake(NamedTuple):
-    """A mistake in a JSON document.
+class Issue(NamedTuple):
+    """Something that is wrong in a JSON document.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Mistake(NamedTuple):
     at_key : bool
         Whether the last key of the path is wrong, rather than its value.
     line, column : int or None
-        Place of the mistake in the file, in lines and characters from 1; None if there is no file.
+        Place of the issue in the file, in lines and characters from 1; None if there is no file.
     """
 
     path: JsonPath
@@ -94,26 +94,26 @@ class Mistake(NamedTuple):
     column: int | None = None
 
     @classmethod
-    def at_path(cls, path: JsonPath, message: str, *, at_key: bool = False) -> Mistake:
-        """Build a mistake whose text begins with its path.
+    def at_path(cls, path: JsonPath, message: str, *, at_key: bool = False) -> Issue:
+        """Build an issue whose text begins with its path.
 
         Parameters
         ----------
         path : tuple of str and int
         message : str
-            Description of the mistake.
+            Description of the issue.
         at_key : bool
             Whether the last key of the path is wrong, rather than its value.
 
         Returns
         -------
-        Mistake
+        Issue
         """
         text = f"{format_path(path)}: {message}" if path else message
         return cls(path, text, at_key)
 
     def format_message(self, where: str) -> str:
-        """Format the mistake as compilers do, ``mine.json:14:9: ...``, so that terminals link to the line.
+        """Format the issue as compilers do, ``mine.json:14:9: ...``, so that terminals link to the line.
 
         Parameters
         ----------
@@ -134,14 +134,14 @@ class MapError(InputError):
 
     Attributes
     ----------
-    mistakes : tuple of Mistake
+    issues : tuple of Issue
         At most `MAX_LISTED`, in the order of the document.
     unlisted : int
-        Number of further mistakes.
+        Number of further issues.
     where : str
         Name of the document.
     line, column : int or None
-        Place of the first mistake.
+        Place of the first issue.
 
     See Also
     --------
@@ -158,42 +158,42 @@ class MapError(InputError):
     ...     try:
     ...         rc.load_map(file)
     ...     except rc.MapError as error:
-    ...         print(error.line, error.mistakes[0].path)
+    ...         print(error.line, error.issues[0].path)
     1 ('name',)
     """
 
-    MAX_LISTED = 20  # Finding the line of a mistake takes as long as reading the file.
-    mistakes: tuple[Mistake, ...] = ()
+    MAX_LISTED = 20  # Finding the line of an issue takes as long as reading the file.
+    issues: tuple[Issue, ...] = ()
     unlisted: int = 0
     where: str = ""
     line: int | None = None
     column: int | None = None
 
     @classmethod
-    def from_mistakes(cls, where: str, mistakes: Sequence[Mistake], unlisted: int = 0) -> MapError:
+    def from_issues(cls, where: str, issues: Sequence[Issue], unlisted: int = 0) -> MapError:
         """Build the error of a document.
 
         Parameters
         ----------
         where : str
             Name of the document.
-        mistakes : sequence of Mistake
+        issues : sequence of Issue
             At least one.
         unlisted : int
-            Number of mistakes in addition to these.
+            Number of issues in addition to these.
 
         Returns
         -------
         MapError
         """
-        first = mistakes[0]
+        first = issues[0]
         message = first.format_message(where)
-        total_count = len(mistakes) + unlisted
+        total_count = len(issues) + unlisted
         if total_count > 1:
             message += f" (and {total_count - 1} more)"
         error = cls(message)
-        error.mistakes = tuple(mistakes[: cls.MAX_LISTED])
-        error.unlisted = total_count - len(error.mistakes)
+        error.issues = tuple(issues[: cls.MAX_LISTED])
+        error.unlisted = total_count - len(error.issues)
         error.where = where
         error.line = first.line
         error.column = first.column

@@ -8,7 +8,7 @@ import pytest
 import robocov as rc
 from robocov import errors
 from robocov.controllers import list_controller_classes
-from robocov.errors import InputError, MapError, Mistake, format_path
+from robocov.errors import InputError, Issue, MapError, format_path
 
 
 def test_the_class_hierarchy_of_errors() -> None:
@@ -43,31 +43,29 @@ def test_messages_about_strange_names_are_readable() -> None:
     assert errors.describe_unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")
 
 
-def test_the_first_mistake_is_reported_and_the_others_are_counted() -> None:
-    mistakes = [Mistake.at_path(("boundary", k), "expected a point, got 3") for k in range(3)]
-    assert (
-        str(MapError.from_mistakes("m.json", mistakes[:1])) == "m.json: boundary[0]: expected a point, got 3"
-    )
-    error = MapError.from_mistakes("m.json", mistakes, 4)
+def test_the_first_issue_is_reported_and_the_others_are_counted() -> None:
+    issues = [Issue.at_path(("boundary", k), "expected a point, got 3") for k in range(3)]
+    assert str(MapError.from_issues("m.json", issues[:1])) == "m.json: boundary[0]: expected a point, got 3"
+    error = MapError.from_issues("m.json", issues, 4)
     assert isinstance(error, MapError)
     assert str(error) == "m.json: boundary[0]: expected a point, got 3 (and 6 more)"
-    assert error.mistakes == tuple(mistakes)
+    assert error.issues == tuple(issues)
     assert (error.line, error.column) == (None, None)
 
 
 def test_an_error_with_a_line_starts_like_those_of_compilers() -> None:
-    error = MapError.from_mistakes("m.json", [Mistake((), "empty", line=14, column=9)])
+    error = MapError.from_issues("m.json", [Issue((), "empty", line=14, column=9)])
     assert str(error) == "m.json:14:9: empty"
     assert (error.line, error.column) == (14, 9)
 
 
 def test_an_error_without_a_location_has_no_line() -> None:
     assert MapError("m.json: no such file").line is None
-    assert MapError("m.json: no such file").mistakes == ()
+    assert MapError("m.json: no such file").issues == ()
 
 
-def test_a_mistake_of_the_whole_document_has_no_path() -> None:
-    assert Mistake.at_path((), "expected an object, got []").text == "expected an object, got []"
+def test_an_issue_of_the_whole_document_has_no_path() -> None:
+    assert Issue.at_path((), "expected an object, got []").text == "expected an object, got []"
 
 
 def test_keys_that_are_not_identifiers_are_quoted() -> None:
@@ -111,7 +109,7 @@ STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
     ],
     ids=range(18),
 )  # fmt: skip
-def test_mistakes_in_python_name_the_argument_and_what_was_expected(
+def test_issues_in_python_name_the_argument_and_what_was_expected(
     call: Callable[[], object], message: str
 ) -> None:
     with pytest.raises(InputError) as caught:

@@ -1,6 +1,6 @@
 """Files: strict reading, and atomic writing.
 
-- `strictjson`: JSON and TOML, with the line and the column of each mistake
+- `strictjson`: JSON and TOML, with the line and the column of each issue
 - `array_files`: arrays in .npz files, and a cache of them
 - `csv_cells`: cells of CSV files
 - `writing`: files that are replaced atomically

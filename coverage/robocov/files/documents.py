@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from robocov.errors import MapError, Mistake, quote_json
+from robocov.errors import Issue, MapError, quote_json
 from robocov.files.strictjson import parse_json, read_bytes
 
 _EXPECTED_ERROR = "expected"
@@ -107,7 +107,7 @@ def validate_document(document: object, where: str, model: type[DocumentType]) -
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        raise build_document_error(error, where, _build_mistake) from None
+        raise build_document_error(error, where, _build_issue) from None
 
 
 def check_header(document: object, where: str, format_name: str, version: int) -> None:
@@ -130,8 +130,8 @@ def check_header(document: object, where: str, format_name: str, version: int) -
     """
     if not isinstance(document, dict):
         expected = f"a JSON object with a {format_name.removeprefix('robocov-')}"
-        mistake = Mistake((), f"expected {expected}, got {quote_json(document)}")
-        raise MapError.from_mistakes(where, [mistake])
+        issue = Issue((), f"expected {expected}, got {quote_json(document)}")
+        raise MapError.from_issues(where, [issue])
     for key, expected_value in (("format", format_name), ("version", version)):
         value = document.get(key)
         if type(value) is type(expected_value) and value == expected_value:
@@ -139,7 +139,7 @@ def check_header(document: object, where: str, format_name: str, version: int) -
         message = describe_mismatch(quote_json(expected_value), value, is_missing=key not in document)
         if key == "version" and type(value) is int and value > version:
             message += "; it was written by a newer robocov"
-        raise MapError.from_mistakes(where, [Mistake.at_path((key,), message)])
+        raise MapError.from_issues(where, [Issue.at_path((key,), message)])
 
 
 def describe_mismatch(expected: str, value: object, *, is_missing: bool = False) -> str:
@@ -166,7 +166,7 @@ def describe_mismatch(expected: str, value: object, *, is_missing: bool = False)
 
 
 def build_document_error(
-    error: ValidationError, where: str, build_mistake: Callable[[ErrorDetails], Mistake]
+    error: ValidationError, where: str, build_issue: Callable[[ErrorDetails], Issue]
 ) -> MapError:
     """Build the error of a document that does not fit its model.
 
@@ -175,8 +175,8 @@ def build_document_error(
     error : ValidationError
     where : str
         Name of the document in messages.
-    build_mistake : callable
-        Returns the mistake for an error of pydantic.
+    build_issue : callable
+        Returns the issue for an error of pydantic.
 
     Returns
     -------
@@ -185,18 +185,18 @@ def build_document_error(
     details = error.errors(include_url=False, include_context=False)
     # A misspelled key is also a missing one. It is more helpful to name the key that is there.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
-    mistakes = [build_mistake(detail) for detail in details[: MapError.MAX_LISTED]]
-    return MapError.from_mistakes(where, mistakes, len(details) - len(mistakes))
+    issues = [build_issue(detail) for detail in details[: MapError.MAX_LISTED]]
+    return MapError.from_issues(where, issues, len(details) - len(issues))
 
 
-def _build_mistake(detail: ErrorDetails) -> Mistake:
+def _build_issue(detail: ErrorDetails) -> Issue:
     path = tuple(step for step in detail["loc"] if step != "[key]")
     if detail["type"] == "missing":
-        return Mistake.at_path(path, "missing")
+        return Issue.at_path(path, "missing")
     if detail["type"] == "extra_forbidden":
-        return Mistake.at_path(path, "unknown key", at_key=True)
+        return Issue.at_path(path, "unknown key", at_key=True)
     if detail["type"] == _EXPECTED_ERROR:
         expected = detail["msg"]
     else:
         expected = _EXPECTED_BY_ERROR_TYPE.get(detail["type"], "another value")
-    return Mistake.at_path(path, describe_mismatch(expected, detail["input"]))
+    return Issue.at_path(path, describe_mismatch(expected, detail["input"]))

@@ -1,7 +1,7 @@
 """Positions of keys and values in the text of JSON documents.
 
 The parser does not record positions, so valid files cost nothing. After an error, the text is scanned
-along the path to the mistake, and everything else is skipped by the parser.
+along the path to the issue, and everything else is skipped by the parser.
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ from typing import Any
 
 from robocov.errors import (
     InputError,
+    Issue,
     JsonPath,
     MapError,
-    Mistake,
     describe_error,
     format_path,
     quote,
@@ -122,15 +122,15 @@ def parse_json(text: str | bytes, where: str) -> Any:
     try:
         value = json.loads(text, object_pairs_hook=_Object.from_pairs, parse_int=_parse_whole_number)
     except json.JSONDecodeError as error:
-        mistake = _locate(Mistake((), _describe_syntax_error(text, error)), text, _find_error(text, error))
-        raise MapError.from_mistakes(where, [mistake]) from None
+        issue = _locate(Issue((), _describe_syntax_error(text, error)), text, _find_error(text, error))
+        raise MapError.from_issues(where, [issue]) from None
     except RecursionError:
-        mistake = _locate(Mistake((), _TOO_DEEP), text, find_deep_nesting(text, MAX_DEPTH))
-        raise MapError.from_mistakes(where, [mistake]) from None
+        issue = _locate(Issue((), _TOO_DEEP), text, find_deep_nesting(text, MAX_DEPTH))
+        raise MapError.from_issues(where, [issue]) from None
     try:
         require_json(value, where)
     except MapError as error:
-        raise locate_mistakes(error, text, where) from None
+        raise locate_issues(error, text, where) from None
     return value
 
 
@@ -187,8 +187,8 @@ def _is_nested_deeper(value: object, limit: int) -> bool:
     return bool(level)
 
 
-def locate_mistakes(error: MapError, text: str | bytes, where: str) -> MapError:
-    """Add lines and columns to the mistakes in a document.
+def locate_issues(error: MapError, text: str | bytes, where: str) -> MapError:
+    """Add lines and columns to the issues in a document.
 
     Parameters
     ----------
@@ -201,24 +201,24 @@ def locate_mistakes(error: MapError, text: str | bytes, where: str) -> MapError:
     Returns
     -------
     MapError
-        The same error if it has no mistakes, or they cannot be located.
+        The same error if it has no issues, or they cannot be located.
     """
-    if not error.mistakes:
+    if not error.issues:
         return error
-    mistakes = []
+    issues = []
     try:
         text = _decode(text, where)
-        for mistake in error.mistakes:
-            offset = find_offset(text, mistake.path, at_key=mistake.at_key)
-            mistakes.append(_locate(mistake, text, offset))
+        for issue in error.issues:
+            offset = find_offset(text, issue.path, at_key=issue.at_key)
+            issues.append(_locate(issue, text, offset))
     except RecursionError:  # Another part of the document is nested as deeply as parsing allows.
         return error
-    return MapError.from_mistakes(to_one_line(where), mistakes, error.unlisted)
+    return MapError.from_issues(to_one_line(where), issues, error.unlisted)
 
 
-def _locate(mistake: Mistake, text: str, offset: int) -> Mistake:
+def _locate(issue: Issue, text: str, offset: int) -> Issue:
     line, column = find_line_and_column(text, offset)
-    return mistake._replace(line=line, column=column)
+    return issue._replace(line=line, column=column)
 
 
 def require_json(value: object, where: str) -> None:
@@ -236,43 +236,43 @@ def require_json(value: object, where: str) -> None:
         If the value contains anything other than finite numbers, strings, lists and objects, true, false and
         null, or is nested too deeply.
     """
-    mistake = _find_first_mistake(value, ())
-    if mistake is not None:
-        raise MapError.from_mistakes(where, [mistake])
+    issue = _find_first_issue(value, ())
+    if issue is not None:
+        raise MapError.from_issues(where, [issue])
 
 
-def _find_first_mistake(value: Any, path: JsonPath) -> Mistake | None:
-    """Return the first mistake in a value and everything nested in it, or None if it is valid JSON."""
+def _find_first_issue(value: Any, path: JsonPath) -> Issue | None:
+    """Return the first issue in a value and everything nested in it, or None if it is valid JSON."""
     if not isinstance(value, (dict, list, tuple)):
         message = _describe_invalid_scalar(value)
-        return None if message is None else Mistake.at_path(path, message)
+        return None if message is None else Issue.at_path(path, message)
     if len(path) >= MAX_DEPTH:
-        return Mistake(path, f"{format_path(path[:4])}...: {_TOO_DEEP}")
+        return Issue(path, f"{format_path(path[:4])}...: {_TOO_DEEP}")
     items: Any = enumerate(value)
     if isinstance(value, dict):
-        mistake = _find_invalid_key(value, path)
-        if mistake is not None:
-            return mistake
+        issue = _find_invalid_key(value, path)
+        if issue is not None:
+            return issue
         items = value.items()
     for key, item in items:
         # Most values in a large file are numbers: skipping the call for them saves time.
         if type(item) is float and math.isfinite(item):
             continue
-        mistake = _find_first_mistake(item, (*path, key))
-        if mistake is not None:
-            return mistake
+        issue = _find_first_issue(item, (*path, key))
+        if issue is not None:
+            return issue
     return None
 
 
-def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
-    """Build the mistake of the first key that is not a string, or of the first duplicate one."""
+def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Issue | None:
+    """Build the issue for the first key that is not a string, or of the first duplicate one."""
     for key in value:
         if not isinstance(key, str) or not _is_encodable(key):
             prefix = f"{format_path(path)}: " if path else ""
             text = f"{prefix}key: expected text that UTF-8 can encode, got {quote(key)}"
-            return Mistake((*path, key), text, at_key=True)
+            return Issue((*path, key), text, at_key=True)
     if isinstance(value, _Object) and value.duplicate_key is not None:
-        return Mistake.at_path((*path, value.duplicate_key), "duplicate key", at_key=True)
+        return Issue.at_path((*path, value.duplicate_key), "duplicate key", at_key=True)
     return None
 
 
@@ -302,8 +302,8 @@ def _decode(text: str | bytes, where: str) -> str:
     except UnicodeDecodeError as error:
         valid_text = body[: error.start].decode("utf-8")
         offset = error.start + len(text) - len(body)
-        mistake = Mistake((), f"byte 0x{body[error.start]:02x} at offset {offset}: not UTF-8")
-        raise MapError.from_mistakes(where, [_locate(mistake, valid_text, len(valid_text))]) from None
+        issue = Issue((), f"byte 0x{body[error.start]:02x} at offset {offset}: not UTF-8")
+        raise MapError.from_issues(where, [_locate(issue, valid_text, len(valid_text))]) from None
 
 
 def _find_error(text: str, error: json.JSONDecodeError) -> int:

@@ -13,15 +13,15 @@ from robocov.density import Density, Raster
 from robocov.environment import Environment, Ring
 from robocov.errors import (
     InputError,
+    Issue,
     MapError,
-    Mistake,
     ParameterError,
     describe_unknown_name,
     quote,
     quote_json,
     to_one_line,
 )
-from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes, require_json
+from robocov.files.strictjson import locate_issues, parse_json, read_bytes, require_json
 from robocov.mapfile.density_pictures import read_gray_levels, read_picture_file
 from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules
@@ -46,7 +46,7 @@ def load_map(source: str | Path) -> Environment:
     Raises
     ------
     MapError
-        If the map cannot be read; the message has line, column and JSON path of the first mistake.
+        If the map cannot be read; the message has line, column and JSON path of the first issue.
 
     See Also
     --------
@@ -144,7 +144,7 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     try:
         return _build_environment(document, to_one_line(where), folder)
     except MapError as error:
-        raise locate_mistakes(error, text, where) from None
+        raise locate_issues(error, text, where) from None
 
 
 def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
@@ -250,9 +250,9 @@ def _read_weights(model: RasterModel, folder: Path | None, where: str) -> Array:
     try:
         gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
     except InputError as error:
-        mistake = Mistake.at_path(path, f"{quote_json(model.picture)}: {error}")
-        raise MapError.from_mistakes(where, [mistake]) from None
+        issue = Issue.at_path(path, f"{quote_json(model.picture)}: {error}")
+        raise MapError.from_issues(where, [issue]) from None
     weights = np.round(black + (white - black) * gray_levels, _GRAY_DIGITS)
     if not weights.max() > 0.0:
-        raise MapError.from_mistakes(where, [Mistake.at_path(path, NO_WEIGHT)])
+        raise MapError.from_issues(where, [Issue.at_path(path, NO_WEIGHT)])
     return np.asarray(weights)

@@ -21,7 +21,7 @@ from robocov.environment import (
     UniformStart,
     WallObstacle,
 )
-from robocov.errors import JsonPath, MapError, Mistake, StartError, format_path
+from robocov.errors import Issue, JsonPath, MapError, StartError, format_path
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
 
@@ -47,67 +47,67 @@ def check_rules(environment: Environment, where: str) -> None:
     Raises
     ------
     MapError
-        With the mistakes in obstacles, boundary and density; if there are none, with the mistakes of the map
+        With the issues in obstacles, boundary and density; if there are none, with the issues of the map
         as a whole.
     """
-    mistakes = list(_find_ring_mistakes(("boundary",), environment.boundary))
+    issues = list(_find_ring_issues(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
         path = ("obstacles", k)
         if isinstance(obstacle, PolygonObstacle):
-            mistakes += _find_polygon_mistakes(path, obstacle)
+            issues += _find_polygon_issues(path, obstacle)
         elif isinstance(obstacle, WallObstacle):
-            mistakes += _find_line_mistakes((*path, "points"), obstacle.points, "wall")
+            issues += _find_line_issues((*path, "points"), obstacle.points, "wall")
         if obstacle.path is not None:
-            mistakes += _find_line_mistakes((*path, "path", "points"), obstacle.path.points, "path")
+            issues += _find_line_issues((*path, "path", "points"), obstacle.path.points, "path")
     if isinstance(environment.density, WeightedPolygons):
         for k, area in enumerate(environment.density.areas):
-            mistakes += _find_polygon_mistakes(("density", "areas", k), area)
-    if not mistakes:
-        mistakes = list(_find_space_mistakes(environment))
-    if mistakes:
-        raise MapError.from_mistakes(where, mistakes)
+            issues += _find_polygon_issues(("density", "areas", k), area)
+    if not issues:
+        issues = list(_find_space_issues(environment))
+    if issues:
+        raise MapError.from_issues(where, issues)
 
 
-def _find_ring_mistakes(path: JsonPath, ring: Ring) -> Iterator[Mistake]:
-    """Yield the mistake of a closed ring of at least 3 points."""
+def _find_ring_issues(path: JsonPath, ring: Ring) -> Iterator[Issue]:
+    """Yield the issue with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
     size = f"{extent[0]:g} x {extent[1]:g} m"
     point_count = len(set(map(tuple, ring)))
     if point_count < 3:
-        yield Mistake.at_path(path, f"expected at least 3 different points, got {point_count}")
+        yield Issue.at_path(path, f"expected at least 3 different points, got {point_count}")
         return
     if extent.max() > MAX_SIZE_M:
-        yield Mistake.at_path(path, f"expected at most {MAX_SIZE_M / 1000:g} km, got {size}")
+        yield Issue.at_path(path, f"expected at most {MAX_SIZE_M / 1000:g} km, got {size}")
         return
     if extent.min() < MIN_SIZE_M:
         message = f"expected at least {MIN_SIZE_M * 1000:g} mm in both directions, got {size}"
-        yield Mistake.at_path(path, message)
+        yield Issue.at_path(path, message)
         return
     polygon = Polygon(points)
     # The area of a ring that crosses itself may vanish; that of its hull does not.
     if shapely.convex_hull(polygon).area <= _MIN_HULL_AREA_RATIO * float(extent.max()) ** 2:
         message = f"expected points that are not on one line, got an area of {polygon.area:g} m²"
-        yield Mistake.at_path(path, message)
+        yield Issue.at_path(path, message)
     elif not polygon.is_valid:
-        yield _build_crossing_mistake(path, points, polygon)
+        yield _build_crossing_issue(path, points, polygon)
 
 
-def _find_line_mistakes(path: JsonPath, line: Ring, noun: str) -> Iterator[Mistake]:
-    """Yield the mistake in the points of a wall or a path."""
+def _find_line_issues(path: JsonPath, line: Ring, noun: str) -> Iterator[Issue]:
+    """Yield the issue with the points of a wall or a path."""
     points = np.asarray(line, dtype=float)
     extent = np.ptp(points, axis=0)
     if extent.max() > MAX_SIZE_M:
         message = f"expected at most {MAX_SIZE_M / 1000:g} km, got {extent[0]:g} x {extent[1]:g} m"
-        yield Mistake.at_path(path, message)
+        yield Issue.at_path(path, message)
     elif extent.max() < MIN_SIZE_M:
         length = float(compute_lengths(np.diff(points, axis=0)).sum())
         message = f"expected a {noun} of at least {MIN_SIZE_M * 1000:g} mm, got {length:g} m"
-        yield Mistake.at_path(path, message)
+        yield Issue.at_path(path, message)
 
 
-def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> Mistake:
-    """Build the mistake of a ring that crosses or touches itself; it names the two edges."""
+def _build_crossing_issue(path: JsonPath, points: Array, polygon: Polygon) -> Issue:
+    """Build the issue for a ring that crosses or touches itself; it names the two edges."""
     reason = shapely.is_valid_reason(polygon)
     # The reason ends with the point, as in "Self-intersection[5 5]".
     x, y = (float(number) for number in reason[reason.index("[") + 1 : -1].split())
@@ -127,15 +127,15 @@ def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> 
     first, second = sorted((first, second))
     other_edge = format_path((*path, second))
     message = f"the edge from here meets the edge from {other_edge} near [{x:g}, {y:g}]"
-    return Mistake.at_path((*path, first), f"{message}, expected a ring that does not meet itself")
+    return Issue.at_path((*path, first), f"{message}, expected a ring that does not meet itself")
 
 
-def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Mistake]:
-    mistakes = list(_find_ring_mistakes((*path, "vertices"), shape.vertices))
+def _find_polygon_issues(path: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Issue]:
+    issues = list(_find_ring_issues((*path, "vertices"), shape.vertices))
     for k, hole in enumerate(shape.holes):
-        mistakes += _find_ring_mistakes((*path, "holes", k), hole)
-    if mistakes or shape.polygon.is_valid:
-        yield from mistakes
+        issues += _find_ring_issues((*path, "holes", k), hole)
+    if issues or shape.polygon.is_valid:
+        yield from issues
         return
     # Each ring is valid by itself, but not all of them together.
     outline = Polygon(shape.vertices)
@@ -144,50 +144,50 @@ def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea
         hole_path = (*path, "holes", k)
         if not outline.covers(Polygon(hole)):
             message = f"sticks out of {format_path((*path, 'vertices'))}, expected a hole inside it"
-            yield Mistake.at_path(hole_path, message)
+            yield Issue.at_path(hole_path, message)
         elif not Polygon(shape.vertices, [*valid_holes, hole]).is_valid:
             message = "meets the outline or another hole, expected a hole apart from them"
-            yield Mistake.at_path(hole_path, message)
+            yield Issue.at_path(hole_path, message)
         else:
             valid_holes.append(hole)
 
 
-def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
-    """Yield the mistakes in the combination of the parts of a map, each of which is valid by itself."""
+def _find_space_issues(environment: Environment) -> Iterator[Issue]:
+    """Yield the issues in the combination of the parts of a map, each of which is valid by itself."""
     if len(environment.region.vertices) < 3:
-        yield Mistake.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
+        yield Issue.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
         return
     if environment.free.is_empty:
-        yield Mistake.at_path(("obstacles",), "no free space is left inside the boundary")
+        yield Issue.at_path(("obstacles",), "no free space is left inside the boundary")
         return
     density = environment.density
     # Integrate the density only if necessary, because importing the modules for it takes a second.
     if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
-        yield Mistake.at_path(("density",), f"{NO_WEIGHT} in the free space")
+        yield Issue.at_path(("density",), f"{NO_WEIGHT} in the free space")
     for name, start in environment.starts.items():
         if isinstance(start, PointsStart):
-            yield from _find_position_mistakes(environment, name, start)
+            yield from _find_position_issues(environment, name, start)
         else:
-            yield from _find_room_mistakes(environment, name, start)
+            yield from _find_room_issues(environment, name, start)
 
 
-def _find_position_mistakes(environment: Environment, name: str, start: PointsStart) -> Iterator[Mistake]:
-    """Yield the mistakes in the positions of a start."""
+def _find_position_issues(environment: Environment, name: str, start: PointsStart) -> Iterator[Issue]:
+    """Yield the issues in the positions of a start."""
     path = ("starts", name, "positions")
     points = np.asarray(start.positions, dtype=float)
     is_free = shapely.contains_properly(environment.free, shapely.points(points))
     for k in np.flatnonzero(~is_free).tolist():
         position = f"[{points[k, 0]:g}, {points[k, 1]:g}]"
         message = f"{position} is inside an obstacle or outside the boundary, expected a free position"
-        yield Mistake.at_path((*path, k), message)
+        yield Issue.at_path((*path, k), message)
     if len(np.unique(points, axis=0)) < len(points):
-        yield Mistake.at_path(path, "duplicate position, expected one for each robot")
+        yield Issue.at_path(path, "duplicate position, expected one for each robot")
 
 
-def _find_room_mistakes(
+def _find_room_issues(
     environment: Environment, name: str, start: DiscStart | UniformStart
-) -> Iterator[Mistake]:
-    """Yield a mistake if the disc or free space has no space for a robot of the default size."""
+) -> Iterator[Issue]:
+    """Yield an issue if the disc or free space has no space for a robot of the default size."""
     if _fits_at_disc_center(environment, start):
         return
     try:
@@ -198,7 +198,7 @@ def _find_room_mistakes(
             x, y = start.center
             area = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
         message = f"a robot of radius {DEFAULT_RADIUS_M:g} m does not fit into {area}"
-        yield Mistake.at_path(("starts", name), message)
+        yield Issue.at_path(("starts", name), message)
 
 
 def _fits_at_disc_center(environment: Environment, start: DiscStart | UniformStart) -> bool:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from robocov.density import MAX_RASTER_SIZE
-from robocov.errors import JsonPath, MapError, Mistake, describe_unknown_name, format_path
+from robocov.errors import Issue, JsonPath, MapError, describe_unknown_name, format_path
 from robocov.files.documents import build_document_error, check_header, describe_mismatch
 from robocov.mapfile.models import (
     COORDINATE_EXPECTED,
@@ -77,98 +77,98 @@ def validate_document(document: object, where: str) -> MapModel:
     Raises
     ------
     MapError
-        With the mistakes in structure and density.
+        With the issues in structure and density.
     """
     check_header(document, where, FORMAT, VERSION)
     try:
         model = MapModel.model_validate(document)
     except ValidationError as error:
-        raise build_document_error(error, where, _build_mistake) from None
+        raise build_document_error(error, where, _build_issue) from None
     if model.density is None:
         return model
     if isinstance(model.density, RasterModel):
-        mistakes = list(_find_raster_mistakes(model.density))
+        issues = list(_find_raster_issues(model.density))
     else:
-        mistakes = list(_find_weight_mistakes(model.density))
-    if mistakes:
-        raise MapError.from_mistakes(where, mistakes)
+        issues = list(_find_weight_issues(model.density))
+    if issues:
+        raise MapError.from_issues(where, issues)
     return model
 
 
-def _build_mistake(detail: ErrorDetails) -> Mistake:
-    """Convert an error of pydantic to a mistake."""
+def _build_issue(detail: ErrorDetails) -> Issue:
+    """Convert an error of pydantic to an issue."""
     path = list(detail["loc"])
     key = str(path[0])
     if key == "starts" and path[2:] == ["[key]"]:
         text = f"starts: name: {describe_mismatch(LABEL_EXPECTED, detail['input'])}"
-        return Mistake(tuple(path[:-1]), text, at_key=True)
+        return Issue(tuple(path[:-1]), text, at_key=True)
     kinds = MODELS_BY_KIND.get(key, {})
     # Length of the path of an object with a kind: of the density itself, or of an item of a list.
     object_length = 1 if key == "density" else 2
     if not kinds or len(path) < object_length:
-        return _build_member_mistake(path, detail, MapModel)
+        return _build_member_issue(path, detail, MapModel)
     if len(path) == object_length:
-        return _build_unknown_kind_mistake(tuple(path), detail["input"], list(kinds))
+        return _build_unknown_kind_issue(tuple(path), detail["input"], list(kinds))
     # The path of pydantic contains the kind after the object; the path in the file does not.
     model = kinds[str(path[object_length])]
     path = path[:object_length] + path[object_length + 1 :]
     if len(path) > object_length + 1:
-        # The mistake is in a part of the object, such as a peak of a density.
+        # The issue is in a part of the object, such as a peak of a density.
         model = PARTS.get(str(path[object_length]), model)
-    return _build_member_mistake(path, detail, model)
+    return _build_member_issue(path, detail, model)
 
 
-def _build_member_mistake(path: list[int | str], detail: ErrorDetails, model: type[Model]) -> Mistake:
-    """Build the mistake of a missing, unknown or wrong member of an object, at a path in the file."""
+def _build_member_issue(path: list[int | str], detail: ErrorDetails, model: type[Model]) -> Issue:
+    """Build the issue for a missing, unknown or wrong member of an object, at a path in the file."""
     if detail["type"] == "extra_forbidden":
-        return _build_unknown_key_mistake(path, model)
+        return _build_unknown_key_issue(path, model)
     # The steps after the last key are indices in nested lists, such as 2 and 0 in vertices[2][0].
     last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
     nesting_depth = len(path) - 1 - last_key
     expected = _EXPECTED[str(path[last_key])][nesting_depth]
     message = describe_mismatch(expected, detail["input"], is_missing=detail["type"] == "missing")
-    return Mistake.at_path(tuple(path), message)
+    return Issue.at_path(tuple(path), message)
 
 
-def _build_unknown_key_mistake(path: list[Any], model: type[Model]) -> Mistake:
+def _build_unknown_key_issue(path: list[Any], model: type[Model]) -> Issue:
     *parent, key = path
     known = [field.alias or name for name, field in model.model_fields.items()]
     prefix = f"{format_path(parent)}: " if parent else ""
-    return Mistake(tuple(path), f"{prefix}{describe_unknown_name('key', str(key), known)}", at_key=True)
+    return Issue(tuple(path), f"{prefix}{describe_unknown_name('key', str(key), known)}", at_key=True)
 
 
-def _build_unknown_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mistake:
-    """Build the mistake of an obstacle, a start or a density that has no known kind."""
+def _build_unknown_kind_issue(path: JsonPath, value: object, kinds: list[str]) -> Issue:
+    """Build the issue for an obstacle, a start or a density that has no known kind."""
     expected = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
-        return Mistake.at_path(path, describe_mismatch(f"an object whose kind is {expected}", value))
+        return Issue.at_path(path, describe_mismatch(f"an object whose kind is {expected}", value))
     path = (*path, "kind")
     if "kind" not in value:
-        return Mistake.at_path(path, describe_mismatch(expected, None, is_missing=True))
+        return Issue.at_path(path, describe_mismatch(expected, None, is_missing=True))
     message = describe_mismatch(expected, value["kind"])
     name = str(value["kind"]).lower()
     for similar_kind in get_close_matches(name, kinds, n=1, cutoff=_MIN_KIND_SIMILARITY):
         message += f" (did you mean {similar_kind!r}?)"
-    return Mistake.at_path(path, message)
+    return Issue.at_path(path, message)
 
 
-def _find_weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
-    """Yield the mistakes in the weights and peaks of a density other than a raster."""
+def _find_weight_issues(model: DensityModel) -> Iterator[Issue]:
+    """Yield the issues in the weights and peaks of a density other than a raster."""
     peaks = getattr(model, "peaks", [])
     areas = getattr(model, "areas", [])
     for k, peak in enumerate(peaks):
         path: JsonPath = ("density", "peaks", k)
         choice_message = _describe_choice(peak, "sigma", "covariance")
         if choice_message is not None:
-            yield Mistake.at_path(path, choice_message)
+            yield Issue.at_path(path, choice_message)
         elif peak.covariance is not None and not _is_covariance(peak.covariance):
             min_variance = f"({MIN_SIZE_M * 1000:g} mm)²"
             expected = f"a symmetric, positive definite matrix of at least {min_variance} in all directions"
-            yield Mistake.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
+            yield Issue.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
     has_base_weight = getattr(model, _BASE_WEIGHTS[model.kind]) > 0.0
     if not has_base_weight and not any(feature.weight > 0.0 for feature in (*peaks, *areas)):
         weight_path: JsonPath = ("density", "weight") if model.kind == "uniform" else ("density",)
-        yield Mistake.at_path(weight_path, NO_WEIGHT)
+        yield Issue.at_path(weight_path, NO_WEIGHT)
 
 
 def _is_covariance(matrix: list[list[float]]) -> bool:
@@ -188,27 +188,27 @@ def _describe_choice(model: Model, first: str, second: str) -> str | None:
     return f"expected one of {first} and {second}, got {'both' if has_first else 'neither'}"
 
 
-def _find_raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
+def _find_raster_issues(model: RasterModel) -> Iterator[Issue]:
     choice_message = _describe_choice(model, "rows", "picture")
     if choice_message is not None:
-        yield Mistake.at_path(("density",), choice_message)
+        yield Issue.at_path(("density",), choice_message)
         return
     if model.extent is not None and not _is_extent(model.extent):
         expected = f"[x_min, y_min, x_max, y_max] with sides from {MIN_SIZE_M:g} to {MAX_SIZE_M:.0f} m"
-        yield Mistake.at_path(("density", "extent"), describe_mismatch(expected, model.extent))
+        yield Issue.at_path(("density", "extent"), describe_mismatch(expected, model.extent))
     if model.rows is None:
         return
     for key in ("black", "white"):
         if getattr(model, key) is not None:
-            yield Mistake.at_path(("density", key), "expected only with a picture, got it with rows")
+            yield Issue.at_path(("density", key), "expected only with a picture, got it with rows")
     width = len(model.rows[0])
     for k, row in enumerate(model.rows):
         if len(row) != width:
             message = f"expected {width} numbers as in the first row, got {len(row)}"
-            yield Mistake.at_path(("density", "rows", k), message)
+            yield Issue.at_path(("density", "rows", k), message)
             return
     if not max(max(row) for row in model.rows) >= MIN_WEIGHT:
-        yield Mistake.at_path(("density", "rows"), NO_WEIGHT)
+        yield Issue.at_path(("density", "rows"), NO_WEIGHT)
 
 
 def _is_extent(extent: list[float]) -> bool:

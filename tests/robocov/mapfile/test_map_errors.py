@@ -257,35 +257,35 @@ def test_several_errors_are_counted() -> None:
         from_json(document)
 
 
-def test_every_mistake_has_its_line() -> None:
+def test_every_issue_has_its_line() -> None:
     document = edit("boundary", 0, 0, "a", document=edit("obstacles", 1, "radius", -1))
     lines = json.dumps(document, indent=2).splitlines()
     with pytest.raises(MapError) as caught:
         parse_map("\r\n".join(lines), "m.json")
-    first, second = caught.value.mistakes
+    first, second = caught.value.issues
     assert (first.path, second.path) == (("boundary", 0, 0), ("obstacles", 1, "radius"))
-    for mistake, value in ((first, '"a"'), (second, "-1")):
-        assert mistake.line is not None
-        assert mistake.column is not None
-        assert lines[mistake.line - 1][mistake.column - 1 :].startswith(value)
+    for issue, value in ((first, '"a"'), (second, "-1")):
+        assert issue.line is not None
+        assert issue.column is not None
+        assert lines[issue.line - 1][issue.column - 1 :].startswith(value)
     assert str(caught.value) == f"m.json:{first.line}:{first.column}: {first.text} (and 1 more)"
     assert (caught.value.line, caught.value.column) == (first.line, first.column)
 
 
 @pytest.mark.parametrize("build_position", [lambda k: [1, 2, k], lambda k: [70 + k, 2]])
-def test_the_first_of_many_mistakes_are_listed_and_all_are_counted(
+def test_the_first_of_many_issues_are_listed_and_all_are_counted(
     build_position: Callable[[int], list[int]],
 ) -> None:
-    """The mistakes violate the structure of the file or the rules of positions."""
+    """The issues violate the structure of the file or the rules of positions."""
     starts = {"given": {"kind": "points", "positions": [build_position(k) for k in range(50)]}}
     with pytest.raises(MapError, match=r"\(and 49 more\)$") as caught:
         parse_map(json.dumps(edit("starts", starts)), "m.json")
-    assert len(caught.value.mistakes) == MapError.MAX_LISTED
+    assert len(caught.value.issues) == MapError.MAX_LISTED
     assert caught.value.unlisted == 50 - MapError.MAX_LISTED
 
 
 @pytest.mark.slow
-def test_mistakes_in_large_files_have_lines() -> None:
+def test_issues_in_large_files_have_lines() -> None:
     ring = [[math.cos(k / 1e4), math.sin(k / 1e4)] for k in range(60_000)]
     document = edit("boundary", [*ring, [2, "x"]], document=edit("extra", {"more": ring}))
     with pytest.raises(MapError) as caught:
@@ -295,7 +295,7 @@ def test_mistakes_in_large_files_have_lines() -> None:
     assert '"x"' in lines[caught.value.line - 1]
 
 
-def test_a_mistake_has_no_line_if_it_cannot_be_located(
+def test_an_issue_has_no_line_if_it_cannot_be_located(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def raise_recursion_error(*_: object, **__: object) -> int:
@@ -312,7 +312,7 @@ def test_errors_can_be_pickled() -> None:
         parse_map(json.dumps(edit("obstacles", 1, "radius", -1)), "m.json")
     copy = pickle.loads(pickle.dumps(caught.value))
     assert str(copy) == str(caught.value)
-    assert copy.mistakes == caught.value.mistakes
+    assert copy.issues == caught.value.issues
 
 
 def test_files_that_cannot_be_read_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

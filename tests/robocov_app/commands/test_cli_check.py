@@ -1,4 +1,4 @@
-"""`robocov check`: every mistake with its line, and maps that are checked at each save."""
+"""`robocov check`: every issue with its line, and maps that are checked at each save."""
 
 import json
 import os
@@ -38,7 +38,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_each_mistake_gets_a_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_issue_gets_a_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file.write_text(BAD)
     assert main(["check", str(file), "rooms"]) == 2
     said = capsys.readouterr()
@@ -58,24 +58,24 @@ def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.Cap
     assert (row["line"], row["column"]) == (7, 39)
     assert row["error"].startswith(f"{file}:7:39: obstacles[1]: unknown key")
     assert "(and 3 more)" in row["error"]
-    second = row["mistakes"][1]
+    second = row["issues"][1]
     assert {key: second[key] for key in ("path", "line", "column")} == {
         "path": "obstacles[0].radius",
         "line": 6,
         "column": 52,
     }
     assert second["text"].startswith("obstacles[0].radius: expected a number")
-    assert row["mistakes_not_listed"] == 0
-    assert none["line"] is None and none["mistakes"] == []
+    assert row["issues_not_listed"] == 0
+    assert none["line"] is None and none["issues"] == []
     assert none["error"] == f"{file.parent / 'none.json'}: no such file"
 
 
-def test_mistakes_beyond_the_limit_are_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_issues_beyond_the_limit_are_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
     assert main(["check", str(file)]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 21
-    assert lines[-1] == f"robocov: error: {file}: and 10 more mistakes"
+    assert lines[-1] == f"robocov: error: {file}: and 10 more issues"
 
 
 def simulate_saves(*steps: Any) -> Any:

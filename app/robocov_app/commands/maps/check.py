@@ -155,31 +155,31 @@ def _build_row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
     if isinstance(outcome, MapError):
         row["line"] = outcome.line
         row["column"] = outcome.column
-        row["mistakes"] = [
+        row["issues"] = [
             {
-                "path": format_path(mistake.path),
-                "text": mistake.text,
-                "line": mistake.line,
-                "column": mistake.column,
+                "path": format_path(issue.path),
+                "text": issue.text,
+                "line": issue.line,
+                "column": issue.column,
             }
-            for mistake in outcome.mistakes
+            for issue in outcome.issues
         ]
-        row["mistakes_not_listed"] = outcome.unlisted
+        row["issues_not_listed"] = outcome.unlisted
     return row
 
 
 def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report or, for an invalid map, one per mistake in the order of the file."""
+    """Yield the lines of a report or, for an invalid map, one per issue in the order of the file."""
     if isinstance(outcome, MapReport):
         yield from format_report(outcome, previous)
-    elif not isinstance(outcome, MapError) or not outcome.mistakes:
+    elif not isinstance(outcome, MapError) or not outcome.issues:
         yield str(outcome)
     else:
-        mistakes = sorted(outcome.mistakes, key=lambda mistake: (mistake.line or 0, mistake.column or 0))
-        for mistake in mistakes:
-            yield mistake.format_message(outcome.where)
+        issues = sorted(outcome.issues, key=lambda issue: (issue.line or 0, issue.column or 0))
+        for issue in issues:
+            yield issue.format_message(outcome.where)
         if outcome.unlisted:
-            yield f"{outcome.where}: and {outcome.unlisted} more mistakes"
+            yield f"{outcome.where}: and {outcome.unlisted} more issues"
 
 
 def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:

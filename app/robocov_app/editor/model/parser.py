@@ -1,6 +1,6 @@
 """Reading of sketches from map documents.
 
-A sketch may break the rules of maps, so that mistakes can be corrected in the editor. A document that cannot
+A sketch may break the rules of maps, so that issues can be corrected in the editor. A document that cannot
 be represented as a sketch, for instance because a point has three coordinates, raises an error.
 """
 
@@ -15,16 +15,16 @@ from typing import Any, NoReturn, TypeVar
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring
 from robocov.errors import (
+    Issue,
     JsonPath,
     MapError,
-    Mistake,
     describe_unknown_name,
     format_path,
     quote_json,
     to_one_line,
 )
 from robocov.files.documents import check_header
-from robocov.files.strictjson import locate_mistakes, parse_json, require_json
+from robocov.files.strictjson import locate_issues, parse_json, require_json
 from robocov.mapfile import parse_density
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import read_marks
@@ -67,7 +67,7 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
     try:
         return build_sketch(document, where, folder)
     except MapError as error:
-        raise locate_mistakes(error, text, where) from None
+        raise locate_issues(error, text, where) from None
 
 
 def build_sketch(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
@@ -170,7 +170,7 @@ class _Reader:
             named_path = path[:-1]
         if named_path:
             message = f"{format_path(named_path)}: {message}"
-        raise MapError.from_mistakes(self._where, [Mistake(path, message, at_key)])
+        raise MapError.from_issues(self._where, [Issue(path, message, at_key)])
 
     def require_type(self, kind: type[_Value], value: Any, path: JsonPath, expected: str) -> _Value:
         """Return a value unchanged; raise MapError unless it has the given type."""

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.errors import JsonPath, MapError, Mistake, quote_json, to_one_line
-from robocov.files.strictjson import locate_mistakes, parse_json
+from robocov.errors import Issue, JsonPath, MapError, quote_json, to_one_line
+from robocov.files.strictjson import locate_issues, parse_json
 from robocov_app.formats.files.limits import MAX_TEXT_BYTES, require_vertices
 from robocov_app.formats.files.reading import read_content
 
@@ -50,8 +50,8 @@ class JsonFile:
         expected : str
             Description of the values that are accepted.
         """
-        mistake = Mistake.at_path(place, f"expected {expected}, got {quote_json(value)}")
-        return locate_mistakes(MapError.from_mistakes(self.where, [mistake]), self._content, self.where)
+        issue = Issue.at_path(place, f"expected {expected}, got {quote_json(value)}")
+        return locate_issues(MapError.from_issues(self.where, [issue]), self._content, self.where)
 
     def parse_points(
         self, value: Any, place: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
-from robocov.errors import MapError, Mistake
+from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, QuestionModel, TaskModel
@@ -87,7 +87,7 @@ def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
     """
     saved = load_session(path)
     if saved.lesson is None:
-        raise MapError.from_mistakes(str(path), [Mistake.at_path(("lesson",), "missing")])
+        raise MapError.from_issues(str(path), [Issue.at_path(("lesson",), "missing")])
     for index, chapter in enumerate(saved.lesson.chapters):
         check_layer_names(f"{path}: lesson.chapters[{index}].show", chapter.show)
     return saved

@@ -63,7 +63,7 @@ def replace_obstacles(
         try:
             return from_json(to_json(changed), "map")
         except MapError as error:
-            invalid = {mistake.path[1] for mistake in error.mistakes if mistake.path[:1] == ("starts",)}
+            invalid = {issue.path[1] for issue in error.issues if issue.path[:1] == ("starts",)}
             covered = [name for name in starts if name in invalid]
             if not covered:
                 raise MapError(str(error).removeprefix("map: ")) from None

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 from pydantic_core import PydanticCustomError
 
 from robocov.environment import Environment
-from robocov.errors import MapError, Mistake, quote, quote_json
+from robocov.errors import Issue, MapError, quote, quote_json
 from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
 from robocov_app.viewer.session.files.models import BundledMapModel
 
@@ -31,7 +31,7 @@ def refuse_value(where: str, path: tuple[str | int, ...], value: object, expecte
         Description of the expected value.
     """
     message = f"expected {expected}, got {quote_json(value)}"
-    raise MapError.from_mistakes(where, [Mistake.at_path(path, message)])
+    raise MapError.from_issues(where, [Issue.at_path(path, message)])
 
 
 class FileContext:
@@ -87,7 +87,7 @@ class FileContext:
             return from_json(content)
         except MapError as error:
             message = f"maps[{number}]: {str(error).removeprefix('map: ')}"
-            raise MapError.from_mistakes(self.where, [Mistake(("maps", number), message)]) from None
+            raise MapError.from_issues(self.where, [Issue(("maps", number), message)]) from None
 
     def _load_bundled_map(self, number: int, content: BundledMapModel) -> Environment:
         if content.bundled not in list_bundled_maps():
@@ -99,7 +99,7 @@ class FileContext:
             expected = quote_json(digest)
             reason = f"the bundled map {quote(content.bundled)} has changed since the session was saved"
             message = f"expected {expected}, got {quote_json(content.digest)}: {reason}"
-            raise MapError.from_mistakes(self.where, [Mistake.at_path(("maps", number, "digest"), message)])
+            raise MapError.from_issues(self.where, [Issue.at_path(("maps", number, "digest"), message)])
         return environment
 
 

@@ -13,9 +13,9 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from robocov.errors import MapError, Mistake, quote_json
+from robocov.errors import Issue, MapError, quote_json
 from robocov.files.documents import build_document_error, check_header
-from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes
+from robocov.files.strictjson import locate_issues, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.edits import DragRobot, Restart, SessionEdit
@@ -189,7 +189,7 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
     try:
         return parse_session(content, where, controllers)
     except MapError as error:
-        raise locate_mistakes(error, text, where) from None
+        raise locate_issues(error, text, where) from None
 
 
 def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -> SavedSession:
@@ -217,7 +217,7 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
     try:
         model = SessionModel.model_validate(content, context=FileContext(where, controllers))
     except ValidationError as error:
-        raise build_document_error(error, where, _build_mistake) from None
+        raise build_document_error(error, where, _build_issue) from None
     nodes: list[Node] = []
     for node_model in model.edits:
         nodes.append(_NodeReader(where, nodes).read(node_model))
@@ -296,8 +296,8 @@ class _NodeReader:
                 node.curves[int(pane), quantity].add(time, value)
 
 
-def _build_mistake(detail: Any) -> Mistake:
-    """Convert an error of pydantic to a robocov `Mistake` with a path and a plain message."""
+def _build_issue(detail: Any) -> Issue:
+    """Convert an error of pydantic to a robocov `Issue` with a path and a plain message."""
     steps = list(detail["loc"])
     # Remove the kinds that pydantic has inserted, because they are not part of the JSON path.
     kinds = [index for index in range(2, len(steps)) if steps[index - 2] in _STEPS_BEFORE_KIND]
@@ -305,19 +305,19 @@ def _build_mistake(detail: Any) -> Mistake:
     message = str(detail["msg"])
     match detail["type"]:
         case "missing":
-            return Mistake.at_path(path, "missing")
+            return Issue.at_path(path, "missing")
         case "invalid":
-            return Mistake.at_path(path, message)
+            return Issue.at_path(path, message)
         case "extra_forbidden":
-            return Mistake.at_path(path, "unknown key", at_key=True)
+            return Issue.at_path(path, "unknown key", at_key=True)
         case "model_type" | "dataclass_type":
-            return Mistake.at_path(path, f"expected an object, got {quote_json(detail['input'])}")
+            return Issue.at_path(path, f"expected an object, got {quote_json(detail['input'])}")
     unknown_tag = _UNKNOWN_TAG.match(message)
     if unknown_tag is not None:
         expected = f"one of {unknown_tag['known']}"
         found = quote_json(unknown_tag["found"])
-        return Mistake.at_path((*path, unknown_tag["key"]), f"expected {expected}, got {found}")
+        return Issue.at_path((*path, unknown_tag["key"]), f"expected {expected}, got {found}")
     expected = message
     for pattern, replacement in _REWRITES:
         expected = re.sub(pattern, replacement, expected)
-    return Mistake.at_path(path, f"expected {expected}, got {quote_json(detail['input'])}")
+    return Issue.at_path(path, f"expected {expected}, got {quote_json(detail['input'])}")
