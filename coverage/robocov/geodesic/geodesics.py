@@ -443,7 +443,7 @@ def _start_straight_paths(
 ) -> int:
     """Write the straight paths from a source to the corners that it sees; return their number.
 
-    The length of the paths to all other corners is infinite. The queue of corners from which paths go on
+    The length of the paths to all other corners is infinite. The queue of corners from which paths continue
     starts with those that the source sees.
     """
     for corner in range(len(walls.corners)):
