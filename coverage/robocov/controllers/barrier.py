@@ -151,7 +151,7 @@ class Barrier(BaseController):
             np.concatenate([robot_planes.limits, obstacle_planes.limits], axis=1),
             team.max_acceleration,
         )
-        # Brake to rest within the response time, or as hard as possible.
+        # Where no acceleration is allowed, brake to rest within the response time, or as hard as possible.
         speed = np.hypot(*seen.velocities.T)
         rate = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, _MIN_NORM))
         accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])

@@ -271,10 +271,11 @@ def _choose_closed_segments(left_face: IntArray, right_face: IntArray, has_disc:
     Faces without a disc are joined to their neighbors at the widest segments. A segment stays closed if it
     would join two faces that contain a disc, or a face to itself around an obstacle.
     """
+    # Joined faces have the same group.
     group = np.arange(len(has_disc))
     group_has_disc = has_disc.copy()
     is_closed = np.ones(len(left_face), dtype=bool)
-    for k in range(len(left_face) - 1, -1, -1):
+    for k in reversed(range(len(left_face))):
         if left_face[k] == _NO_FACE or right_face[k] == _NO_FACE:
             continue
         left = group[left_face[k]]

@@ -52,6 +52,7 @@ def _find_member(text: str, offset: int, step: str | int) -> tuple[int, int] | N
     members = _iterate_members(text, offset)
     if isinstance(step, int):
         members = islice(members, step + 1)
+    # An object may repeat a key. Its last value counts, as in Python's JSON decoder.
     offsets = None
     for key, key_offset, value_offset in members:
         if key == step:

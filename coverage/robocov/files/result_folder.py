@@ -356,6 +356,7 @@ def _carry_out_journal(folder: Path) -> None:
         return
     files, removed_files = journal
     flush_to_disk([folder])
+    # If an earlier attempt was interrupted, some of the files are already removed or moved.
     for name in removed_files:
         path = _resolve_inside(folder, name)
         if _is_file_or_link(path):
@@ -384,6 +385,8 @@ def _open_folder(folder: Path) -> Iterator[None]:
         try:
             yield
         finally:
+            # A journal is left by an interrupted commit. The staged files remain, from which the next opening
+            # completes it.
             if not os.path.lexists(folder / _JOURNAL_FILE):
                 with suppress(OSError):
                     _discard_staging(folder)

@@ -128,6 +128,7 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         else:
             high = middle
     blocks = build_blocks(low)
+    # These blocks are larger than requested by the rest of the bisection; scaling makes their area exact.
     factor = math.sqrt(request.blocked_area / _sum_areas(blocks))
     blocks = [scale(block, factor, factor, origin="centroid") for block in blocks]
     if not all(_is_thick(block) for block in blocks):

@@ -110,14 +110,14 @@ class _Descent:
     def step(self) -> bool:
         """Move the robots to a lower cost; return whether that was possible."""
         gradient = _compute_gradient(self.result)
-        scale = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
+        curvature = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
         improved = None
         if self.recent_pairs:
-            direction = _compute_quasi_newton_direction(gradient, scale, self.recent_pairs)
+            direction = _compute_quasi_newton_direction(gradient, curvature, self.recent_pairs)
             improved = self._search_line(gradient, direction, _MAX_QUASI_NEWTON_TRIALS)
         if improved is None:
             self.recent_pairs.clear()
-            improved = self._search_line(gradient, -gradient / scale, _MAX_GRADIENT_TRIALS)
+            improved = self._search_line(gradient, -gradient / curvature, _MAX_GRADIENT_TRIALS)
         if improved is None:
             return False
         move = improved.positions - self.result.positions
@@ -167,16 +167,16 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
     return np.where(curvature > 0.0, curvature, 1.0)
 
 
-def _compute_quasi_newton_direction(gradient: Array, scale: Array, pairs: deque[_CurvaturePair]) -> Array:
-    """Return the L-BFGS direction, (n, 2) m, for an initial curvature of `scale`, (n, 1)."""
+def _compute_quasi_newton_direction(gradient: Array, curvature: Array, pairs: deque[_CurvaturePair]) -> Array:
+    """Return the L-BFGS direction, (n, 2) m, for an initial curvature by robot, (n, 1) 1/m."""
     moves = np.array([pair.move for pair in pairs]).reshape(len(pairs), -1)
     changes = np.array([pair.gradient_change for pair in pairs]).reshape(len(pairs), -1)
     # SciPy's recursion starts from a Hessian equal to the identity. It therefore runs in coordinates
     # z = root * x, in which the initial Hessian, diag(root²), becomes the identity. As in Nocedal and Wright,
     # equation 7.20, the initial Hessian is scaled to fit the last move.
-    curvature = np.broadcast_to(scale, gradient.shape).ravel()
-    factor = changes[-1] @ (changes[-1] / curvature) / (moves[-1] @ changes[-1])
-    root = np.sqrt(curvature * factor)
+    diagonal = np.broadcast_to(curvature, gradient.shape).ravel()
+    factor = changes[-1] @ (changes[-1] / diagonal) / (moves[-1] @ changes[-1])
+    root = np.sqrt(diagonal * factor)
     inverse_hessian = scipy.optimize.LbfgsInvHessProduct(moves * root, changes / root)
     direction = inverse_hessian @ (gradient.ravel() / root)
     return np.asarray(-(direction / root).reshape(gradient.shape))
