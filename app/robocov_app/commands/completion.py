@@ -38,6 +38,8 @@ _ZSH_PROLOGUE = (
     "#compdef robocov\nautoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
 )
 _CONTROLLER_OPTIONS = ("--controller", "--controllers")
+_CONTROLLER_ARGUMENT = "names"
+"""Name of the positional argument that takes controllers."""
 _MAP_ARGUMENTS = {"map", "files"}
 """Names of positional arguments that take maps."""
 
@@ -67,7 +69,7 @@ class _Completions(NamedTuple):
     options : list of str
         Names of options, such as ``--robots``.
     words : list of str
-        Choices of positional arguments.
+        Choices of positional arguments, and controllers if one takes them.
     takes_maps : bool
         Whether a positional argument is a map.
     """
@@ -101,6 +103,8 @@ def _collect_completions(kind: type) -> _Completions:
     for field in positionals:
         if get_origin(choices[field.name]) is Literal:
             words += get_args(choices[field.name])
+        elif field.name == _CONTROLLER_ARGUMENT:
+            words += CONTROLLERS
     names = {field.name for field in positionals}
     return _Completions(["--help", *_list_options(kind)], words, bool(names & _MAP_ARGUMENTS))
 

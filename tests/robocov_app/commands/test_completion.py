@@ -56,6 +56,7 @@ def test_the_options_of_a_command_are_those_of_its_help(
         (("robocov", "run", "--rob"), ["--robots"]),
         (("robocov", "run", "--controller", "atlas"), ["atlas", "atlas-shared"]),
         (("robocov", "benchmark", "ver"), ["verify"]),
+        (("robocov", "controllers", "rap"), ["rapf"]),
         (("robocov", "check", ""), list(list_bundled_maps())),
         (("robocov", "run", "--json", "roo"), ["rooms"]),
     ],
