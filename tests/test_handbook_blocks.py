@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fuzz_seeds import IMDF, imdf_zip
+from fuzz_seeds import IMDF, build_imdf_zip
 from swept import DirectExecutor
 
 from robocov.errors import InputError
@@ -35,11 +35,11 @@ _FASTER = (
 )
 
 
-def words_of(line: str) -> list[str]:
+def split_words(line: str) -> list[str]:
     return shlex.split(line.partition(" # ")[0].partition("  #")[0])[1:]
 
 
-def parsed_alone(words: list[str]) -> None:
+def parse_alone(words: list[str]) -> None:
     parse_options(
         import_module(f"robocov_app.commands.{COMMANDS[words[0]].module}").Arguments, words[0], words[1:]
     )
@@ -69,7 +69,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
         mine = (find_page_sources() / "own-controller.md").read_text()
         (folder / "mine.py").write_text(next(re.finditer(r"```python\n(# mine.py.*?)```", mine, re.S))[1])
     if page.stem == "maps":
-        (folder / "museum.zip").write_bytes(imdf_zip(IMDF))
+        (folder / "museum.zip").write_bytes(build_imdf_zip(IMDF))
     names: dict[str, Any] = {}
     for found in re.finditer(r"```(\w+)\n(.*?)```", text, re.S):
         kind, code = found.groups()
@@ -87,9 +87,9 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
             assert kind == "sh"
             for line in code.replace("\\\n", " ").splitlines():
                 if line.startswith("robocov "):
-                    words = words_of(line)
+                    words = split_words(line)
                     if words[0] in _SHOWN:
-                        parsed_alone(words)
+                        parse_alone(words)
                     else:
                         assert main([*words, *_SHORTER.get(words[0], [])]) == 0, line
 
@@ -100,6 +100,6 @@ def test_commands_in_the_text_are_such_that_they_are_understood(page: Path) -> N
         words = shlex.split(line)
         if words[0] in COMMANDS and ">" not in words:
             try:
-                parsed_alone(words)
+                parse_alone(words)
             except InputError as error:  # of the text's own
                 assert "no such file" in str(error), line

@@ -17,27 +17,27 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
-def passes(*command: str, cwd: Path = ROOT) -> None:
+def assert_passes(*command: str, cwd: Path = ROOT) -> None:
     done = subprocess.run([sys.executable, *command], cwd=cwd, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}\n{done.stderr}"
 
 
 def test_ruff_finds_nothing() -> None:
-    passes("-m", "ruff", "check", ".")
+    assert_passes("-m", "ruff", "check", ".")
 
 
 def test_the_format_is_ruffs() -> None:
-    passes("-m", "ruff", "format", "--check", ".")
+    assert_passes("-m", "ruff", "format", "--check", ".")
 
 
 @pytest.mark.slow
 def test_types_are_strict() -> None:
-    passes("-m", "mypy")
+    assert_passes("-m", "mypy")
 
 
 def test_imports_go_down_only() -> None:
     call = "from importlinter.cli import lint_imports_command as lint; lint([])"
-    passes("-c", call)
+    assert_passes("-c", call)
 
 
 def test_no_two_modules_need_each_other_not_even_for_types() -> None:
@@ -119,21 +119,21 @@ def test_public_classes_can_be_pickled_by_reference() -> None:
             assert pickle.loads(pickle.dumps(value)) is value
 
 
-def loaded_by(statement: str) -> set[str]:
+def list_loaded_modules(statement: str) -> set[str]:
     script = f"import sys\n{statement}\nprint(' '.join(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     return set(done.stdout.split())
 
 
 def test_importing_the_package_loads_neither_pygame_nor_matplotlib() -> None:
-    loaded = loaded_by("import robocov")
+    loaded = list_loaded_modules("import robocov")
     assert not loaded & {"pygame", "matplotlib", "scipy", "shapely", "pydantic"}
-    everything = loaded_by("import robocov\nfor name in robocov.__all__: getattr(robocov, name)")
+    everything = list_loaded_modules("import robocov\nfor name in robocov.__all__: getattr(robocov, name)")
     assert not everything & {"pygame", "matplotlib", "rich", "tyro"}
 
 
 def test_asking_for_help_loads_nothing_heavy() -> None:
-    loaded = loaded_by("from robocov_app.cli import main\nmain(['--help'])")
+    loaded = list_loaded_modules("from robocov_app.cli import main\nmain(['--help'])")
     heavy = {"numpy", "scipy", "shapely", "pydantic", "pygame", "matplotlib", "pymunk", "tyro", "rich"}
     assert not loaded & heavy
 

@@ -20,12 +20,12 @@ README = "\n".join(page.read_text() for page in PAGES)
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, flags=re.DOTALL)
 
 
-def block(language: str, part: str) -> str:
+def find_block(language: str, part: str) -> str:
     return next(text for kind, text in BLOCKS if kind == language and part in text)
 
 
 def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
-    text = block("json", "desk")
+    text = find_block("json", "desk")
     assert parse_map(text, "README").free_area < 60.0
     with pytest.raises(MapError, match=r"^mine.json:8:54: obstacles\[2\].radius: expected "):
         parse_map(text.replace('"radius": 0.5', '"radius": -1'), "mine.json")
@@ -33,7 +33,7 @@ def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
 
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     exec(
-        block("python", "\nsimulation = rc.Simulation(environment").replace("run(60.0)", "run(0.5)"),
+        find_block("python", "\nsimulation = rc.Simulation(environment").replace("run(60.0)", "run(0.5)"),
         {"rc": rc},
     )
     assert len(capsys.readouterr().out.split()) == 3
@@ -42,7 +42,7 @@ def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("name", ["Homing", "Patient"])
 def test_the_controllers_run(name: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
-    file.write_text(block("python", f"class {name}"))
+    file.write_text(find_block("python", f"class {name}"))
     controller = make_controller(f"{file}:{name}")
     room = load_map("rooms")
     record = Simulation(room, controller, room.start().sample(3), dt=1 / 30).run(2.0)
@@ -73,5 +73,5 @@ def test_pictures_and_pages_that_it_links_to_are_there(page: Path) -> None:
 
 def test_a_map_may_begin_with_its_schema(tmp_path: Path) -> None:
     assert '`{"$schema": "./map.schema.json",`' in README
-    text = block("json", "desk").replace("{", '{"$schema": "./map.schema.json",', 1)
+    text = find_block("json", "desk").replace("{", '{"$schema": "./map.schema.json",', 1)
     assert parse_map(text, "README").schema == "./map.schema.json"

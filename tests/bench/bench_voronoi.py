@@ -29,7 +29,7 @@ REGION = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 6.0], [0.0, 6.0]]))
 RANGE = 2.5
 
 
-def medians(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+def measure_medians(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
     """Return the median seconds of each call, all of them called in turn `rounds` times."""
     taken: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(rounds):
@@ -54,7 +54,7 @@ def main(budget: int) -> None:
         }
         if n >= 4:
             calls["delaunay"] = lambda points=points: Delaunay(points)
-        taken = medians(calls, max(15, budget // n))
+        taken = measure_medians(calls, max(15, budget // n))
         floor = taken.get("delaunay", np.nan)
         row = f"{n:6d} {floor * 1e6:9.0f} µs"
         for name in ("partition", "limited"):
@@ -62,7 +62,7 @@ def main(budget: int) -> None:
         print(row, f"{(taken['polygons'] - taken['partition']) * 1e6:9.0f} µs")
 
 
-def on_the_move(budget: int) -> None:
+def print_moving_teams(budget: int) -> None:
     """Print one row a team size: robots that cross 1/60 s in straight lines, 10 m² a robot."""
     rng = np.random.default_rng(0)
     print(f"\n{'robots':>6} {'Delaunay':>12} {'anew':>18} {'on the move':>18} {'goal':>6}")
@@ -96,4 +96,4 @@ def on_the_move(budget: int) -> None:
 
 if __name__ == "__main__":
     main(int(sys.argv[1]) if len(sys.argv) > 1 else 20000)
-    on_the_move(int(sys.argv[1]) if len(sys.argv) > 1 else 20000)
+    print_moving_teams(int(sys.argv[1]) if len(sys.argv) > 1 else 20000)

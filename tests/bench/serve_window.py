@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 sys.path.insert(0, str(Path(__file__).parents[1] / "robocov_app"))
 
 from driven_browser import Browser
-from served_window import served
+from served_window import serve_window
 
 WATCH = """
 window.drawn = 0; window.came = 0;
@@ -69,7 +69,7 @@ def main() -> None:
             browser.driver.set_script_timeout(120)
             begun = time.monotonic()
             more = "--robots", options.robots, "--start", "uniform", "--folder", folder
-            with served("demo", "rooms", *more) as link:
+            with serve_window("demo", "rooms", *more) as link:
                 browser.driver.get(link)
                 browser.until(lambda: browser.js("return canvas.width") == round(width * options.ratio))
                 print(f"{time.monotonic() - begun:.1f} s from the command to its first picture")

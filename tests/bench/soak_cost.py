@@ -25,15 +25,15 @@ from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 
 
-def by_brute_force(environment, robots):
+def compute_largest_error(environment, robots):
     """Return the largest error of a coarse cost, as a part of the map's size."""
     cost = CoverageCost(environment, 5)
 
-    def placed(points):
+    def list_well_placed(points):
         return [p for p in points.tolist() if brute.is_well_placed(environment.free, tuple(p), SIDE)]
 
-    robots = placed(robots)[:3]
-    points = placed(cost.points)
+    robots = list_well_placed(robots)[:3]
+    points = list_well_placed(cost.points)
     if not robots or not points:
         return 0.0
     expected = brute.compute_distances(environment.free, robots, points).min(axis=0)
@@ -68,7 +68,7 @@ def main(seconds: float, seed: int) -> None:
                 worst = max(worst, compute_distance_error(environment, lattice, places))
                 maps += 1
                 if len(shapely.get_coordinates(environment.free)) < 100:
-                    slow_worst = max(slow_worst, by_brute_force(environment, places))
+                    slow_worst = max(slow_worst, compute_largest_error(environment, places))
                     slow_maps += 1
             except ParameterError:
                 continue

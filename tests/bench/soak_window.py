@@ -28,7 +28,7 @@ WARM = 10
 """Minutes until all that is kept is there."""
 
 
-def resident() -> float:
+def read_memory_mb() -> float:
     """Return the memory in use, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 1e6
@@ -43,18 +43,18 @@ def main(minutes: int, robots: int) -> None:
         # the cost beside it takes no memory here; one a frame would take all of the time
         viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
         window = ViewerWindow(viewer, (1280, 720), 1.0)
-        warm = resident()
+        warm = read_memory_mb()
         for minute in range(1, minutes + 1):
             for _ in range(60 * FPS):
                 if rng.random() < 1 / (20 * FPS):
                     touch(viewer, rng)
                 window.run_frame(1.0 / FPS)
             if minute == WARM:
-                warm = resident()
+                warm = read_memory_mb()
             if minute % 5 == 0:
                 past = f"{len(session.timeline.history)} moments, {session.timeline.history.thinned} thinned"
-                print(f"{minute:3d} min  {resident():7.1f} MB  {past}", flush=True)
-        print(f"grown by {resident() - warm:.1f} MB since minute {WARM}")
+                print(f"{minute:3d} min  {read_memory_mb():7.1f} MB  {past}", flush=True)
+        print(f"grown by {read_memory_mb() - warm:.1f} MB since minute {WARM}")
 
 
 def touch(viewer: Presenter, rng: np.random.Generator) -> None:

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Callable
 
 from fuzz_reading import Job
-from fuzz_seeds import Case, imdf_files
+from fuzz_seeds import Case, build_imdf_files
 
 
 def _include_each_other() -> Case:
@@ -197,7 +197,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "imdf: many files": (
         _one("a.zip", lambda: _zip({f"{k}/unit.geojson": b"" for k in range(5000)})), _READ, "1000 files",
     ),
-    "imdf: levels": (lambda: Case(imdf_files(_LEVELS)), Job("folder"), "objects"),
+    "imdf: levels": (lambda: Case(build_imdf_files(_LEVELS)), Job("folder"), "objects"),
     "picture: unpacked": (_one("a.png", _png), Job("import", None, {"cell": 1.0}), "million"),
     "study: runs": (_one("study.toml", _study), Job("study"), "expected at most 100000, got 1e+12"),
 }

@@ -54,34 +54,36 @@ class Cost:
         return max(self.seconds / seconds, self.megabytes / megabytes)
 
 
-def star(points: int, x: float = 0.0, y: float = 0.0, radius: float = 20.0) -> list[tuple[float, float]]:
+def build_star(
+    points: int, x: float = 0.0, y: float = 0.0, radius: float = 20.0
+) -> list[tuple[float, float]]:
     """Return a star whose every side crosses almost every other one."""
     angle = np.arange(points) * (points // 2) * math.tau / points
     return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)]).round(3).tolist()
 
 
-def path(ring: list[tuple[float, float]]) -> str:
+def build_path(ring: list[tuple[float, float]]) -> str:
     """Return a filled path."""
     return '<path d="M' + " ".join(f"{x:g} {y:g}" for x, y in ring) + 'z"/>'
 
 
-def svg(*bodies: str) -> bytes:
+def build_svg(*bodies: str) -> bytes:
     """Return a drawing."""
     return f'<svg xmlns="http://www.w3.org/2000/svg">{"".join(bodies)}</svg>'.encode()
 
 
-def geojson(rings: list[Any]) -> bytes:
+def build_geojson(rings: list[Any]) -> bytes:
     """Return polygons in meters."""
     coordinates = [[[*ring, ring[0]]] for ring in rings]
     return json.dumps({"type": "MultiPolygon", "units": "meters", "coordinates": coordinates}).encode()
 
 
-def wkt(ring: Any) -> bytes:
+def build_wkt(ring: Any) -> bytes:
     """Return a polygon."""
     return f"POLYGON(({','.join(f'{x:.4f} {y:.4f}' for x, y in ring)}))".encode()
 
 
-def comb(teeth: int) -> list[tuple[float, float]]:
+def build_comb(teeth: int) -> list[tuple[float, float]]:
     """Return a hall with as many niches."""
     x = np.arange(teeth) * 0.02
     tooth = [(0.0, 0.0), (0.0, 5.0), (0.01, 5.0), (0.01, 0.0)]
@@ -89,24 +91,24 @@ def comb(teeth: int) -> list[tuple[float, float]]:
     return [*map(tuple, points.reshape(-1, 2).tolist()), (teeth * 0.02, -3.0), (0.0, -3.0)]
 
 
-def pgm(cells: np.ndarray) -> bytes:
+def build_pgm(cells: np.ndarray) -> bytes:
     """Return a picture, raw."""
     return b"P5 %d %d 255\n" % cells.shape[::-1] + cells.astype(np.uint8).tobytes()
 
 
-def pillars(size: int) -> np.ndarray:
+def build_pillars(size: int) -> np.ndarray:
     """Return cells with a pillar in every third of every third row."""
     cells = np.full((size, size), 255)
     cells[1::3, 1::3] = 0
     return cells
 
 
-def noise(size: int, share: float) -> np.ndarray:
+def build_noise(size: int, share: float) -> np.ndarray:
     """Return cells of which a share is blocked, by chance."""
     return np.where(np.random.default_rng(0).random((size, size)) < share, 0, 255)
 
 
-def white_png(size: int) -> bytes:
+def build_white_png(size: int) -> bytes:
     """Return a picture with nothing on it."""
     import io
 
@@ -117,7 +119,7 @@ def white_png(size: int) -> bytes:
     return file.getvalue()
 
 
-def squares(size: int) -> list[list[tuple[float, float]]]:
+def build_squares(size: int) -> list[list[tuple[float, float]]]:
     """Return squares that touch at their corners, as on a chess board."""
     return [
         [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
@@ -127,30 +129,32 @@ def squares(size: int) -> list[list[tuple[float, float]]]:
     ]
 
 
-def wavy(count: int) -> np.ndarray:
+def build_wavy_room(count: int) -> np.ndarray:
     """Return a round room with a wall of as many vertices."""
     angle = np.arange(count) * math.tau / count
     radius = 300 + 0.5 * np.sin(angle * count / 40)
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
 
-def rooms(size: int) -> bytes:
+def build_rooms(size: int) -> bytes:
     """Return cells with walls every 16 and a door in each."""
     cells = np.full((size, size), 255)
     cells[::16] = cells[:, ::16] = 0
     cells[::16, 7::16] = cells[::16, 8::16] = cells[7::16, ::16] = cells[8::16, ::16] = 255
     cells[0] = cells[:, 0] = 0
-    return pgm(cells)
+    return build_pgm(cells)
 
 
-def rectangles(count: int) -> bytes:
+def build_rectangles(count: int) -> bytes:
     """Return a drawing of as many desks."""
     side = math.isqrt(count) + 1
     desks = (f'<rect x="{2 * (k % side)}" y="{2 * (k // side)}" width="1" height="1"/>' for k in range(count))
-    return svg(f'<rect id="boundary" x="-1" y="-1" width="{2 * side + 2}" height="{2 * side + 2}"/>', *desks)
+    return build_svg(
+        f'<rect id="boundary" x="-1" y="-1" width="{2 * side + 2}" height="{2 * side + 2}"/>', *desks
+    )
 
 
-def lines(count: int) -> bytes:
+def build_lines(count: int) -> bytes:
     """Return a DXF of as many walls that stand alone."""
     side = math.isqrt(count) + 1
     text = ["0", "SECTION", "2", "ENTITIES"]
@@ -162,32 +166,38 @@ def lines(count: int) -> bytes:
 
 
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
-    "four stars of 201 points": ("stars.svg", lambda: svg(*(path(star(201, 45 * k)) for k in range(4)))),
-    "four of 201 on each other": ("starred.svg", lambda: svg(*(path(star(201, k)) for k in range(4)))),
-    "a star of 241 points": ("star.svg", lambda: svg(path(star(241)))),
-    "a star of 241 points, WKT": ("star.wkt", lambda: wkt(star(241))),
-    "a comb of 40,000 teeth": ("comb.wkt", lambda: wkt(comb(40_000))),
-    "a comb of 12,000 teeth": ("short.wkt", lambda: wkt(comb(12_000))),
-    "111,000 pillars": ("pillars.pgm", lambda: pgm(pillars(1000))),
-    "7,900 pillars": ("some.pgm", lambda: pgm(pillars(267))),
-    "140 x 140 squares that touch at corners": ("squares.geojson", lambda: geojson(squares(140))),
-    "440 x 440 squares that touch at corners": ("board.geojson", lambda: geojson(squares(440))),
-    "a white picture of 8000 x 8000": ("white.png", lambda: white_png(8000)),
-    "noise on 1000 x 1000 cells, 5 %": ("sparse.pgm", lambda: pgm(noise(1000, 0.05))),
-    "noise on 700 x 700 cells, 40 %": ("dense.pgm", lambda: pgm(noise(700, 0.4))),
-    "rooms on 4000 x 4000 cells": ("rooms.pgm", lambda: rooms(4000)),
-    "rooms on 1200 x 1200 cells": ("flats.pgm", lambda: rooms(1200)),
-    "a wall of 490,000 vertices": ("wavy.wkt", lambda: wkt(wavy(490_000))),
-    "7,900 desks": ("desks.svg", lambda: rectangles(7_900)),
-    "90,000 desks": ("many.svg", lambda: rectangles(90_000)),
-    "7,900 lines, DXF": ("lines.dxf", lambda: lines(7_900)),
-    "49,000 lines, DXF": ("many.dxf", lambda: lines(49_000)),
-    "100,000 lines, DXF": ("more.dxf", lambda: lines(100_000)),
+    "four stars of 201 points": (
+        "stars.svg",
+        lambda: build_svg(*(build_path(build_star(201, 45 * k)) for k in range(4))),
+    ),
+    "four of 201 on each other": (
+        "starred.svg",
+        lambda: build_svg(*(build_path(build_star(201, k)) for k in range(4))),
+    ),
+    "a star of 241 points": ("star.svg", lambda: build_svg(build_path(build_star(241)))),
+    "a star of 241 points, WKT": ("star.wkt", lambda: build_wkt(build_star(241))),
+    "a comb of 40,000 teeth": ("comb.wkt", lambda: build_wkt(build_comb(40_000))),
+    "a comb of 12,000 teeth": ("short.wkt", lambda: build_wkt(build_comb(12_000))),
+    "111,000 pillars": ("pillars.pgm", lambda: build_pgm(build_pillars(1000))),
+    "7,900 pillars": ("some.pgm", lambda: build_pgm(build_pillars(267))),
+    "140 x 140 squares that touch at corners": ("squares.geojson", lambda: build_geojson(build_squares(140))),
+    "440 x 440 squares that touch at corners": ("board.geojson", lambda: build_geojson(build_squares(440))),
+    "a white picture of 8000 x 8000": ("white.png", lambda: build_white_png(8000)),
+    "noise on 1000 x 1000 cells, 5 %": ("sparse.pgm", lambda: build_pgm(build_noise(1000, 0.05))),
+    "noise on 700 x 700 cells, 40 %": ("dense.pgm", lambda: build_pgm(build_noise(700, 0.4))),
+    "rooms on 4000 x 4000 cells": ("rooms.pgm", lambda: build_rooms(4000)),
+    "rooms on 1200 x 1200 cells": ("flats.pgm", lambda: build_rooms(1200)),
+    "a wall of 490,000 vertices": ("wavy.wkt", lambda: build_wkt(build_wavy_room(490_000))),
+    "7,900 desks": ("desks.svg", lambda: build_rectangles(7_900)),
+    "90,000 desks": ("many.svg", lambda: build_rectangles(90_000)),
+    "7,900 lines, DXF": ("lines.dxf", lambda: build_lines(7_900)),
+    "49,000 lines, DXF": ("many.dxf", lambda: build_lines(49_000)),
+    "100,000 lines, DXF": ("more.dxf", lambda: build_lines(100_000)),
 }
 """Name of a case, and its file."""
 
 
-def measured(names: list[str], seconds: float = 300.0) -> Iterator[tuple[str, Cost]]:
+def measure_cases(names: list[str], seconds: float = 300.0) -> Iterator[tuple[str, Cost]]:
     """Yield what each case costs; one that takes longer than so many seconds of a processor is ended."""
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
@@ -217,7 +227,11 @@ def read(place: Path, seconds: float) -> Cost:
 
     # what imports need is the fault of no file
     options = {"wkt": ReadOptions(), "pgm": ReadOptions(cell=1.0), "dxf": ReadOptions(scale=1.0)}
-    small = ("wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0))"), ("pgm", "P2 3 1 1 1 1 1"), ("dxf", lines(2).decode())
+    small = (
+        ("wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0))"),
+        ("pgm", "P2 3 1 1 1 1 1"),
+        ("dxf", build_lines(2).decode()),
+    )
     for suffix, text in small:
         warm = place.with_name(f"warm.{suffix}")
         warm.write_text(text)
@@ -226,7 +240,7 @@ def read(place: Path, seconds: float) -> Cost:
     given = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in kind.options})
     if kind.name == "picture":
         given = ReadOptions(cell=0.1)
-    before = peak()
+    before = read_peak_mb()
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
     began = time.process_time()
     good = False
@@ -238,10 +252,10 @@ def read(place: Path, seconds: float) -> Cost:
         said = f"refused: {str(error).partition(': ')[2]}"
         good = good or (kind.name == "dxf" and " shapes" in said)  # layers are known once ezdxf read it
     spent = time.process_time() - began
-    return Cost(spent, peak() - before, said, good)
+    return Cost(spent, read_peak_mb() - before, said, good)
 
 
-def peak() -> float:
+def read_peak_mb() -> float:
     """Return the most memory that this process has had, in MB; as Linux tells it."""
     status = Path("/proc/self/status").read_text()
     return int(status.partition("VmHWM:")[2].split()[0]) / 1024
@@ -261,7 +275,7 @@ def main() -> int:
         return 0
     print(f"{'CPU s':>7} {'MB':>6}")
     worst = 0.0
-    for name, cost in measured(given.names or list(CASES), given.seconds):
+    for name, cost in measure_cases(given.names or list(CASES), given.seconds):
         print(f"{cost.seconds:7.2f} {cost.megabytes:6.0f}  {name}: {cost.said}", flush=True)
         worst = max(worst, cost.share)
     return int(worst > 1.0)

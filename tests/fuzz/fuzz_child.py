@@ -47,13 +47,13 @@ def answer(job: dict[str, Any]) -> dict[str, Any]:
                 _require_one_line(str(error))
                 found = {"outcome": "refused", "words": str(error)}
     except MemoryError as error:
-        found = _finding("memory", error)
+        found = _build_finding("memory", error)
     except (Exception, SystemExit) as error:
-        found = _finding("error", error)
+        found = _build_finding("error", error)
     return {**found, "seconds": time.process_time() - began}
 
 
-def _finding(kind: str, error: BaseException) -> dict[str, Any]:
+def _build_finding(kind: str, error: BaseException) -> dict[str, Any]:
     """Return a finding, with the place in the project's own code that it comes from."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = [frame for frame in frames if "robocov" in frame.filename] or frames
@@ -105,7 +105,7 @@ def _import(path: Path, job: dict[str, Any]) -> str:
     return _require_map(environment)
 
 
-def _folder(path: Path, job: dict[str, Any]) -> str:
+def _import_folder(path: Path, job: dict[str, Any]) -> str:
     """Import the folder that a file is in, or an archive."""
     return _import(path if path.suffix == ".zip" else path.parent, job)
 
@@ -142,7 +142,7 @@ def _check(path: Path, job: dict[str, Any]) -> str:
     return "valid" if status == 0 else "invalid"
 
 
-def _misbehaving(path: Path, job: dict[str, Any]) -> str:
+def _misbehave(path: Path, job: dict[str, Any]) -> str:
     """Do what a file says: what the harness must find."""
     from robocov.errors import MapError
 
@@ -166,11 +166,11 @@ def _misbehaving(path: Path, job: dict[str, Any]) -> str:
 
 _READ = {
     "import": _import,
-    "folder": _folder,
+    "folder": _import_folder,
     "map": _map,
     "study": _study,
     "check": _check,
-    "misbehaving": _misbehaving,
+    "misbehaving": _misbehave,
 }
 
 

@@ -5,7 +5,7 @@ import re
 import zlib
 from random import Random
 
-from fuzz_seeds import TOKENS, Case, chunk
+from fuzz_seeds import TOKENS, Case, build_chunk
 
 MOST = 200_000
 """Longest input in bytes: long ones are slow, and find nothing that short ones do not."""
@@ -60,69 +60,69 @@ NUMBERS = [
 _NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-def mutated(case: Case, target: str, corpus: list[Case], random: Random) -> Case:
+def mutate(case: Case, target: str, corpus: list[Case], random: Random) -> Case:
     """Return a case with one to a few changes of one of its files."""
     name = random.choice(list(case.files))
     content = case.files[name]
     if name.endswith(".png") and random.random() < 0.7:
-        return case.with_file(name, _picture(content, target, random))
+        return case.with_file(name, _change_picture(content, target, random))
     for _ in range(random.choice((1, 1, 1, 2, 3, 6))):
-        content = _changed(content, name, target, corpus, random)[:MOST]
+        content = _change(content, name, target, corpus, random)[:MOST]
     if name.endswith(".svg") and random.random() < 0.03:
         content = gzip.compress(content)
     return case.with_file(name, content)
 
 
-def _changed(content: bytes, name: str, target: str, corpus: list[Case], random: Random) -> bytes:
+def _change(content: bytes, name: str, target: str, corpus: list[Case], random: Random) -> bytes:
     way = random.choice(_WAYS)
-    if way is _crossed:
+    if way is _cross:
         other = random.choice(corpus)
         beside = other.files.get(name, other.files[other.main])
-        return _crossed(content, beside, random)
-    if way is _spliced:
-        return _spliced(content, random.choice(TOKENS[target]).encode("utf-8", "surrogatepass"), random)
+        return _cross(content, beside, random)
+    if way is _splice:
+        return _splice(content, random.choice(TOKENS[target]).encode("utf-8", "surrogatepass"), random)
     return way(content, random)
 
 
-def _span(content: bytes, random: Random, longest: int = 200) -> tuple[int, int]:
+def _choose_span(content: bytes, random: Random, longest: int = 200) -> tuple[int, int]:
     begin = random.randrange(len(content) + 1)
     return begin, min(begin + random.randrange(1, longest), len(content))
 
 
-def _flipped(content: bytes, random: Random) -> bytes:
+def _flip_bits(content: bytes, random: Random) -> bytes:
     changed = bytearray(content)
     for _ in range(random.choice((1, 1, 2, 8)) if changed else 0):
         changed[random.randrange(len(changed))] ^= 1 << random.randrange(8)
     return bytes(changed)
 
 
-def _overwritten(content: bytes, random: Random) -> bytes:
-    begin, end = _span(content, random, 6)
+def _overwrite(content: bytes, random: Random) -> bytes:
+    begin, end = _choose_span(content, random, 6)
     return content[:begin] + random.randbytes(end - begin) + content[end:]
 
 
 def _cut(content: bytes, random: Random) -> bytes:
-    begin, end = _span(content, random)
+    begin, end = _choose_span(content, random)
     return content[:begin] + content[end:]
 
 
-def _ended(content: bytes, random: Random) -> bytes:
+def _truncate(content: bytes, random: Random) -> bytes:
     return content[: random.randrange(len(content) + 1)]
 
 
-def _repeated(content: bytes, random: Random) -> bytes:
-    begin, end = _span(content, random, 60)
+def _repeat(content: bytes, random: Random) -> bytes:
+    begin, end = _choose_span(content, random, 60)
     return content[:end] + content[begin:end] * random.choice((1, 1, 2, 10, 300)) + content[end:]
 
 
-def _moved(content: bytes, random: Random) -> bytes:
-    begin, end = _span(content, random)
+def _move(content: bytes, random: Random) -> bytes:
+    begin, end = _choose_span(content, random)
     rest = content[:begin] + content[end:]
     at = random.randrange(len(rest) + 1)
     return rest[:at] + content[begin:end] + rest[at:]
 
 
-def _number(content: bytes, random: Random) -> bytes:
+def _replace_number(content: bytes, random: Random) -> bytes:
     found = list(_NUMBER.finditer(content))
     if not found:
         return content
@@ -135,7 +135,7 @@ def _number(content: bytes, random: Random) -> bytes:
     return content[: number.start()] + new + content[number.end() :]
 
 
-def _same_number(content: bytes, random: Random) -> bytes:
+def _copy_number(content: bytes, random: Random) -> bytes:
     """Put one number in the place of another: what coincides is where geometry is hard."""
     found = list(_NUMBER.finditer(content))
     if len(found) < 2:
@@ -144,7 +144,7 @@ def _same_number(content: bytes, random: Random) -> bytes:
     return content[: one.start()] + other[0] + content[one.end() :]
 
 
-def _line(content: bytes, random: Random) -> bytes:
+def _change_line(content: bytes, random: Random) -> bytes:
     lines = content.split(b"\n")
     at = random.randrange(len(lines))
     if random.random() < 0.5:
@@ -154,7 +154,7 @@ def _line(content: bytes, random: Random) -> bytes:
     return b"\n".join(lines)
 
 
-def _encoded(content: bytes, random: Random) -> bytes:
+def _change_encoding(content: bytes, random: Random) -> bytes:
     text = content.decode("latin-1")
     return random.choice(
         (
@@ -170,36 +170,46 @@ def _encoded(content: bytes, random: Random) -> bytes:
     )
 
 
-def _crossed(content: bytes, other: bytes, random: Random) -> bytes:
-    begin, end = _span(other, random)
-    at, until = _span(content, random)
+def _cross(content: bytes, other: bytes, random: Random) -> bytes:
+    begin, end = _choose_span(other, random)
+    at, until = _choose_span(content, random)
     return content[:at] + other[begin:end] + content[until if random.random() < 0.5 else at :]
 
 
-def _spliced(content: bytes, token: bytes, random: Random) -> bytes:
+def _splice(content: bytes, token: bytes, random: Random) -> bytes:
     at = random.randrange(len(content) + 1)
     return content[:at] + token * random.choice((1, 1, 1, 1, 2, 1000)) + content[at:]
 
 
 _WAYS = (
-    *(_flipped, _overwritten, _cut, _ended, _repeated, _moved, _line, _encoded),
-    *(_number, _number, _number, _same_number, _crossed, _crossed, _spliced, _spliced, _spliced),
+    *(_flip_bits, _overwrite, _cut, _truncate, _repeat, _move, _change_line, _change_encoding),
+    *(
+        _replace_number,
+        _replace_number,
+        _replace_number,
+        _copy_number,
+        _cross,
+        _cross,
+        _splice,
+        _splice,
+        _splice,
+    ),
 )
 
 
-def _picture(content: bytes, target: str, random: Random) -> bytes:
+def _change_picture(content: bytes, target: str, random: Random) -> bytes:
     """Change a PNG between its check sums, and put them right: else nothing behind them is reached."""
-    found = _chunks(content)
+    found = _split_chunks(content)
     if not found:
-        return _flipped(content, random)
+        return _flip_bits(content, random)
     at = random.randrange(len(found))
     kind, data = found[at]
     way = random.random()
     if kind == b"IDAT" and way < 0.7:
         try:
-            data = zlib.compress(_changed_plain(zlib.decompress(data), random))
+            data = zlib.compress(_change_plain(zlib.decompress(data), random))
         except zlib.error:
-            data = _flipped(data, random)
+            data = _flip_bits(data, random)
     elif kind == b"IHDR" and way < 0.9:
         number = random.choice((0, 1, 2, 3, 12, 24, 25, 65_535, 10**6, 2**31 - 1, 2**31, 2**32 - 1)).to_bytes(
             4, "big"
@@ -211,7 +221,7 @@ def _picture(content: bytes, target: str, random: Random) -> bytes:
                 [random.choice((1, 2, 4, 8, 16, 3)), random.randrange(8), *random.choices((0, 1), k=3)]
             )
     elif way < 0.8:
-        data = _changed_plain(data, random)
+        data = _change_plain(data, random)
     elif way < 0.9:
         kind = random.choice(
             (b"PLTE", b"tRNS", b"IDAT", b"iCCP", b"zTXt", b"gAMA", b"acTL", b"fcTL", b"IEND")
@@ -219,19 +229,19 @@ def _picture(content: bytes, target: str, random: Random) -> bytes:
         found.insert(
             random.randrange(len(found) + 1), (kind, zlib.compress(bytes(random.choice((3, 768, 10**6)))))
         )
-        return _joined(found)
+        return _join_chunks(found)
     else:
         found.pop(at)
-        return _joined(found)
+        return _join_chunks(found)
     found[at] = kind, data
-    return _joined(found)
+    return _join_chunks(found)
 
 
-def _changed_plain(content: bytes, random: Random) -> bytes:
-    return random.choice((_flipped, _overwritten, _cut, _ended, _repeated, _moved))(content, random)[:MOST]
+def _change_plain(content: bytes, random: Random) -> bytes:
+    return random.choice((_flip_bits, _overwrite, _cut, _truncate, _repeat, _move))(content, random)[:MOST]
 
 
-def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
+def _split_chunks(content: bytes) -> list[tuple[bytes, bytes]]:
     found = []
     at = 8
     while at + 12 <= len(content):
@@ -241,5 +251,5 @@ def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
     return found
 
 
-def _joined(chunks: list[tuple[bytes, bytes]]) -> bytes:
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(kind, data) for kind, data in chunks)
+def _join_chunks(chunks: list[tuple[bytes, bytes]]) -> bytes:
+    return b"\x89PNG\r\n\x1a\n" + b"".join(build_chunk(kind, data) for kind, data in chunks)

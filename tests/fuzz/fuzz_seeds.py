@@ -125,7 +125,7 @@ _DXF = [
 # fmt: on
 
 
-def png(rows: list[list[int]], depth: int = 8) -> bytes:
+def build_png(rows: list[list[int]], depth: int = 8) -> bytes:
     """Return a gray picture of one channel as PNG."""
     width = len(rows[0])
     height = len(rows)
@@ -133,15 +133,15 @@ def png(rows: list[list[int]], depth: int = 8) -> bytes:
     raw = b"".join(b"\0" + struct.pack(f">{width}{size}", *row) for row in rows)
     header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)
     chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(kind, data) for kind, data in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(build_chunk(kind, data) for kind, data in chunks)
 
 
-def chunk(kind: bytes, data: bytes) -> bytes:
+def build_chunk(kind: bytes, data: bytes) -> bytes:
     """Return a chunk of a PNG."""
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def pgm(rows: list[list[int]], *, text: bool = False) -> bytes:
+def build_pgm(rows: list[list[int]], *, text: bool = False) -> bytes:
     """Return a gray picture as PGM."""
     head = f"{'P2' if text else 'P5'}\n# a comment\n{len(rows[0])} {len(rows)}\n255\n".encode()
     if text:
@@ -182,11 +182,11 @@ class Case:
         return Case({**self.files, name: content})
 
 
-def _one(name: str, *contents: str | bytes) -> list[Case]:
+def _build_cases(name: str, *contents: str | bytes) -> list[Case]:
     return [Case({name: text.encode() if isinstance(text, str) else text}) for text in contents]
 
 
-def _rgba() -> bytes:
+def _build_rgba() -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
@@ -197,7 +197,7 @@ def _rgba() -> bytes:
     return file.getvalue()
 
 
-def _floats() -> bytes:
+def _build_float_tiff() -> bytes:
     """Return a TIFF of floating-point samples, one of which is none."""
     import numpy as np
     from PIL import Image
@@ -209,7 +209,7 @@ def _floats() -> bytes:
     return file.getvalue()
 
 
-def _saved(kind: str, **options: Any) -> bytes:
+def _save_picture(kind: str, **options: Any) -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
@@ -253,7 +253,7 @@ INDOOR = """\
 """
 
 
-def _elements() -> list[dict[str, Any]]:
+def _build_elements() -> list[dict[str, Any]]:
     """Return a building, whose way has nodes and places, a wall, and a relation that holds its way."""
     places = [
         {"lat": 48.0 + y * 1e-4, "lon": 11.0 + x * 1e-4} for x, y in ((0, 0), (2, 0), (2, 1), (0, 1), (0, 0))
@@ -277,12 +277,12 @@ OVERPASS: dict[str, Any] = {
     "version": 0.6,
     "generator": "Overpass API",
     "bounds": {"minlat": 47.9999, "minlon": 10.9999, "maxlat": 48.0003, "maxlon": 11.0004},
-    "elements": _elements(),
+    "elements": _build_elements(),
     "remark": "runtime error: none",
 }
 
 
-def _feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+def _build_feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "properties": properties, "geometry": geometry}
 
@@ -293,11 +293,11 @@ _HOLE = [[2, 2], [2, 4], [4, 4], [4, 2], [2, 2]]
 GEOJSON = {
     "type": "FeatureCollection",
     "features": [
-        _feature("Polygon", [_SQUARE, _HOLE], name="boundary"),
-        _feature("MultiPolygon", [[[[7, 1], [8, 1], [8, 2], [7, 1]]]], name="desk"),
-        _feature("LineString", [[5, 0], [5, 2.5], [6, 3]], name="wall"),
-        _feature("MultiLineString", [[[1, 5], [2, 5]], [[3, 5], [4, 5.5]]]),
-        _feature("Point", [8, 4], name="pillar"),
+        _build_feature("Polygon", [_SQUARE, _HOLE], name="boundary"),
+        _build_feature("MultiPolygon", [[[[7, 1], [8, 1], [8, 2], [7, 1]]]], name="desk"),
+        _build_feature("LineString", [[5, 0], [5, 2.5], [6, 3]], name="wall"),
+        _build_feature("MultiLineString", [[[1, 5], [2, 5]], [[3, 5], [4, 5.5]]]),
+        _build_feature("Point", [8, 4], name="pillar"),
         {"type": "Feature", "properties": None, "geometry": None},
     ],
 }
@@ -423,7 +423,7 @@ MORE = """\
 _TILES = struct.pack("<12I", *(0, 0, 0, 1) * 3)
 
 
-def _indoor_feature(kind: str, geometry: Any, number: str = "1", **properties: Any) -> dict[str, Any]:
+def _build_indoor_feature(kind: str, geometry: Any, number: str = "1", **properties: Any) -> dict[str, Any]:
     return {
         "type": "Feature",
         "id": number,
@@ -433,7 +433,7 @@ def _indoor_feature(kind: str, geometry: Any, number: str = "1", **properties: A
     }
 
 
-def _indoor_area(*sides: float) -> dict[str, Any]:
+def _build_indoor_area(*sides: float) -> dict[str, Any]:
     x, y, right, top = (side * 1e-5 for side in sides)
     ring = [(x, y), (right, y), (right, top), (x, top), (x, y)]
     return {"type": "Polygon", "coordinates": [[[8.4 + a, 49.0 + b] for a, b in ring]]}
@@ -442,24 +442,28 @@ def _indoor_area(*sides: float) -> dict[str, Any]:
 _OPENING = {"type": "LineString", "coordinates": [[8.40001, 49.0001], [8.40003, 49.0001]]}
 IMDF: dict[str, list[dict[str, Any]]] = {
     "level": [
-        _indoor_feature("level", _indoor_area(0, 0, 20, 30), "a", ordinal=0, short_name={"en": "G"}),
-        _indoor_feature("level", None, "b", ordinal=1, name={"en": "First"}),
+        _build_indoor_feature(
+            "level", _build_indoor_area(0, 0, 20, 30), "a", ordinal=0, short_name={"en": "G"}
+        ),
+        _build_indoor_feature("level", None, "b", ordinal=1, name={"en": "First"}),
     ],
     "unit": [
-        _indoor_feature("unit", _indoor_area(0, 0, 20, 10), category="walkway", level_id="a"),
-        _indoor_feature(
-            "unit", _indoor_area(0, 10, 10, 30), category="office", level_id="a", name={"en": "A"}
+        _build_indoor_feature("unit", _build_indoor_area(0, 0, 20, 10), category="walkway", level_id="a"),
+        _build_indoor_feature(
+            "unit", _build_indoor_area(0, 10, 10, 30), category="office", level_id="a", name={"en": "A"}
         ),
-        _indoor_feature("unit", _indoor_area(10, 10, 20, 30), category="stairs", level_id="a"),
-        _indoor_feature("unit", _indoor_area(0, 0, 9, 9), category="room", level_id="b"),
+        _build_indoor_feature("unit", _build_indoor_area(10, 10, 20, 30), category="stairs", level_id="a"),
+        _build_indoor_feature("unit", _build_indoor_area(0, 0, 9, 9), category="room", level_id="b"),
     ],
-    "opening": [_indoor_feature("opening", _OPENING, category="pedestrian", level_id="a")],
-    "fixture": [_indoor_feature("fixture", _indoor_area(2, 2, 4, 4), category="desk", level_id="a")],
-    "venue": [_indoor_feature("venue", None, name={"en": "Mill"})],
+    "opening": [_build_indoor_feature("opening", _OPENING, category="pedestrian", level_id="a")],
+    "fixture": [
+        _build_indoor_feature("fixture", _build_indoor_area(2, 2, 4, 4), category="desk", level_id="a")
+    ],
+    "venue": [_build_indoor_feature("venue", None, name={"en": "Mill"})],
 }
 
 
-def imdf_files(given: dict[str, Any]) -> dict[str, bytes]:
+def build_imdf_files(given: dict[str, Any]) -> dict[str, bytes]:
     """Return the files of an archive."""
     return {
         f"{name}.geojson": json.dumps({"type": "FeatureCollection", "features": features}).encode()
@@ -467,18 +471,18 @@ def imdf_files(given: dict[str, Any]) -> dict[str, bytes]:
     }
 
 
-def imdf_zip(given: dict[str, Any]) -> bytes:
+def build_imdf_zip(given: dict[str, Any]) -> bytes:
     """Return an archive as a zip, some of it packed."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
-        for k, (name, content) in enumerate(imdf_files(given).items()):
+        for k, (name, content) in enumerate(build_imdf_files(given).items()):
             entry = zipfile.ZipInfo(name)
             entry.compress_type = zipfile.ZIP_DEFLATED if k % 2 else zipfile.ZIP_STORED
             archive.writestr(entry, content)
     return file.getvalue()
 
 
-def _sequence(separator: bytes) -> bytes:
+def _build_sequence(separator: bytes) -> bytes:
     lines = [json.dumps(feature).encode() for feature in GEOJSON["features"]]
     return b"".join(separator + line + b"\n" for line in lines)
 
@@ -496,27 +500,34 @@ robot: [{state: *state}, {<<: [*world], state: [2, 2, 0]}]
 """
 
 SEEDS: dict[str, list[Case]] = {
-    "map": _one("map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})),
-    "check": _one("map.json", json.dumps(MAP, indent=1)),
-    "study": _one("study.toml", STUDY, 'maps = "*"\ncontrollers = ["rpf"]\n'),
-    "movingai": _one("plan.map", f"type octile\nheight 9\nwidth 12\nmap\n{PLAN}\n"),
+    "map": _build_cases(
+        "map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})
+    ),
+    "check": _build_cases("map.json", json.dumps(MAP, indent=1)),
+    "study": _build_cases("study.toml", STUDY, 'maps = "*"\ncontrollers = ["rpf"]\n'),
+    "movingai": _build_cases("plan.map", f"type octile\nheight 9\nwidth 12\nmap\n{PLAN}\n"),
     "picture": [
-        *_one("plan.png", png(GRAY), png([[257 * value for value in row] for row in GRAY], 16), _rgba()),
-        *_one("plan.pgm", pgm(GRAY), pgm(GRAY, text=True)),
-        *_one("plan.jpg", _saved("JPEG"), _saved("JPEG", progressive=True)),
-        *_one("plan.bmp", _saved("BMP"), _saved("PPM")),
-        *_one(
+        *_build_cases(
+            "plan.png",
+            build_png(GRAY),
+            build_png([[257 * value for value in row] for row in GRAY], 16),
+            _build_rgba(),
+        ),
+        *_build_cases("plan.pgm", build_pgm(GRAY), build_pgm(GRAY, text=True)),
+        *_build_cases("plan.jpg", _save_picture("JPEG"), _save_picture("JPEG", progressive=True)),
+        *_build_cases("plan.bmp", _save_picture("BMP"), _save_picture("PPM")),
+        *_build_cases(
             "plan.tif",
-            _saved("TIFF"),
-            _floats(),
-            *(_saved("TIFF", compression=f"tiff_{way}") for way in ("lzw", "deflate")),
+            _save_picture("TIFF"),
+            _build_float_tiff(),
+            *(_save_picture("TIFF", compression=f"tiff_{way}") for way in ("lzw", "deflate")),
         ),
     ],
     "ros": [
-        Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": pgm(GRAY)}),
-        Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": png(GRAY)}),
+        Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": build_pgm(GRAY)}),
+        Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": build_png(GRAY)}),
     ],
-    "houseexpo": _one(
+    "houseexpo": _build_cases(
         "plan.json",
         json.dumps(
             {
@@ -528,34 +539,39 @@ SEEDS: dict[str, list[Case]] = {
             }
         ),
     ),
-    "rings": _one(
+    "rings": _build_cases(
         "plan.json",
         json.dumps([_SQUARE, _HOLE]),
         json.dumps([[_SQUARE, _HOLE]]),
         json.dumps({"vertices": [0, 0, 10, 0, 10, 6, 0, 6, 2, 2, 2, 4, 4, 4], "holes": [4], "dimensions": 2}),
     ),
-    "wkt": _one("plan.wkt", *WKT),
+    "wkt": _build_cases("plan.wkt", *WKT),
     "geojson": [
-        *_one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES), _sequence(b"\x1e")),
-        *_one("plan.geojsonl", _sequence(b"")),
+        *_build_cases(
+            "plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES), _build_sequence(b"\x1e")
+        ),
+        *_build_cases("plan.geojsonl", _build_sequence(b"")),
     ],
-    "imdf": [Case(imdf_files(IMDF)), Case({"venue.zip": imdf_zip(IMDF)})],
-    "svg": _one("plan.svg", SVG, COLORED),
-    "osm": [*_one("plan.osm", OSM, INDOOR), *_one("plan.json", json.dumps(OVERPASS, indent=1))],
-    "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
+    "imdf": [Case(build_imdf_files(IMDF)), Case({"venue.zip": build_imdf_zip(IMDF)})],
+    "svg": _build_cases("plan.svg", SVG, COLORED),
+    "osm": [
+        *_build_cases("plan.osm", OSM, INDOOR),
+        *_build_cases("plan.json", json.dumps(OVERPASS, indent=1)),
+    ],
+    "dxf": _build_cases("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
     "stage": [
-        Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": png(GRAY)}),
+        Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": build_png(GRAY)}),
         Case({"hall.world": (THINGS + "table ( ) table ( pose [4 2 0 0] )").encode()}),
     ],
-    "argos": _one("arena.argos", ARGOS),
+    "argos": _build_cases("arena.argos", ARGOS),
     "irsim": [
-        *_one("world.yaml", IRSIM, ANCHORS),
+        *_build_cases("world.yaml", IRSIM, ANCHORS),
         Case(
             {
                 "world.yaml": IRSIM.replace(
                     "step_time: 0.1", "obstacle_map: map.png\n  mdownsample: 2"
                 ).encode(),
-                "map.png": png(GRAY),
+                "map.png": build_png(GRAY),
             }
         ),
     ],

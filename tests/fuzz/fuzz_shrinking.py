@@ -8,7 +8,7 @@ from collections.abc import Callable
 from fuzz_seeds import Case
 
 
-def shrunk(case: Case, fails: Callable[[Case], bool], seconds: float) -> Case:
+def shrink(case: Case, fails: Callable[[Case], bool], seconds: float) -> Case:
     """Return a case that still fails, with less in its files: lines, then parts of lines, go.
 
     Parameters
@@ -21,20 +21,20 @@ def shrunk(case: Case, fails: Callable[[Case], bool], seconds: float) -> Case:
     """
     deadline = time.monotonic() + seconds
     for name in case.files:
-        for split in (_lines, _bytes):
-            case = _less(case, name, split, fails, deadline)
+        for split in (_split_lines, _split_bytes):
+            case = _shrink_file(case, name, split, fails, deadline)
     return case
 
 
-def _lines(content: bytes) -> list[bytes]:
+def _split_lines(content: bytes) -> list[bytes]:
     return content.splitlines(keepends=True)
 
 
-def _bytes(content: bytes) -> list[bytes]:
+def _split_bytes(content: bytes) -> list[bytes]:
     return [content[k : k + 1] for k in range(len(content))]
 
 
-def _less(
+def _shrink_file(
     case: Case,
     name: str,
     split: Callable[[bytes], list[bytes]],

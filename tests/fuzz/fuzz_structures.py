@@ -4,7 +4,7 @@ import copy
 import json
 from typing import Any
 
-from fuzz_seeds import DEGREES, GEOJSON, IMDF, MAP, OVERPASS, Case, imdf_files
+from fuzz_seeds import DEGREES, GEOJSON, IMDF, MAP, OVERPASS, Case, build_imdf_files
 from hypothesis import strategies as st
 
 _WHOLE = st.integers(-3, 12)
@@ -51,11 +51,11 @@ _BOX = st.tuples(_WHOLE, _WHOLE, st.integers(1, 8), st.integers(1, 8)).map(
 _AREA = st.lists(_BOX | _RING, min_size=1, max_size=4)
 
 
-def _places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+def _list_places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     found = [path] if path else []
     steps = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
     for step in steps:
-        found += _places(value[step], (*path, step))
+        found += _list_places(value[step], (*path, step))
     return found
 
 
@@ -64,7 +64,7 @@ def _altered(draw: st.DrawFn, document: Any, values: st.SearchStrategy[Any]) -> 
     """Draw a document with some values replaced, removed or added."""
     document = copy.deepcopy(document)
     for _ in range(draw(st.integers(1, 4))):
-        places = _places(document)
+        places = _list_places(document)
         if not places:
             break
         *parent, last = draw(st.sampled_from(places))
@@ -85,7 +85,7 @@ def _altered(draw: st.DrawFn, document: Any, values: st.SearchStrategy[Any]) -> 
     return document
 
 
-def _json(document: Any) -> bytes:
+def _dump_json(document: Any) -> bytes:
     return json.dumps(document).encode("utf-8", "surrogatepass")
 
 
@@ -165,20 +165,22 @@ _FEATURES = st.fixed_dictionaries(
 )
 
 
-def _wkt_numbers(points: list[Any], more: str = "") -> str:
+def _format_wkt_points(points: list[Any], more: str = "") -> str:
     return "(" + ", ".join(f"{x} {y}{more}" for x, y in points) + ")"
 
 
-def _wkt_area(rings: list[Any]) -> str:
-    return "(" + ", ".join(_wkt_numbers([*ring, *ring[:1]]) for ring in rings) + ")"
+def _format_wkt_area(rings: list[Any]) -> str:
+    return "(" + ", ".join(_format_wkt_points([*ring, *ring[:1]]) for ring in rings) + ")"
 
 
 _WKT = st.recursive(
     st.one_of(
-        _AREA.map(lambda rings: f"POLYGON {_wkt_area(rings)}"),
-        st.lists(_AREA, max_size=3).map(lambda areas: f"MULTIPOLYGON ({', '.join(map(_wkt_area, areas))})"),
-        st.lists(_POINT, max_size=4).map(lambda points: f"LINESTRING {_wkt_numbers(points)}"),
-        st.lists(_NEAR, max_size=3).map(lambda points: f"MULTIPOINT Z {_wkt_numbers(points, ' 5')}"),
+        _AREA.map(lambda rings: f"POLYGON {_format_wkt_area(rings)}"),
+        st.lists(_AREA, max_size=3).map(
+            lambda areas: f"MULTIPOLYGON ({', '.join(map(_format_wkt_area, areas))})"
+        ),
+        st.lists(_POINT, max_size=4).map(lambda points: f"LINESTRING {_format_wkt_points(points)}"),
+        st.lists(_NEAR, max_size=3).map(lambda points: f"MULTIPOINT Z {_format_wkt_points(points, ' 5')}"),
         st.sampled_from(
             [
                 "POINT EMPTY",
@@ -270,7 +272,7 @@ _ENTITY = st.tuples(
 # fmt: on
 
 
-def _dxf(parts: tuple[list[Any], list[Any]]) -> str:
+def _format_dxf(parts: tuple[list[Any], list[Any]]) -> str:
     block, entities = parts
     groups: list[tuple[int, Any]] = [
         (0, "SECTION"),
@@ -297,11 +299,13 @@ _SETTING = st.one_of(
 )
 
 
-def _toml(value: Any) -> str:
+def _format_toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items()) + "}"
+        return (
+            "{" + ", ".join(f"{json.dumps(key)} = {_format_toml(item)}" for key, item in value.items()) + "}"
+        )
     if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return "[" + ", ".join(map(_format_toml, value)) + "]"
     return json.dumps(value) if value is not None else '""'
 
 
@@ -311,14 +315,14 @@ _KEYS = ["maps", "controllers", "robots", "starts", "seeds", "duration", "dt", "
 # fmt: on
 _STUDY = st.dictionaries(st.sampled_from(_KEYS), _SETTING, max_size=5).map(
     lambda settings: (
-        "".join(f"{key} = {_toml(value)}\n" for key, value in settings.items())
+        "".join(f"{key} = {_format_toml(value)}\n" for key, value in settings.items())
         + ('maps = ["square"]\n' if "maps" not in settings else "")
         + ('controllers = ["rapf"]\n' if "controllers" not in settings else "")
     )
 )
 
 
-def _case(name: str, texts: st.SearchStrategy[Any]) -> st.SearchStrategy[Case]:
+def _build_case(name: str, texts: st.SearchStrategy[Any]) -> st.SearchStrategy[Case]:
     return texts.map(
         lambda text: Case({name: text if isinstance(text, bytes) else text.encode("utf-8", "replace")})
     )
@@ -357,13 +361,13 @@ def _overpass(draw: st.DrawFn) -> dict[str, Any]:
 def _venue(draw: st.DrawFn) -> dict[str, Any]:
     """Draw units on a small grid with openings anywhere."""
 
-    def geometry(kind: str, points: Any) -> dict[str, Any]:
+    def build_geometry(kind: str, points: Any) -> dict[str, Any]:
         return {"type": kind, "coordinates": points}
 
-    def degrees(points: Any) -> Any:
+    def convert_to_degrees(points: Any) -> Any:
         return [[8.4 + x * 1e-5, 49.0 + y * 1e-5] for x, y in points]
 
-    def features(kind: str, geometries: list[Any]) -> list[Any]:
+    def build_features(kind: str, geometries: list[Any]) -> list[Any]:
         categories = st.sampled_from(["walkway", "office", "stairs", "column", "room", "lobby"])
         return [
             {
@@ -376,45 +380,50 @@ def _venue(draw: st.DrawFn) -> dict[str, Any]:
         ]
 
     rings = [
-        degrees([*ring, *ring[:1]]) for ring in draw(st.lists(_BOX | st.lists(_NEAR, min_size=1), max_size=5))
+        convert_to_degrees([*ring, *ring[:1]])
+        for ring in draw(st.lists(_BOX | st.lists(_NEAR, min_size=1), max_size=5))
     ]
-    lines = [degrees(line) for line in draw(st.lists(st.lists(_NEAR, min_size=2, max_size=3), max_size=3))]
+    lines = [
+        convert_to_degrees(line)
+        for line in draw(st.lists(st.lists(_NEAR, min_size=2, max_size=3), max_size=3))
+    ]
     level = {"type": "Feature", "id": "a", "geometry": None, "properties": {"ordinal": 0}}
     return {
         "level": [level],
-        "unit": features("unit", [geometry("Polygon", [ring]) for ring in rings]),
-        "opening": features("opening", [geometry("LineString", line) for line in lines]),
-        "fixture": features("fixture", [geometry("Polygon", [ring]) for ring in rings[:1]]),
+        "unit": build_features("unit", [build_geometry("Polygon", [ring]) for ring in rings]),
+        "opening": build_features("opening", [build_geometry("LineString", line) for line in lines]),
+        "fixture": build_features("fixture", [build_geometry("Polygon", [ring]) for ring in rings[:1]]),
     }
 
 
-def _archive(given: dict[str, Any]) -> Case:
+def _build_archive(given: dict[str, Any]) -> Case:
     """Return the files that IMDF knows of an altered archive."""
     known = {name: given[name] for name in IMDF if name in given}
-    return Case(imdf_files(known) or {"unit.geojson": b""})
+    return Case(build_imdf_files(known) or {"unit.geojson": b""})
 
 
 STRUCTURES: dict[str, st.SearchStrategy[Case]] = {
-    "map": _case("map.json", _MAP.map(_json)),
-    "check": _case("map.json", _MAP.map(_json)),
-    "study": _case("study.toml", _STUDY),
-    "movingai": _case("plan.map", _GRID),
-    "houseexpo": _case(
-        "plan.json", st.fixed_dictionaries({"verts": _RING | _BOX, "id": _JUNK, "room_num": _JUNK}).map(_json)
+    "map": _build_case("map.json", _MAP.map(_dump_json)),
+    "check": _build_case("map.json", _MAP.map(_dump_json)),
+    "study": _build_case("study.toml", _STUDY),
+    "movingai": _build_case("plan.map", _GRID),
+    "houseexpo": _build_case(
+        "plan.json",
+        st.fixed_dictionaries({"verts": _RING | _BOX, "id": _JUNK, "room_num": _JUNK}).map(_dump_json),
     ),
-    "rings": _case("plan.json", (_AREA | st.lists(_AREA, max_size=3) | _RING).map(_json)),
-    "wkt": _case("plan.wkt", _WKT),
-    "geojson": _case(
+    "rings": _build_case("plan.json", (_AREA | st.lists(_AREA, max_size=3) | _RING).map(_dump_json)),
+    "wkt": _build_case("plan.wkt", _WKT),
+    "geojson": _build_case(
         "plan.geojson",
         (_FEATURES | _geometry() | _altered(GEOJSON, _JUNK | _RING) | _altered(DEGREES, _JUNK | _RING)).map(
-            _json
+            _dump_json
         ),
     ),
-    "osm": _case("plan.json", (_overpass() | _altered(OVERPASS, _JUNK)).map(_json)),
-    "imdf": (_venue() | _altered(IMDF, _JUNK)).map(_archive),
-    "svg": _case("plan.svg", _SVG),
-    "dxf": _case(
-        "plan.dxf", st.tuples(st.lists(_ENTITY, max_size=2), st.lists(_ENTITY, max_size=6)).map(_dxf)
+    "osm": _build_case("plan.json", (_overpass() | _altered(OVERPASS, _JUNK)).map(_dump_json)),
+    "imdf": (_venue() | _altered(IMDF, _JUNK)).map(_build_archive),
+    "svg": _build_case("plan.svg", _SVG),
+    "dxf": _build_case(
+        "plan.dxf", st.tuples(st.lists(_ENTITY, max_size=2), st.lists(_ENTITY, max_size=6)).map(_format_dxf)
     ),
 }
 """For each target, where a rule makes more of it than changes do."""

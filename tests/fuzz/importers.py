@@ -22,10 +22,10 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from fuzz_mutations import mutated
+from fuzz_mutations import mutate
 from fuzz_reading import SECONDS, Job, Outcome, Reader
 from fuzz_seeds import SEEDS, Case
-from fuzz_shrinking import shrunk
+from fuzz_shrinking import shrink
 
 MOST_KEPT = 300
 """Cases that are kept to make others from, of those that were read, and of those that were refused."""
@@ -78,14 +78,14 @@ _MOSTLY = {"picture": "cell", "svg": "scale"}
 """Options without which the seeds would be refused."""
 
 
-def targets() -> list[str]:
+def list_targets() -> list[str]:
     """Return what can be fuzzed: every importer, and what the project's own formats are read by."""
     from robocov_app.formats import IMPORTERS
 
     return ["map", "study", "check", *IMPORTERS]
 
 
-def usual_job(target: str) -> Job:
+def build_usual_job(target: str) -> Job:
     """Return how the seeds of a target are read."""
     if target in ("map", "study", "check"):
         return Job(target)
@@ -94,7 +94,7 @@ def usual_job(target: str) -> Job:
     return Job("import", target, {_MOSTLY[target]: 0.5} if target in _MOSTLY else {})
 
 
-def drawn_job(target: str, random: Random) -> Job:
+def draw_job(target: str, random: Random) -> Job:
     """Return how a case of a target is read; options are the usual ones mostly."""
     if target in ("map", "study"):
         return Job(target)
@@ -193,11 +193,15 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
     random = Random(f"{target} {seed}")
     corpus = Corpus([*SEEDS[target]])
     for case in SEEDS[target]:
-        tally.note(case, usual_job(target), reader.read(case, usual_job(target)))
+        tally.note(case, build_usual_job(target), reader.read(case, build_usual_job(target)))
     number = 0
     while not enough(tally):
-        for case in _structured(target, seed + number) if number % 2 else _changed(target, corpus, random):
-            job = drawn_job(target, random)
+        for case in (
+            _generate_structured(target, seed + number)
+            if number % 2
+            else _generate_mutated(target, corpus, random)
+        ):
+            job = draw_job(target, random)
             outcome = reader.read(case, job)
             if tally.note(case, job, outcome):
                 corpus.keep(case, outcome, random)
@@ -207,12 +211,12 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
     return tally
 
 
-def _changed(target: str, corpus: Corpus, random: Random) -> Iterator[Case]:
+def _generate_mutated(target: str, corpus: Corpus, random: Random) -> Iterator[Case]:
     for _ in range(_BATCH):
-        yield mutated(corpus.drawn(random), target, corpus.read, random)
+        yield mutate(corpus.drawn(random), target, corpus.read, random)
 
 
-def _structured(target: str, seed: int) -> list[Case]:
+def _generate_structured(target: str, seed: int) -> list[Case]:
     """Return cases made by rule, none where there is no rule."""
     import hypothesis
     from fuzz_structures import STRUCTURES
@@ -248,7 +252,7 @@ def save(folder: Path, target: str, case: Case, job: Job, outcome: Outcome) -> P
     return place
 
 
-def saved(place: Path) -> tuple[Case, Job]:
+def read_saved(place: Path) -> tuple[Case, Job]:
     """Return a finding that was saved."""
     how = json.loads((place / "finding.json").read_text())
     return Case({name: (place / name).read_bytes() for name in how["files"]}), Job(**how["job"])
@@ -274,7 +278,7 @@ def main(words: list[str] | None = None) -> int:
         "--seconds", type=float, default=SECONDS, help=f"of a processor for a case ({SECONDS:g})"
     )
     given = parser.parse_args(words)
-    known = targets()
+    known = list_targets()
     for name in given.formats:
         if name not in known:
             parser.error(f"unknown format {name!r} (known: {', '.join(known)})")
@@ -282,7 +286,7 @@ def main(words: list[str] | None = None) -> int:
     found = 0
     with Reader(given.seconds) as reader:
         for place in given.again or ():
-            outcome = reader.read(*saved(place))
+            outcome = reader.read(*read_saved(place))
             print(f"{outcome.outcome:<8} {place}\n    {outcome.words.partition(chr(10))[0]}", flush=True)
             found += not outcome.good
         if given.again:
@@ -292,24 +296,24 @@ def main(words: list[str] | None = None) -> int:
                 print(f"{target:<10} has no seeds", flush=True)
                 found += 1
                 continue
-            tally = _fuzzed(target, reader, given.seed, 60.0 * given.minutes)
+            tally = _fuzz_for(target, reader, given.seed, 60.0 * given.minutes)
             print(f"{tally}  (seed {given.seed})", flush=True)
             for case, job, outcome in tally.findings.values():
-                small = _shrunk(case, job, outcome, reader)
+                small = _shrink(case, job, outcome, reader)
                 place = save(given.out, target, small, job, outcome)
                 print(f"  {outcome.outcome}: {outcome.words.partition(chr(10))[0]}\n    {place}", flush=True)
                 found += 1
     return 1 if found else 0
 
 
-def _shrunk(case: Case, job: Job, outcome: Outcome, reader: Reader) -> Case:
+def _shrink(case: Case, job: Job, outcome: Outcome, reader: Reader) -> Case:
     def fails(smaller: Case) -> bool:
         return reader.read(smaller, job).signature == outcome.signature
 
-    return shrunk(case, fails, 30.0)
+    return shrink(case, fails, 30.0)
 
 
-def _fuzzed(target: str, reader: Reader, seed: int, seconds: float) -> Tally:
+def _fuzz_for(target: str, reader: Reader, seed: int, seconds: float) -> Tally:
     deadline = time.monotonic() + seconds
     return fuzz(target, reader, seed, lambda _: time.monotonic() > deadline)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from bombs import BOMBS
 from fuzz_reading import Reader
-from importers import targets
+from importers import list_targets
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")]
 NOTHING_TO_REPEAT = {"map", "check", "movingai", "houseexpo", "rings"}
@@ -28,4 +28,4 @@ def test_bombs_are_refused(name: str, reader: Reader) -> None:
 
 
 def test_every_format_that_could_hold_a_bomb_has_one() -> None:
-    assert {name.partition(":")[0] for name in BOMBS} == set(targets()) - NOTHING_TO_REPEAT
+    assert {name.partition(":")[0] for name in BOMBS} == set(list_targets()) - NOTHING_TO_REPEAT

@@ -7,10 +7,10 @@ from random import Random
 
 import importers
 import pytest
-from fuzz_mutations import mutated
+from fuzz_mutations import mutate
 from fuzz_reading import Job, Outcome, Reader
 from fuzz_seeds import SEEDS, Case
-from fuzz_shrinking import shrunk
+from fuzz_shrinking import shrink
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")]
 
@@ -25,13 +25,13 @@ def reader() -> Iterator[Reader]:
 
 
 def test_everything_that_reads_files_of_others_has_seeds() -> None:
-    assert set(SEEDS) == set(importers.targets())
+    assert set(SEEDS) == set(importers.list_targets())
 
 
 @pytest.mark.parametrize("target", SEEDS)
 def test_every_seed_is_read(target: str, reader: Reader) -> None:
     for case in SEEDS[target]:
-        outcome = reader.read(case, importers.usual_job(target))
+        outcome = reader.read(case, importers.build_usual_job(target))
         assert outcome.outcome == "read", f"{outcome.words}\n{outcome.traceback}"
 
 
@@ -51,7 +51,7 @@ def test_nothing_comes_of_some_inputs_but_maps_and_refusals(
 # The harness finds what it is there for
 
 
-def outcome_of(word: str, reader: Reader) -> Outcome:
+def read_word(word: str, reader: Reader) -> Outcome:
     return reader.read(Case({"word.txt": word.encode()}), Job("misbehaving"))
 
 
@@ -68,20 +68,20 @@ def outcome_of(word: str, reader: Reader) -> Outcome:
     ],
 )
 def test_what_may_not_be_is_found(word: str, outcome: str, words: str, reader: Reader) -> None:
-    found = outcome_of(word, reader)
+    found = read_word(word, reader)
     assert found.outcome == outcome
     assert found.words.startswith(words)
     assert found.good == (outcome in ("read", "refused")) == (not found.signature)
     # and it goes on after that
-    assert outcome_of("fine", reader).outcome == "read"
+    assert read_word("fine", reader).outcome == "read"
 
 
 def test_what_hangs_is_ended() -> None:
     with Reader(seconds=0.3) as reader:
-        assert outcome_of("fine", reader).outcome == "read"
-        found = outcome_of("hang", reader)
+        assert read_word("fine", reader).outcome == "read"
+        found = read_word("hang", reader)
         assert found.outcome == "hang"
-        assert outcome_of("fine", reader).outcome == "read"
+        assert read_word("fine", reader).outcome == "read"
         assert reader.started == 2
 
 
@@ -97,10 +97,10 @@ def test_the_same_fault_is_one_finding_however_often() -> None:
 
 def test_findings_are_made_small() -> None:
     big = Case({"plan.svg": b"line\n" * 50 + b"some <bad> words\n" + b"more\n" * 50, "beside": b"long\n" * 9})
-    small = shrunk(big, lambda case: b"<bad>" in case.files["plan.svg"], 10.0)
+    small = shrink(big, lambda case: b"<bad>" in case.files["plan.svg"], 10.0)
     assert small.files == {"plan.svg": b"<bad>", "beside": b""}
-    assert shrunk(big, lambda case: False, 10.0) == big
-    assert shrunk(big, lambda case: True, 0.0) == big
+    assert shrink(big, lambda case: False, 10.0) == big
+    assert shrink(big, lambda case: True, 0.0) == big
 
 
 def test_changes_are_by_chance_and_can_be_had_again() -> None:
@@ -108,7 +108,7 @@ def test_changes_are_by_chance_and_can_be_had_again() -> None:
         made = []
         for _ in range(2):
             random = Random(7)
-            made.append([mutated(random.choice(seeds), target, seeds, random) for _ in range(40)])
+            made.append([mutate(random.choice(seeds), target, seeds, random) for _ in range(40)])
         assert made[0] == made[1]
         assert sum(case not in seeds for case in made[0]) > 25
         assert all(set(case.files) in [set(seed.files) for seed in seeds] for case in made[0])
@@ -118,7 +118,7 @@ def test_a_finding_is_saved_so_that_it_can_be_read_again(tmp_path: Path) -> None
     outcome = Outcome("error", "KeyError: 'x'", "error-KeyError-wkt.py:read", "Traceback ...")
     place = importers.save(tmp_path, "wkt", SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}), outcome)
     assert (place / "plan.wkt").read_bytes() == SEEDS["wkt"][0].files["plan.wkt"]
-    assert importers.saved(place) == (SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}))
+    assert importers.read_saved(place) == (SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}))
     assert "Traceback" in (place / "finding.txt").read_text()
 
 

@@ -58,10 +58,12 @@ def compute_attractive_potential(
 
 
 def compute_gradient(energy, x: float, y: float, h: float = 1e-6) -> np.ndarray:
-    def at(a: float, b: float) -> float:
+    def evaluate_at(a: float, b: float) -> float:
         return float(energy(np.array([np.hypot(a, b)]))[0])
 
-    return np.array([(at(x + h, y) - at(x - h, y)), (at(x, y + h) - at(x, y - h))]) / (2 * h)
+    return np.array(
+        [(evaluate_at(x + h, y) - evaluate_at(x - h, y)), (evaluate_at(x, y + h) - evaluate_at(x, y - h))]
+    ) / (2 * h)
 
 
 @given(x=coordinate, y=coordinate, k_rep=strength, rho_0=st.floats(0.2, 6))

@@ -11,7 +11,7 @@ SHORT = ("--duration", "1.0", "--lattice", "16", "--size", "480x320")
 COMMAND = (sys.executable, "-m", "robocov_app")
 
 
-def complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
+def read_complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
     """Call the command with something wrong; return the one line that it must say."""
     assert main(list(words)) == status
     said = capsys.readouterr()

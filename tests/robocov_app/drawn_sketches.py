@@ -72,16 +72,18 @@ def valid_shapes(draw):
             ((x, y), (round(x + size, 4), y), (round(x + size, 4), round(y + 1, 4))), 0.2, name
         )
 
-    def ring(*corners):
+    def place_ring(*corners):
         return tuple((round(x + size * u, 4), round(y + size * v, 4)) for u, v in corners)
 
-    box = ring((0, 0), (1, 0), (1, 1), (0, 1))
+    box = place_ring((0, 0), (1, 0), (1, 1), (0, 1))
     if kind == "ring":
-        return PolygonObstacle(box, (ring((0.2, 0.2), (0.8, 0.2), (0.8, 0.7), (0.2, 0.7)),), name)
+        return PolygonObstacle(box, (place_ring((0.2, 0.2), (0.8, 0.2), (0.8, 0.7), (0.2, 0.7)),), name)
     if kind == "triangle":
-        return PolygonObstacle(ring((0, 0), (1, 0.3), (0.4, 1)), (), name)
+        return PolygonObstacle(place_ring((0, 0), (1, 0.3), (0.4, 1)), (), name)
     if kind == "star":
-        return PolygonObstacle(ring((0, 0), (0.5, 0.3), (1, 0), (0.7, 0.5), (1, 1), (0.2, 0.8)), (), name)
+        return PolygonObstacle(
+            place_ring((0, 0), (0.5, 0.3), (1, 0), (0.7, 0.5), (1, 1), (0.2, 0.8)), (), name
+        )
     return PolygonObstacle(box, (), name)
 
 

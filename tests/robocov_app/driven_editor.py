@@ -25,7 +25,7 @@ from robocov_app.toolkit.window.display import open_display
 SIZE = (900, 600)
 
 
-def sheet(*shapes: Any, **more: Any) -> Sketch:
+def build_sheet(*shapes: Any, **more: Any) -> Sketch:
     """Return a sketch of 10 x 10 m with some obstacles."""
     return Sketch(boundary=DEFAULT_BOUNDARY, **more).with_obstacles(shapes)[0]
 
@@ -55,7 +55,7 @@ def open_editor(
     """Open the editor without a display."""
     with open_display(headless=True):
         if document is None:
-            document = Document(sketch if sketch is not None else sheet(), drafts)
+            document = Document(sketch if sketch is not None else build_sheet(), drafts)
         editor = Editor(
             document, readings or create_measurement_worker(direct=True), folder, EditorSettings()
         )

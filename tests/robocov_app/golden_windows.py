@@ -14,53 +14,53 @@ SIZE = (900, 600)
 FPS = 30
 
 
-def compared(window) -> None:
+def show_comparison(window) -> None:
     window.do("pane:add")
-    played(window, 40)
+    play_frames(window, 40)
 
 
-def asked(window) -> None:
+def show_question(window) -> None:
     window.viewer.inspection.selected = 2
     window.panel.show_tab("robot")
     window.do("layer:force_attraction")
     window.do("layer:distances")
-    played(window, 40)
+    play_frames(window, 40)
 
 
-def past(window) -> None:
-    played(window, 30)
+def show_past(window) -> None:
+    play_frames(window, 30)
     window.viewer.attempt(lambda: window.viewer.session.fail_robot(3))
-    played(window, 30)
+    play_frames(window, 30)
     window.do("back:second")
     window.panel.show_tab("show")
-    played(window, 1)
+    play_frames(window, 1)
 
 
-def helped(window) -> None:
+def show_help(window) -> None:
     window.do("help")
-    played(window, 1)
+    play_frames(window, 1)
 
 
-def toured(window) -> None:
+def show_tour(window) -> None:
     window.do("tour")
-    played(window, 40)
+    play_frames(window, 40)
 
 
 SCENES: dict[str, tuple[str, Callable[[object], None]]] = {
-    "compared-light": ("light", compared),
-    "asked-dark": ("dark", asked),
-    "past-light": ("light", past),
-    "helped-dark": ("dark", helped),
-    "toured-light": ("light", toured),
+    "compared-light": ("light", show_comparison),
+    "asked-dark": ("dark", show_question),
+    "past-light": ("light", show_past),
+    "helped-dark": ("dark", show_help),
+    "toured-light": ("light", show_tour),
 }
 
 
-def played(window, frames: int) -> None:
+def play_frames(window, frames: int) -> None:
     for _ in range(frames):
         window.run_frame(1.0 / FPS)
 
 
-def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
+def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.scenario import SessionScenario
@@ -78,11 +78,11 @@ def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> n
         return copy_pixels(window.screen).copy()
 
 
-def golden(name: str) -> np.ndarray:
+def read_golden(name: str) -> np.ndarray:
     return np.asarray(Image.open(FOLDER / f"{name}.png").convert("RGB"))
 
 
-def difference(first: np.ndarray, second: np.ndarray) -> float:
+def compute_difference(first: np.ndarray, second: np.ndarray) -> float:
     """Return the part of pixels that anyone would see to be different."""
     apart = np.abs(first.astype(int) - second.astype(int)).max(axis=2)
     return float((apart > 60).mean())
@@ -92,5 +92,5 @@ if __name__ == "__main__":
     os.environ["ROBOCOV_SETTINGS"] = ""
     FOLDER.mkdir(exist_ok=True)
     for scene in SCENES:
-        Image.fromarray(drawn(scene)).save(FOLDER / f"{scene}.png", optimize=True)
+        Image.fromarray(draw_scene(scene)).save(FOLDER / f"{scene}.png", optimize=True)
         print(scene)

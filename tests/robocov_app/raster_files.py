@@ -33,7 +33,7 @@ def draw_pixels(text: str, values: dict[str, int] = VALUES) -> np.ndarray:
     return np.array([[values[letter] for letter in line] for line in text.split()], dtype=np.uint8)
 
 
-def pgm(pixels: np.ndarray, most: int = 255, head: str = "# drawn for a test\n") -> bytes:
+def build_pgm(pixels: np.ndarray, most: int = 255, head: str = "# drawn for a test\n") -> bytes:
     rows, columns = pixels.shape
     kind = np.uint8 if most < 256 else ">u2"
     return f"P5\n{head}{columns} {rows}\n{most}\n".encode() + pixels.astype(kind).tobytes()
@@ -45,7 +45,7 @@ def write_ros_map(
     """Write a ROS map; return its YAML. Keys replace those of the YAML, None takes them out."""
     if image is None:
         image = f"{name}.pgm"
-        (folder / image).write_bytes(pixels if isinstance(pixels, bytes) else pgm(pixels))
+        (folder / image).write_bytes(pixels if isinstance(pixels, bytes) else build_pgm(pixels))
     given = {
         "image": image, "resolution": 0.25, "origin": [0.0, 0.0, 0.0], "negate": 0,
         "occupied_thresh": 0.65, "free_thresh": 0.196,
@@ -55,16 +55,16 @@ def write_ros_map(
     return path
 
 
-def chunk(kind: bytes, data: bytes) -> bytes:
+def build_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def raw_png(width: int, height: int, bits: int, colors: int, rows: bytes, interlaced: int = 0) -> bytes:
+def encode_png(width: int, height: int, bits: int, colors: int, rows: bytes, interlaced: int = 0) -> bytes:
     """Return a PNG of rows that are ready, filter bytes and all."""
     head = struct.pack(">IIBBBBB", width, height, bits, colors, 0, 0, interlaced)
     return (
         b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", head)
-        + chunk(b"IDAT", zlib.compress(rows))
-        + chunk(b"IEND", b"")
+        + build_chunk(b"IHDR", head)
+        + build_chunk(b"IDAT", zlib.compress(rows))
+        + build_chunk(b"IEND", b"")
     )

@@ -15,7 +15,7 @@ class Link(str):
 
 
 @contextmanager
-def served(command: str, *arguments: str, port: int = 0, **how: object) -> Iterator[Link]:
+def serve_window(command: str, *arguments: str, port: int = 0, **how: object) -> Iterator[Link]:
     """Serve a window, by default at any free port, and give its link; `how`: more for the process."""
     call = [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", str(port)]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, complaint
+from called import SHORT, answer, read_complaint
 from drawn_run import ROOMS, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -129,7 +129,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     row = answer(capsys, "import", str(plan), "-o", str(out))
     assert row["area_kept_m2"] == pytest.approx(33.0)
     assert load_map(out).free_area == pytest.approx(33.0)
-    assert "already exists" in complaint(capsys, "import", str(plan), "-o", str(out))
+    assert "already exists" in read_complaint(capsys, "import", str(plan), "-o", str(out))
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_wrong_input_gets_one_clear_line(
     words: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert part in complaint(capsys, *words.split())
+    assert part in read_complaint(capsys, *words.split())
     assert list(tmp_path.iterdir()) == [], "nothing may be left behind by what was refused"
 
 
@@ -232,7 +232,7 @@ def test_wrong_positions_are_refused(
 ) -> None:
     file = tmp_path / "robots.json"
     file.write_bytes(content)
-    assert part in complaint(capsys, "cost", "square", "--positions", str(file))
+    assert part in read_complaint(capsys, "cost", "square", "--positions", str(file))
 
 
 # fmt: off
@@ -280,7 +280,7 @@ def test_any_words_end_in_an_answer_or_one_line(
 def test_an_out_that_cannot_be_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
-    line = complaint(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
+    line = read_complaint(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
     assert line.startswith(f"{file / 'x'}: cannot be written: Not a directory")
 
 
@@ -317,5 +317,5 @@ def test_odd_command_lines_end_in_one_short_line(
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "run").mkdir()
     record_walk(ROOMS, 2).save(tmp_path / "run")
-    said = complaint(capsys, *words.split())
+    said = read_complaint(capsys, *words.split())
     assert said.startswith(message) and len(said) < 1100

@@ -25,18 +25,18 @@ pytestmark = [
 ]
 
 
-def cell(notebook, name):
+def find_cell(notebook, name):
     return next(each for each in notebook.cells if each["id"] == name)
 
 
-def shown(notebook, name):
+def list_shown(notebook, name):
     """Return the MIME bundles that a cell shows."""
-    return [output["data"] for output in cell(notebook, name).outputs if "data" in output]
+    return [output["data"] for output in find_cell(notebook, name).outputs if "data" in output]
 
 
-def printed(notebook, name):
+def read_printed(notebook, name):
     return "".join(
-        output["text"] for output in cell(notebook, name).outputs if output.output_type == "stream"
+        output["text"] for output in find_cell(notebook, name).outputs if output.output_type == "stream"
     )
 
 
@@ -114,7 +114,7 @@ def test_nothing_is_said_on_the_side(executed):
 
 
 def test_a_map_is_shown(executed):
-    (bundle,) = shown(executed, "map")
+    (bundle,) = list_shown(executed, "map")
     assert set(bundle) == {"text/html", "image/png", "text/plain"}
     assert bundle["text/plain"].startswith("<Environment Rooms, ")
     assert 'class="robocov-map"' in bundle["text/html"] and 'role="img"' in bundle["text/html"]
@@ -122,7 +122,7 @@ def test_a_map_is_shown(executed):
 
 
 def test_a_run_is_shown_and_can_be_played(executed):
-    (bundle,) = shown(executed, "run")
+    (bundle,) = list_shown(executed, "run")
     assert set(bundle) == {"text/html", "image/png", "text/plain"}
     assert bundle["text/plain"] == "<Record rapf on Rooms, 6 robots, 60.0 s>"
     html = bundle["text/html"]
@@ -132,7 +132,7 @@ def test_a_run_is_shown_and_can_be_played(executed):
 
 
 def test_moments_are_said_in_short(executed):
-    (bundle,) = shown(executed, "moment")
+    (bundle,) = list_shown(executed, "moment")
     assert set(bundle) == {"text/plain"}
     words = bundle["text/plain"]
     assert "<Snapshot at 12.00 s, 6 robots>" in words and "<Record rapf on Rooms, 6 robots, 20.0 s>" in words
@@ -140,29 +140,29 @@ def test_moments_are_said_in_short(executed):
 
 
 def test_a_plot_without_axes_is_shown_as_its_page(executed):
-    (output,) = [output for output in cell(executed, "cost").outputs if "data" in output]
+    (output,) = [output for output in find_cell(executed, "cost").outputs if "data" in output]
     picture = Image.open(io.BytesIO(base64.b64decode(output["data"]["image/png"])))
     assert picture.width > output["metadata"]["image/png"]["width"] > 600
     assert "mean distance" in output["metadata"]["image/png"]["alt"]
 
 
 def test_plots_on_axes_of_ones_own_are_shown_once(executed):
-    (bundle,) = shown(executed, "axes")
+    (bundle,) = list_shown(executed, "axes")
     assert "image/png" in bundle
 
 
 def test_the_frame_is_shown(executed):
-    (bundle,) = shown(executed, "frame")
+    (bundle,) = list_shown(executed, "frame")
     assert re.findall(r"<th>(\w+)</th>", bundle["text/html"])[:4] == ["time_s", "robot", "x_m", "y_m"]
-    (bundle,) = shown(executed, "speeds")
+    (bundle,) = list_shown(executed, "speeds")
     speeds = [float(line.split()[1]) for line in bundle["text/plain"].splitlines()[1:-1]]
     assert len(speeds) == 6 and 0.5 < max(speeds) <= 1.0 + 1e-9
 
 
 def test_a_sweep_is_read(executed):
-    (bundle,) = shown(executed, "sweep")
+    (bundle,) = list_shown(executed, "sweep")
     assert "text/html" in bundle
-    (bundle,) = shown(executed, "table")
+    (bundle,) = list_shown(executed, "table")
     assert bundle["text/html"].count("<tr>") >= 3
-    (bundle,) = shown(executed, "worst")
+    (bundle,) = list_shown(executed, "worst")
     assert 'class="robocov-replay"' in bundle["text/html"]

@@ -175,12 +175,12 @@ class TestDistances:
 
     @pytest.mark.slow
     def test_robots_have_the_radius_that_they_are_said_to_have(self):
-        def size(**options):
+        def get_sizes(**options):
             (discs,) = [c for c in RESULT.plot(**options).collections if len(c.get_offsets()) == 5]
             return discs.get_sizes()
 
-        assert size(radius=0.9).min() > 4 * size().max()
-        apart = size(radius=[0.9, 0.1, 0.1, 0.1, 0.1])
+        assert get_sizes(radius=0.9).min() > 4 * get_sizes().max()
+        apart = get_sizes(radius=[0.9, 0.1, 0.1, 0.1, 0.1])
         assert apart[0] > 4 * apart[1:].max()
 
     def test_a_result_that_does_not_know_its_map_says_so(self):

@@ -31,7 +31,7 @@ def maps(tmp_path: Path) -> tuple[str, str, str]:
     return str(paths[0]), str(paths[1]), str(paths[2])
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+def read_output(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     assert main([*words]) in (0, None)
     return capsys.readouterr().out
 
@@ -44,9 +44,11 @@ def test_the_line() -> None:
 
 def test_cost(maps, capsys) -> None:
     plain, heavy, robots = maps
-    assert "φ" not in told(capsys, "cost", plain, "--positions", robots)
-    assert "weighted by φ   gaussians, 0.5 to 4.5" in told(capsys, "cost", heavy, "--positions", robots)
-    answer = json.loads(told(capsys, "cost", heavy, "--positions", robots, "--json"))
+    assert "φ" not in read_output(capsys, "cost", plain, "--positions", robots)
+    assert "weighted by φ   gaussians, 0.5 to 4.5" in read_output(
+        capsys, "cost", heavy, "--positions", robots
+    )
+    answer = json.loads(read_output(capsys, "cost", heavy, "--positions", robots, "--json"))
     result = CoverageCost(HEAVY)([[1.0, 1.0], [4.0, 4.5]])
     assert answer["mean_distance_m"] == pytest.approx(result.mean_distance)
     assert answer["cost_m3"] == pytest.approx(result.value) and answer["density"] == "gaussians"
@@ -54,14 +56,14 @@ def test_cost(maps, capsys) -> None:
 
 def test_check_and_maps(maps, capsys) -> None:
     plain, heavy, _ = maps
-    assert "density" not in told(capsys, "check", plain)
-    said = told(capsys, "check", heavy)
+    assert "density" not in read_output(capsys, "check", plain)
+    said = read_output(capsys, "check", heavy)
     mean = HEAVY.free_masses.sum() / HEAVY.free_area
     assert f"gaussians, 0.5 to 4.5, mean {mean:.4g}" in said
-    report = json.loads(told(capsys, "check", heavy, "--json"))["maps"][0]
+    report = json.loads(read_output(capsys, "check", heavy, "--json"))["maps"][0]
     assert report["density"] == "gaussians" and report["density_range"] == [0.5, 4.5]
     assert report["mean_density"] == pytest.approx(mean)
-    rows = json.loads(told(capsys, "maps", "--json"))["maps"]
+    rows = json.loads(read_output(capsys, "maps", "--json"))["maps"]
     assert {row["name"]: row["density"] for row in rows}["hospital"] == "polygons"
     assert {row["density"] for row in rows} == {None, "polygons"}
 
@@ -70,7 +72,7 @@ def test_check_and_maps(maps, capsys) -> None:
 def test_a_run_keeps_the_density_and_says_so(maps, capsys, tmp_path) -> None:
     _, heavy, _ = maps
     out = tmp_path / "out"
-    said = told(
+    said = read_output(
         capsys, "run", heavy, "--robots", "3", "--duration", "1", "--lattice", "16", "--out", str(out)
     )
     assert "weighted by φ   gaussians, 0.5 to 4.5" in said
@@ -86,9 +88,9 @@ def test_a_run_keeps_the_density_and_says_so(maps, capsys, tmp_path) -> None:
 def test_the_optimum_by_another_density_is_another(maps, capsys) -> None:
     plain, heavy, _ = maps
     words = ("--robots", "2", "--restarts", "2", "--lattice", "16")
-    assert "weighted by φ" in told(capsys, "optimum", heavy, *words)
-    first = json.loads(told(capsys, "optimum", heavy, *words, "--json"))
-    second = json.loads(told(capsys, "optimum", plain, *words, "--json"))
+    assert "weighted by φ" in read_output(capsys, "optimum", heavy, *words)
+    first = json.loads(read_output(capsys, "optimum", heavy, *words, "--json"))
+    second = json.loads(read_output(capsys, "optimum", plain, *words, "--json"))
     assert first["density"] == "gaussians" and second["density"] is None
     assert max(x + y for x, y in first["positions_m"]) > max(x + y for x, y in second["positions_m"]) + 0.5
 
@@ -99,8 +101,8 @@ def test_a_report_shows_and_tells_it(maps, capsys, tmp_path) -> None:
     for name, path in (("plain", plain), ("heavy", heavy)):
         out = str(tmp_path / name)
         words = ("--controllers", "rapf", "lloyd", "--robots", "2", "--duration", "1", "--lattice", "12")
-        told(capsys, "compare", path, *words, "--out", out)
-        told(capsys, "report", out)
+        read_output(capsys, "compare", path, *words, "--out", out)
+        read_output(capsys, "report", out)
         page = (tmp_path / name / "report.html").read_text()
         is_heavy = name == "heavy"
         assert ("Final mean distance to the nearest robot, weighted by φ: " in page) == is_heavy
@@ -127,5 +129,7 @@ def test_the_picture_in_pages() -> None:
 
 def test_what_other_formats_cannot_hold_is_said(maps, capsys, tmp_path) -> None:
     plain, heavy, _ = maps
-    assert "the density" not in told(capsys, "export", plain, "-o", str(tmp_path / "plain.wkt"))
-    assert "dropped: the density (gaussians)" in told(capsys, "export", heavy, "-o", str(tmp_path / "a.svg"))
+    assert "the density" not in read_output(capsys, "export", plain, "-o", str(tmp_path / "plain.wkt"))
+    assert "dropped: the density (gaussians)" in read_output(
+        capsys, "export", heavy, "-o", str(tmp_path / "a.svg")
+    )

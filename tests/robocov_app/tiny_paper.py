@@ -52,12 +52,12 @@ TINY = Plan(
 )
 
 
-def options(workers: int = 2) -> RunnerOptions:
+def build_options(workers: int = 2) -> RunnerOptions:
     return RunnerOptions(workers=workers, scheduler=None, quiet=True, stop=Interruption())
 
 
 @contextmanager
-def shared(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
+def share_folder(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
     """Give a folder that all workers of a test session have in common, to one of them at a time."""
     base = factory.getbasetemp()
     folder = (base.parent if base.name.startswith("popen-") else base) / name

@@ -19,11 +19,11 @@ def read(folder: Path, kind: str, content: Any, **options: Any) -> ForeignMap:
     return importer.read(path, ReadOptions(**options))
 
 
-def square(x: float, y: float, width: float, height: float) -> list[list[float]]:
+def build_square(x: float, y: float, width: float, height: float) -> list[list[float]]:
     """Return a closed ring."""
     return [[x, y], [x + width, y], [x + width, y + height], [x, y + height], [x, y]]
 
 
-def svg(body: str, head: str = 'width="1000" height="600"') -> str:
+def build_svg(body: str, head: str = 'width="1000" height="600"') -> str:
     """Return a document of SVG."""
     return f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>'

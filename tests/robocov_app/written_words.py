@@ -9,7 +9,7 @@ from robocov_app.render.fonts import render_text
 from robocov_app.render.painter import Painter
 
 
-def places(frame, words, size, theme, color):
+def find_words(frame, words, size, theme, color):
     """Return the (x, y) middles of all places where bold `words` stand on the background."""
     alpha = pygame.surfarray.array_alpha(render_text(words, size, color, True)).T.astype(float) / 255
     rows, columns = np.nonzero(alpha)
@@ -26,7 +26,7 @@ def places(frame, words, size, theme, color):
     return np.array(found).reshape(-1, 2)
 
 
-def glyphs(layer, scene, theme, scale=2.0):
+def draw_glyphs(layer, scene, theme, scale=2.0):
     """Return pictures of the glyphs of a layer's legend entries, their middles at (60, 40) px."""
     painter = Painter(scene.environment, (640, 480), theme, scale=scale)
     pictures = []

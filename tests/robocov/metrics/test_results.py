@@ -210,10 +210,10 @@ def test_errors_name_an_unreadable_study(folder: Path) -> None:
 
 
 def test_errors_name_the_extra_that_installs_pandas(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
+    def raise_missing(name: str) -> None:
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
-    monkeypatch.setattr(optional_imports.importlib, "import_module", missing)
+    monkeypatch.setattr(optional_imports.importlib, "import_module", raise_missing)
     with pytest.raises(RobocovError, match=r'pip install "robocov\[pandas\]"'):
         read_results(folder).to_pandas()
 

@@ -114,13 +114,13 @@ def test_one_robot_ends_at_the_geometric_median_from_any_start():
 def test_a_heartbeat_may_stop_the_descent():
     steps = []
 
-    def heartbeat():
+    def interrupt():
         steps.append(1)
         if len(steps) == 3:
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        descend(COST, ROOM, sample_starts(0, 5), np.zeros(5, dtype=int), heartbeat)
+        descend(COST, ROOM, sample_starts(0, 5), np.zeros(5, dtype=int), interrupt)
     assert len(steps) == 3
 
 

@@ -10,7 +10,7 @@ from functools import partial
 import matplotlib
 import numpy as np
 import pytest
-from called import complaint
+from called import read_complaint
 from matplotlib.figure import Figure
 
 from robocov_app.bench import cost, learning, plot, processes, render, step, window
@@ -46,12 +46,12 @@ def test_calls_alternate_and_have_median_times():
     slow = clock.work(9.0, 3.0, 1.0, 2.0)
     quick = clock.work(9.0, 0.5, 0.25, 1.5)
 
-    def noted(name, call):
+    def note(name, call):
         order.append((name, gc.isenabled()))
         call()
 
-    calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
-    prepared = partial(noted, "before", clock.work(*[100.0] * 3))
+    calls = {"slow": partial(note, "slow", slow), "quick": partial(note, "quick", quick)}
+    prepared = partial(note, "before", clock.work(*[100.0] * 3))
     assert measure_interleaved(calls, 3, clock=clock, before_round=prepared) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
     round_ = [("slow", False), ("quick", False)]
@@ -174,7 +174,7 @@ def test_robots_of_the_benchmark_move_a_little_and_stay_free():
 @pytest.mark.slow
 def test_without_the_yardstick_the_message_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
-    assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")
+    assert "pip install 'robocov[bench]'" in read_complaint(capsys, "bench", "cost")
     shrink_parts(monkeypatch)
     monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
     for other in (step, render, window):
@@ -190,20 +190,22 @@ def test_without_the_yardstick_the_message_says_how_to_install_it(monkeypatch, c
 
 
 def test_an_interruption_leaves_the_measured_rows(monkeypatch, capsys):
-    def interrupted():
+    def interrupt():
         yield Row("step", "one step", {"robots": 7}, 1.0, "yardstick", 0.5)
 
     def stop():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(step, "list_cases", lambda quick: [interrupted, stop, stop])
+    monkeypatch.setattr(step, "list_cases", lambda quick: [interrupt, stop, stop])
     assert main(["bench", "step"]) == 130
     assert "7 robots" in capsys.readouterr().out
 
 
 def test_an_invalid_plot_file_is_rejected_before_anything_is_measured(capsys, tmp_path):
-    assert "'.gif'" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
-    assert "there is no folder" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "a" / "b.png"))
+    assert "'.gif'" in read_complaint(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
+    assert "there is no folder" in read_complaint(
+        capsys, "bench", "step", "--plot", str(tmp_path / "a" / "b.png")
+    )
 
 
 ROWS = [
@@ -225,11 +227,11 @@ def test_no_text_of_the_plot_is_cut_off_or_overlaps(rows, tmp_path, monkeypatch)
     drawn: list[Figure] = []
     save = plot.save_figure
 
-    def kept(figure, path):
+    def keep(figure, path):
         drawn.append(figure)
         save(figure, path)
 
-    monkeypatch.setattr(plot, "save_figure", kept)
+    monkeypatch.setattr(plot, "save_figure", keep)
     plot.save_ratios(rows, tmp_path / "ratios.png")
     (figure,) = drawn
     width, height = figure.canvas.get_width_height()

@@ -27,22 +27,22 @@ WALLED = Environment(
 )
 
 
-def frozen_hashes(names: tuple[str, ...]) -> dict[str, str]:
+def load_frozen_hashes(names: tuple[str, ...]) -> dict[str, str]:
     return {name: suite.load_frozen_maps()[name]["sha256"] for name in names}
 
 
-def made_hashes(names: tuple[str, ...]) -> dict[str, str]:
+def compute_hashes(names: tuple[str, ...]) -> dict[str, str]:
     return {name: suite.compute_map_hash(suite.build_map(name)) for name in names}
 
 
 def test_some_maps_are_still_the_frozen_ones() -> None:
-    assert made_hashes(SOME) == frozen_hashes(SOME)
+    assert compute_hashes(SOME) == load_frozen_hashes(SOME)
 
 
 @pytest.mark.slow
 def test_all_maps_are_still_the_frozen_ones() -> None:
     names = tuple(suite.FAMILY_OF)
-    assert made_hashes(names) == frozen_hashes(names)
+    assert compute_hashes(names) == load_frozen_hashes(names)
     assert set(suite.load_frozen_maps()) == set(names)
 
 

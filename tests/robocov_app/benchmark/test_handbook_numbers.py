@@ -15,7 +15,7 @@ from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
 
 
-def line(law: str, track: str) -> str:
+def format_row(law: str, track: str) -> str:
     """Return the row of a law's results on a track."""
     rows = [row for row in read_result(ENTRIES / f"{law}.json.gz")["rows"] if row["track"] == track]
     assert not any("error" in row for row in rows)
@@ -42,7 +42,7 @@ ROWS = [
 
 @pytest.mark.parametrize(("law", "track"), ROWS)
 def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
-    assert f"| {suite.format_heading(track)} {line(law, track)}\n" in PAGE.read_text(encoding="utf-8")
+    assert f"| {suite.format_heading(track)} {format_row(law, track)}\n" in PAGE.read_text(encoding="utf-8")
 
 
 def test_the_study_of_the_paper_has_the_goals_of_the_handbook() -> None:

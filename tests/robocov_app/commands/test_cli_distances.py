@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, complaint
+from called import SHORT, read_complaint
 from PIL import Image
 
 from robocov_app.cli import main
@@ -14,7 +14,7 @@ MIN_BLUE = 60
 """Difference of blue and red above which a pixel is blue; that of pale cells is less."""
 
 
-def frames(folder: Path) -> list[np.ndarray]:
+def read_frames(folder: Path) -> list[np.ndarray]:
     return [np.array(Image.open(path)).astype(int) for path in sorted((folder / "frames").iterdir())]
 
 
@@ -28,7 +28,7 @@ def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: 
     ):
         options = (*SHORT, "--frames", "--fps", "2", "--film-speed", "1", "--out", str(tmp_path / name))
         assert main([*words, *options, *more]) == 0
-    plain, bare, warm = (frames(tmp_path / name) for name in ("plain", "bare", "warm"))
+    plain, bare, warm = (read_frames(tmp_path / name) for name in ("plain", "bare", "warm"))
     assert len(plain) == len(bare) == len(warm) >= 3
     # tints of cells are many colors; without them the page is mostly white, with distances mostly blue
     assert (bare[0] == 255).all(axis=2).mean() > (plain[0] == 255).all(axis=2).mean() + 0.2
@@ -41,7 +41,7 @@ def test_unknown_layers_are_rejected_before_the_run(
     option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    message = complaint(capsys, "run", "trap", *SHORT, option, "distanses", "--out", str(out))
+    message = read_complaint(capsys, "run", "trap", *SHORT, option, "distanses", "--out", str(out))
     assert message.startswith(f"{option}: unknown layer 'distanses': did you mean 'distances'?")
     assert not out.exists()
 
@@ -62,5 +62,5 @@ def test_cost_draws_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 
 def test_an_unwritable_map_is_reported_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("cost", "rooms", "--positions", str(tmp_path / "missing.json"), "--plot")
-    assert "'.jpg'" in complaint(capsys, *words, str(tmp_path / "a.jpg"))
-    assert "there is no folder" in complaint(capsys, *words, str(tmp_path / "b" / "a.png"))
+    assert "'.jpg'" in read_complaint(capsys, *words, str(tmp_path / "a.jpg"))
+    assert "there is no folder" in read_complaint(capsys, *words, str(tmp_path / "b" / "a.png"))

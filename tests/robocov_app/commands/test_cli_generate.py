@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, answer, complaint
+from called import COMMAND, answer, read_complaint
 
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import dump_map, list_bundled_maps, load_map
@@ -66,7 +66,9 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
     for seed, name in enumerate(names, start=8):
         assert load_map(folder / name) == generate_map(seed, kind="mazes")
     assert sheet.read_bytes().startswith(b"\x89PNG")
-    assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; choose another --out or")
+    assert read_complaint(capsys, *words).startswith(
+        f"{folder}: the folder is not empty; choose another --out or"
+    )
 
 
 def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -149,7 +151,7 @@ def test_impossible_maps_are_reported_with_the_option(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert complaint(capsys, "generate", *words.split()).startswith(message)
+    assert read_complaint(capsys, "generate", *words.split()).startswith(message)
     assert not list(tmp_path.iterdir())
 
 
@@ -162,11 +164,13 @@ def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.Cap
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "map.json"
     file.write_text("mine")
-    assert "already exists; choose another --out or pass --overwrite" in complaint(
+    assert "already exists; choose another --out or pass --overwrite" in read_complaint(
         capsys, "generate", "-o", str(file)
     )
     assert file.read_text() == "mine"
-    assert "cannot be used for maps: " in complaint(capsys, "generate", "--count", "2", "-o", str(file / "x"))
+    assert "cannot be used for maps: " in read_complaint(
+        capsys, "generate", "--count", "2", "-o", str(file / "x")
+    )
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import COMMAND, SHORT, answer, complaint
+from called import COMMAND, SHORT, answer, read_complaint
 from PIL import Image
 
 from robocov.environment import DiscStart, Environment, WallObstacle
@@ -152,14 +152,14 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_mistakes_are_named(words: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert part in complaint(capsys, "optimum", *words)
+    assert part in read_complaint(capsys, "optimum", *words)
 
 
 def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.json"
     file.write_text("[[1, 1]]")
     words = ("optimum", "trap", *FAST, "--positions", str(file))
-    assert "already exists" in complaint(capsys, *words)
+    assert "already exists" in read_complaint(capsys, *words)
     assert file.read_text() == "[[1, 1]]"
     assert main([*words, "--overwrite"]) == 0
     assert len(json.loads(file.read_bytes())) == 6

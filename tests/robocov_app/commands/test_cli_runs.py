@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, complaint
+from called import SHORT, answer, read_complaint
 
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.record import Record
@@ -81,7 +81,7 @@ def test_overwrite_removes_only_the_earlier_result(
     for path in mine:
         path.write_text("mine")
     answer(capsys, "metrics", str(out))
-    assert "not empty" in complaint(capsys, "run", "square", *SHORT, "--out", str(out))
+    assert "not empty" in read_complaint(capsys, "run", "square", *SHORT, "--out", str(out))
     answer(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
     assert [path.read_text() for path in mine] == ["mine"] * 3
     assert list((out / "frames").iterdir()) == [mine[2]]
@@ -100,10 +100,10 @@ def test_an_obstructed_result_keeps_the_earlier_one(
     elsewhere.mkdir()
     before = (out / "run.json").read_bytes()
     (out / "run.mp4").mkdir()
-    assert "run.mp4: is in the way" in complaint(capsys, *words)
+    assert "run.mp4: is in the way" in read_complaint(capsys, *words)
     (out / "run.mp4").rmdir()
     (out / "frames").symlink_to(elsewhere)
-    assert "frames: is a link, which is not followed" in complaint(capsys, *words)
+    assert "frames: is a link, which is not followed" in read_complaint(capsys, *words)
     assert (out / "run.json").read_bytes() == before
     assert list(elsewhere.iterdir()) == []
 
@@ -116,14 +116,14 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": [".."]}'
     )
-    assert "folders[0]: expected the name of a folder" in complaint(capsys, "metrics", str(inner))
+    assert "folders[0]: expected the name of a folder" in read_complaint(capsys, "metrics", str(inner))
     answer(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
     assert len(Record.load(tmp_path / "run")) == len(Record.load(inner)) == 61
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
     )
     (inner / "on").symlink_to(tmp_path / "run")
-    assert "on: expected a folder inside the folder of the comparison, got a link" in complaint(
+    assert "on: expected a folder inside the folder of the comparison, got a link" in read_complaint(
         capsys, "metrics", str(inner)
     )
 
@@ -203,7 +203,7 @@ def test_a_class_that_fails_is_named_with_its_line(
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")
     words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in complaint(capsys, *words, status=1 if "ended Python" in part else 2)
+    assert part in read_complaint(capsys, *words, status=1 if "ended Python" in part else 2)
     assert not out.exists()
 
 
@@ -234,7 +234,7 @@ def test_a_traceback_is_shown_on_request(
     ids=range(9),
 )
 def test_an_unknown_gain_is_rejected(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    said = complaint(capsys, "run", "square", "--set", f"k_rep={value}")
+    said = read_complaint(capsys, "run", "square", "--set", f"k_rep={value}")
     assert said.startswith(message) and len(said) < 200
 
 
@@ -275,7 +275,7 @@ def test_a_controller_that_fails_is_named_with_its_line(
     )
     out = tmp_path / "run"
     words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in complaint(capsys, *words, status=1 if "ended Python" in part else 2)
+    assert part in read_complaint(capsys, *words, status=1 if "ended Python" in part else 2)
     assert not out.exists(), "a folder with nothing in it is not left behind"
 
 

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from called import answer, complaint
+from called import answer, read_complaint
 from swept import ROOM, list_run_folders, read_tables, write_controller
 
 from robocov.mapfile import save_map
@@ -136,15 +136,15 @@ def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixtu
 def test_options_are_checked(
     study: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert message in complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"), *words)
+    assert message in read_complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"), *words)
     assert not (study.parent / "out").exists()
 
 
 def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study.write_text(STUDY.replace("k_rep", "k_rap"))
-    said = complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"))
+    said = read_complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"))
     assert said.startswith(f"{study}: gains.rpf: unknown gain 'k_rap': did you mean 'k_rep'?")
-    assert "no such file" in complaint(capsys, "sweep", str(study.parent / "none.toml"))
+    assert "no such file" in read_complaint(capsys, "sweep", str(study.parent / "none.toml"))
     assert not (study.parent / "out").exists()
 
 
@@ -152,14 +152,14 @@ def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureF
 def test_a_full_disk_is_reported_and_the_sweep_can_be_resumed(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(path: Path, content: bytes) -> int:
+    def fail_as_disk_is_full(path: Path, content: bytes) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     out = study.parent / "out"
     words = ("sweep", str(study), "--out", str(out), "--workers", "1")
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_bytes", full)
-        said = complaint(capsys, *words, "--json")
+        patch.setattr(Path, "write_bytes", fail_as_disk_is_full)
+        said = read_complaint(capsys, *words, "--json")
     assert said.endswith("cannot be written: No space left on device")
     assert list_run_folders(out) == []
     assert answer(capsys, *words)["done"] == 8
@@ -183,7 +183,7 @@ def test_a_foreign_file_with_a_reserved_name_is_rejected_in_one_line(
         (out / name).touch()
     else:
         (out / name / "mine").mkdir(parents=True)
-    assert str(out) in complaint(capsys, *words)
+    assert str(out) in read_complaint(capsys, *words)
     assert (out / name).exists() and (name == "runs" or (out / name / "mine").is_dir())
 
 

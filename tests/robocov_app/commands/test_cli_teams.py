@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, complaint
+from called import SHORT, answer, read_complaint
 
 from robocov.record import Record
 from robocov_app.cli import main
@@ -76,16 +76,18 @@ def test_the_cost_of_positions_in_seconds(tmp_path: Path, capsys: pytest.Capture
         assert saved["times"].mean() == pytest.approx(timed["mean_time_s"])
     half = answer(capsys, *words, "--speeds", "0.5")
     assert half["mean_time_s"] == pytest.approx(2.0 * plain["mean_distance_m"])
-    said = complaint(capsys, *words, "--speeds", "1", "1", "1")
+    said = read_complaint(capsys, *words, "--speeds", "1", "1", "1")
     assert said == "--speeds: expected one, or one for each of 2 robots, got 3 numbers"
-    assert complaint(capsys, *words, "--speeds", "0") == "--speeds: expected a number above 0, got 0.0 m/s"
+    assert (
+        read_complaint(capsys, *words, "--speeds", "0") == "--speeds: expected a number above 0, got 0.0 m/s"
+    )
 
 
 def test_teams_that_are_none(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = complaint(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
+    said = read_complaint(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
     assert said == f"--robots: expected 3 as in {team}, got 5"
     bad = tmp_path / "bad.toml"
     bad.write_text("[[group]]\ncount = 1\nspeed = 3\n")
     for words in (("run", "rooms"), ("compare", "rooms"), ("demo", "rooms")):
-        said = complaint(capsys, *words, "--team", str(bad))
+        said = read_complaint(capsys, *words, "--team", str(bad))
         assert said.startswith(f"{bad}: group[0]: unknown key 'speed'")

@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import answer, complaint
+from called import answer, read_complaint
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
@@ -63,7 +63,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_folder(
 
 
 def test_errors_are_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    said = complaint(capsys, "run", "rooms", "--fail", "3@x")
+    said = read_complaint(capsys, "run", "rooms", "--fail", "3@x")
     assert said == "--fail: expected ROBOT@SECONDS, as in 3@20, got '3@x'"
 
 
@@ -80,7 +80,7 @@ def test_a_robot_that_joins_outside_the_map_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    said = complaint(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
+    said = read_complaint(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
     assert said.startswith("--join: expected a place inside the boundary of map 'Rooms' (x from 0 to 12 m, ")
     assert said.endswith("got [100, 100] for robot 6")
     assert not out.exists()

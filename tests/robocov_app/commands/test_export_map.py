@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import answer, complaint
+from called import answer, read_complaint
 
 from robocov.mapfile import load_map
 from robocov_app.cli import main
@@ -60,7 +60,7 @@ def test_errors_are_reported_in_one_line_and_leave_no_files(
         ("export nowhere -o x.svg", "nowhere"),
         ("export square -o x.svg --digits 99", "digits: expected a number from 0 to 12, got 99"),
     ):
-        assert part in complaint(capsys, *words.split())
+        assert part in read_complaint(capsys, *words.split())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -69,11 +69,11 @@ def test_no_file_is_overwritten_without_the_option(
 ) -> None:
     out = tmp_path / "plan.json"
     out.write_text("precious")
-    assert "already exists" in complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")
+    assert "already exists" in read_complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")
     assert out.read_text() == "precious"
     from robocov.mapfile import save_map
 
     save_map(load_map("square"), out)
-    line = complaint(capsys, "export", str(out), "-o", str(out), "--format", "wkt", "--overwrite")
+    line = read_complaint(capsys, "export", str(out), "-o", str(out), "--format", "wkt", "--overwrite")
     assert "is the map being read" in line
     assert load_map(out) == load_map("square")

@@ -63,7 +63,7 @@ def call(folder: Path, body: str, *words: str) -> subprocess.CompletedProcess[st
     return subprocess.run([*COMMAND, *words], cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-def last_line(ended: subprocess.CompletedProcess[str]) -> str:
+def read_last_line(ended: subprocess.CompletedProcess[str]) -> str:
     assert "Traceback" not in ended.stderr and "fault of robocov" not in ended.stderr
     errors = [line for line in ended.stderr.splitlines() if line.startswith("robocov: error: ")]
     assert len(errors) == 1, ended.stderr
@@ -76,7 +76,7 @@ def last_line(ended: subprocess.CompletedProcess[str]) -> str:
 def test_one_line_names_a_controller_that_ends_python(folder: Path, body: str) -> None:
     ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
     assert ended.returncode == 1, ended.stderr
-    assert (RAISED | ENDED)[body] in last_line(ended)
+    assert (RAISED | ENDED)[body] in read_last_line(ended)
 
 
 @pytest.mark.slow
@@ -84,14 +84,14 @@ def test_one_line_names_a_controller_that_ends_python(folder: Path, body: str) -
 def test_one_line_names_a_controller_that_fails(folder: Path, body: str) -> None:
     ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
     assert ended.returncode == 2, ended.stderr
-    assert ORDINARY[body] in last_line(ended)
+    assert ORDINARY[body] in read_last_line(ended)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
 def test_a_comparison_ended_by_a_controller_is_reported(folder: Path) -> None:
     ended = call(folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL)
     assert ended.returncode == 1
-    assert ENDED["os._exit(0)"] in last_line(ended)
+    assert ENDED["os._exit(0)"] in read_last_line(ended)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
@@ -101,7 +101,7 @@ def test_a_controller_that_behaves_is_only_watched(folder: Path) -> None:
     assert ended.stdout.startswith('{"out": "out"')
     wrong = call(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
     assert wrong.returncode == 2
-    assert "unknown class 'Yours' (known: Mine" in last_line(wrong)
+    assert "unknown class 'Yours' (known: Mine" in read_last_line(wrong)
 
 
 @pytest.mark.slow

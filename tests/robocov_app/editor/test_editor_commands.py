@@ -5,7 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 from driven_window import open_viewer
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
@@ -26,7 +26,7 @@ WALLS = (WallObstacle(((1, 8), (3, 8)), 0.1), WallObstacle(((3, 8), (3, 9)), 0.1
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet(LOW, HIGH, FAR, *WALLS)) as driver:
+    with open_editor(tmp_path, build_sheet(LOW, HIGH, FAR, *WALLS)) as driver:
         yield driver
 
 
@@ -196,13 +196,13 @@ def test_an_obstacle_becomes_the_boundary_and_back(driver: EditorDriver) -> None
 
 def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
     starts = (("one", DiscStart((2, 2), 1.0)), ("two", DiscStart((7, 7), 1.0)))
-    with open_editor(tmp_path, sheet(starts=starts)) as driver:
+    with open_editor(tmp_path, build_sheet(starts=starts)) as driver:
         assert driver.editor.start_name == "one"
         driver.press_key("shift+n")
         assert driver.editor.start_name == "two" and driver.editor.selection == Selection.of("two")
         driver.press_key("shift+d")
         assert driver.editor.start_names == ["two", "one"]
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         driver.press_key("shift+n")
         assert "no start yet" in driver.message
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from density_cases import KINDS
 from drawn_sketches import list_problems
-from driven_editor import open_editor, sheet
+from driven_editor import build_sheet, open_editor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -69,7 +69,7 @@ def test_an_invalid_density_is_reported_with_its_path():
 
 def test_a_density_of_zero_in_the_free_space_is_a_problem():
     nothing = WeightedPolygons(KINDS["rooms"].areas[1:], 0.0)
-    covering = sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
+    covering = build_sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
     grave = [problem.message for problem in list_problems(covering) if problem.is_error]
     assert grave and "at least one weight above 0" in grave[0]
     assert not [problem for problem in list_problems(build_dense_map()) if problem.is_error]
@@ -77,7 +77,7 @@ def test_a_density_of_zero_in_the_free_space_is_a_problem():
 
 class TestEdits:
     def test_the_first_hot_spot_stands_on_a_floor_of_one(self):
-        change = density_edits.add_peak(sheet(), (3.0, 4.0), 1.5, 4.0)
+        change = density_edits.add_peak(build_sheet(), (3.0, 4.0), 1.5, 4.0)
         assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
         two = density_edits.add_peak(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
         assert len(density_edits.list_features(two)) == 2
@@ -90,7 +90,7 @@ class TestEdits:
         assert density_edits.remove_feature(build_dense_map(), 0).sketch.density is None
         assert density_edits.remove_density(build_dense_map()).sketch.density is None
         with pytest.raises(MapError, match="the same weight already"):
-            density_edits.remove_density(sheet())
+            density_edits.remove_density(build_sheet())
 
     def test_hot_spots_are_moved_resized_and_weighted(self):
         moved = density_edits.move_feature(build_dense_map(), 0, 1.0, 2.0).sketch
@@ -124,7 +124,7 @@ class TestEdits:
             ),
             (lambda: density_edits.set_weight(build_dense_map(), 0, 1e9), "weight: expected .*, got 1e"),
             (lambda: density_edits.move_feature(build_dense_map(), 5, 1.0, 1.0), "hot spot no longer exists"),
-            (lambda: density_edits.set_floor(sheet(), 0.0), "weight: expected .*, got 0"),
+            (lambda: density_edits.set_floor(build_sheet(), 0.0), "weight: expected .*, got 0"),
             (
                 lambda: density_edits.add_peak(build_dense_map(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0),
                 "is a polygons",
@@ -154,7 +154,7 @@ class TestEdits:
 
 
 def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         plain = driver.copy_frame()
         driver.press_key("d")
         driver.drag(*(driver.find_pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
@@ -199,7 +199,7 @@ def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
 
 
 def test_a_canceled_drag_changes_nothing(tmp_path):
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         driver.press_key("d")
         driver.press(*driver.find_pixel((3, 3)))
         driver.move(*driver.find_pixel((5, 3)), held=1)
@@ -214,7 +214,7 @@ AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
 
 class TestAreas:
     def test_areas_are_added_moved_weighted_and_removed(self):
-        sketch = density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch
+        sketch = density_edits.add_area(build_sheet(), WeightedArea(AREA, 3.0)).sketch
         assert sketch.density == WeightedPolygons((WeightedArea(AREA, 3.0),), 1.0)
         moved = density_edits.move_feature(sketch, 0, 1.0, -1.0).sketch
         assert moved.density.areas[0].vertices[0] == (3.0, 1.0)
@@ -228,7 +228,7 @@ class TestAreas:
 
     def test_polygons_become_areas_with_their_holes_and_names(self):
         hole = ((3.0, 3.0), (4.0, 3.0), (4.0, 4.0))
-        sketch, keys = sheet().with_obstacles(
+        sketch, keys = build_sheet().with_obstacles(
             [PolygonObstacle(AREA, (hole,), "ward"), CircleObstacle((8.0, 8.0), 0.5)]
         )
         change = density_edits.convert_polygons(sketch, Selection.of(keys[0]), 5.0)
@@ -253,7 +253,7 @@ class TestAreas:
     )
     def test_impossible_edits_raise_a_map_error(self, edit, message):
         with pytest.raises(MapError, match=message):
-            edit(density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch)
+            edit(density_edits.add_area(build_sheet(), WeightedArea(AREA, 3.0)).sketch)
 
     def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
         sketch = Sketch.from_environment(load_map("hospital"))

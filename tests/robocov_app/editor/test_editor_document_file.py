@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from driven_editor import rewrite_file, sheet
+from driven_editor import build_sheet, rewrite_file
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
@@ -118,7 +118,7 @@ def test_a_removed_file_is_noticed(tmp_path: Path) -> None:
 
 def test_a_draft_is_recovered_and_removed_by_saving(tmp_path: Path) -> None:
     drafts = tmp_path / "drafts"
-    document = Document(sheet(), drafts)
+    document = Document(build_sheet(), drafts)
     add_circle(document)
     document.flush()
     assert find_recoverable(drafts) == ()  # its editor lives

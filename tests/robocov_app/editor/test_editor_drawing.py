@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 from PIL import Image
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
@@ -13,7 +13,7 @@ from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         yield driver
 
 
@@ -152,7 +152,7 @@ def test_the_boundary_is_drawn_by_dragging_by_corners_and_by_size(driver: Editor
     driver.press_key("return")
     assert set(driver.sketch.boundary) == {(0, 0), (12, 0), (12, 8), (0, 8)}
     driver.press_key("ctrl+z", times=3)
-    assert driver.sketch.boundary == sheet().boundary
+    assert driver.sketch.boundary == build_sheet().boundary
 
 
 def test_the_first_point_can_be_typed(driver: EditorDriver) -> None:

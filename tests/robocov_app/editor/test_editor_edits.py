@@ -143,7 +143,7 @@ def collect_shapes(sketch: Sketch) -> shapely.Geometry:
     return shapely.GeometryCollection([*shapes, shapely.Polygon(sketch.boundary)])
 
 
-def distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
+def compute_distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
     """Return the largest distance between corresponding vertices."""
     first = shapely.get_coordinates(a)
     second = shapely.get_coordinates(b)
@@ -155,7 +155,7 @@ def distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
 def test_moving_agrees_with_shapely(sketch, dx, about):
     change = transform.move(sketch, Selection.select_all(sketch), dx, 0.5)
     expected = affinity.translate(collect_shapes(sketch), dx, 0.5)
-    assert distance(collect_shapes(change.sketch), expected) <= 1e-4
+    assert compute_distance(collect_shapes(change.sketch), expected) <= 1e-4
     back = transform.move(change.sketch, change.selection, -dx, -0.5).sketch
     assert back == sketch
 
@@ -166,7 +166,7 @@ def test_turning_agrees_with_shapely(sketch, degrees, about):
     change = transform.rotate(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
     for key in polygons:
         expected = affinity.rotate(sketch.get_item(key).shape.polygon, degrees, origin=about)
-        assert distance(change.sketch.get_item(key).shape.polygon, expected) <= 1e-4
+        assert compute_distance(change.sketch.get_item(key).shape.polygon, expected) <= 1e-4
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
     quarter = sketch
     for _ in range(4):
@@ -245,7 +245,8 @@ def test_mirroring_twice_changes_nothing(sketch, axis):
     whole = Selection.select_all(sketch)
     once = transform.mirror(sketch, whole, axis).sketch
     assert (
-        distance(collect_shapes(transform.mirror(once, whole, axis).sketch), collect_shapes(sketch)) <= 3e-4
+        compute_distance(collect_shapes(transform.mirror(once, whole, axis).sketch), collect_shapes(sketch))
+        <= 3e-4
     )
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pygame
 import pytest
-from called import complaint
+from called import read_complaint
 from drawn_sketches import renumber
-from driven_editor import EditorDriver, open_editor, rewrite_file, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor, rewrite_file
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle
@@ -33,7 +33,9 @@ from robocov_app.toolkit.dialogs import Choice, Question
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0)), drafts=tmp_path / "drafts") as driver:
+    with open_editor(
+        tmp_path, build_sheet(CircleObstacle((5, 5), 1.0)), drafts=tmp_path / "drafts"
+    ) as driver:
         yield driver
 
 
@@ -284,7 +286,7 @@ def test_recent_files_are_found_from_every_folder(
 
 
 def test_abandoned_drafts_are_offered_and_recovered(folders: Path) -> None:
-    lost = Document(sheet(), folders / "drafts")
+    lost = Document(build_sheet(), folders / "drafts")
     lost.history.apply(create.add_circle(lost.history.sketch, (5, 5), 1.0))
     lost.update_draft()
     lost.flush()
@@ -347,7 +349,7 @@ def test_screenshots_need_no_display(folders: Path, capsys: pytest.CaptureFixtur
 def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, capsys) -> None:
     for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    line = complaint(capsys, "edit", "rooms")
+    line = read_complaint(capsys, "edit", "rooms")
     assert line.startswith("no display: the editor needs one") and "--screenshot" in line
 
 
@@ -364,12 +366,12 @@ def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, c
 def test_invalid_options_are_reported_in_one_line(
     folders: Path, capsys, words: list[str], message: str
 ) -> None:
-    assert message in complaint(capsys, "edit", *words)
+    assert message in read_complaint(capsys, "edit", *words)
 
 
 def test_a_broken_file_is_reported_before_a_window_opens(folders: Path, capsys) -> None:
     (folders / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
-    assert "boundery" in complaint(capsys, "edit", str(folders / "bad.json"))
+    assert "boundery" in read_complaint(capsys, "edit", str(folders / "bad.json"))
     (folders / "draft.json").write_text(
         json.dumps({"format": "robocov-map", "version": 1, "name": "d", "boundary": [[0, 0], [1, 1]]})
     )

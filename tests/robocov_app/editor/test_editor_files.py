@@ -97,10 +97,10 @@ def test_a_failed_write_leaves_the_file_unchanged(tmp_path, monkeypatch):
     disk = write_sketch(SKETCH, path)
     before = path.read_bytes()
 
-    def full(self, data):
+    def fail_as_disk_is_full(self, data):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    monkeypatch.setattr("pathlib.Path.write_bytes", fail_as_disk_is_full)
     with pytest.raises(OutputError, match=r"map\.json: cannot be written: No space left"):
         write_sketch(SKETCH.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])[0], path, disk)
     monkeypatch.undo()

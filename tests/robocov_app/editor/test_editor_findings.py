@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_editor import EditorDriver, load_sketch, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.canvas import describe_map
@@ -37,7 +37,7 @@ def draw_without_message(driver: EditorDriver) -> np.ndarray:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Path, theme: str) -> None:
     red = (LIGHT if theme == "light" else DARK).trajectory
-    with open_editor(tmp_path, sheet(*NARROW), theme=theme) as driver:
+    with open_editor(tmp_path, build_sheet(*NARROW), theme=theme) as driver:
         measurement = driver.editor.measurement
         assert measurement.gap.width == pytest.approx(0.15) and not measurement.impassable.is_empty
         at = driver.find_pixel((4.975, 5))
@@ -50,7 +50,7 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
 
 
 def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as driver:
+    with open_editor(tmp_path, build_sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as driver:
         driver.open_tab("map")
         assert len(driver.editor.measurement.components) == 2
         assert not driver.editor.measurement.cut_off.is_empty
@@ -60,7 +60,7 @@ def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
 
 def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
     outside = CircleObstacle((30, 30), 1.0)
-    with open_editor(tmp_path, sheet(CROSSED, outside)) as driver:
+    with open_editor(tmp_path, build_sheet(CROSSED, outside)) as driver:
         problems = driver.editor.problems
         assert problems[0].is_error and "cross" in problems[0].message
         driver.window.canvas.fit()
@@ -80,7 +80,7 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
 
 
 def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(CROSSED)) as driver:
+    with open_editor(tmp_path, build_sheet(CROSSED)) as driver:
         assert describe_map(driver.editor).endswith("draft: 1 problem")
         driver.press_key("ctrl+a")
         driver.press_key("delete")
@@ -101,7 +101,7 @@ def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:
 def test_all_layers_are_drawn_at_every_scale_and_theme(tmp_path: Path, scale: float) -> None:
     starts = (("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1)))))
     size = round(900 * scale), round(600 * scale)
-    sketch = sheet(CROSSED, *NARROW, CircleObstacle((8, 8), 1.0), starts=starts)
+    sketch = build_sheet(CROSSED, *NARROW, CircleObstacle((8, 8), 1.0), starts=starts)
     with open_editor(tmp_path, sketch, size=size, scale=scale, theme="dark") as driver:
         driver.press_key("a")
         driver.press_key("ctrl+a")
@@ -112,7 +112,7 @@ def test_all_layers_are_drawn_at_every_scale_and_theme(tmp_path: Path, scale: fl
 
 
 def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         driver.press_key("p")
         driver.click_all((2, 2), (6, 2))
         driver.move_to((6, 5))
@@ -146,7 +146,7 @@ def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> Non
 
 
 def test_problems_are_marked_during_a_drag(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0))) as driver:
+    with open_editor(tmp_path, build_sheet(CircleObstacle((5, 5), 1.0))) as driver:
         assert not driver.editor.problems
         driver.press(*driver.find_pixel((5, 5)))
         driver.move_to((8, 5), (11.5, 5), held=1)

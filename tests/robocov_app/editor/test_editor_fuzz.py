@@ -7,7 +7,7 @@ from pathlib import Path
 import pygame
 import pytest
 from drawn_sketches import renumber
-from driven_editor import EditorDriver, load_sketch, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 from driven_window import MODIFIERS, build_key_event
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
@@ -39,14 +39,14 @@ WORDS = (
 SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))
 BUTTONS = (1, 1, 1, 1, 1, 2, 3, 3, 4, 8)
 SHEETS: dict[str, Callable[[], object]] = {
-    "plain": lambda: sheet(
+    "plain": lambda: build_sheet(
         PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), (((2.5, 2.5), (3, 2.5), (3, 3)),), "box"),
         CircleObstacle((7, 7), 1.0),
         WallObstacle(((1, 8), (3, 8), (3, 9)), 0.1),
         WallObstacle(((3, 9), (5, 9)), 0.2),
         starts=(("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1))))),
     ),
-    "broken": lambda: sheet(
+    "broken": lambda: build_sheet(
         PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))),
         PolygonObstacle(((5, 5), (6, 6))),
         WallObstacle(((1, 8), (1, 8)), 0.1),

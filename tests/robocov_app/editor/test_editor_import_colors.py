@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.ui.import_dialog import ImportDialog
@@ -137,7 +137,7 @@ def write_drawing(folder: Path) -> Path:
 def driver(request: Any, tmp_path: Path) -> Iterator[EditorDriver]:
     theme, size = request.param
     write_drawing(tmp_path)
-    with open_editor(tmp_path, sheet(), theme=theme, size=size) as driver:
+    with open_editor(tmp_path, build_sheet(), theme=theme, size=size) as driver:
         driver.press_key("ctrl+o")
         driver.type("plan.svg")
         driver.press_key("return")

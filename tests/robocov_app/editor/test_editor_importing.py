@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pygame
 import pytest
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.edits.properties import set_title
@@ -121,7 +121,7 @@ def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         yield driver
 
 
@@ -218,7 +218,7 @@ def test_closing_the_window_closes_the_dialog(driver: EditorDriver, plan: Path) 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
 def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size: tuple[int, int]) -> None:
-    with open_editor(tmp_path, sheet(), size=size) as driver:
+    with open_editor(tmp_path, build_sheet(), size=size) as driver:
         driver.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
         driver.run_frames(2)
         dialog, view = get_dialog(driver)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_editor import open_editor, sheet
+from driven_editor import build_sheet, open_editor
 
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -33,7 +33,7 @@ def get_path(sketch: Sketch, key: int = 0) -> ObstaclePath:
 
 
 def test_the_first_waypoint_starts_a_path_at_the_center() -> None:
-    sketch = sheet(DESK)
+    sketch = build_sheet(DESK)
     change = paths.add_waypoint(sketch, 0, (1.0, 3.00004), speed=0.3)
     assert get_path(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
     assert change.selection == Selection.of(0)
@@ -45,7 +45,7 @@ def test_the_first_waypoint_starts_a_path_at_the_center() -> None:
 
 
 def test_waypoints_are_moved_and_removed() -> None:
-    sketch = sheet(MOVING)
+    sketch = build_sheet(MOVING)
     moved = paths.move_waypoint(sketch, 0, 1, (7.0, 3.0)).sketch
     assert get_path(moved).points[1] == (7.0, 3.0)
     fewer = paths.remove_waypoint(moved, 0, 0).sketch
@@ -60,7 +60,7 @@ def test_waypoints_are_moved_and_removed() -> None:
 
 
 def test_speed_and_repetition_are_set() -> None:
-    sketch = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND))
+    sketch = build_sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND))
     both = Selection.of(0, 1, 2)
     turned = paths.toggle_repeat(sketch, both).sketch
     assert [get_path(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
@@ -100,7 +100,7 @@ def test_a_path_that_leads_nowhere_is_harmless(points, tmp_path: Path) -> None:
     assert paths.describe_path(broken.path) == "leads nowhere"
     paths.find_waypoint(broken.path, (0.0, 0.0), 1.0)
     assert paths.find_leg(broken.path, (9.0, 9.0), 0.1) is None
-    with open_editor(tmp_path, sheet(broken)) as driver:
+    with open_editor(tmp_path, build_sheet(broken)) as driver:
         driver.editor.select(Selection.of(0))
         driver.press_key("l")
         driver.press_key("o")
@@ -112,7 +112,7 @@ def test_a_path_that_leads_nowhere_is_harmless(points, tmp_path: Path) -> None:
     "shape", [CART, DESK, WallObstacle(((2.0, 2.0), (3.0, 4.0)), 0.2)], ids=["circle", "polygon", "wall"]
 )
 def test_transforms_apply_to_paths(shape) -> None:
-    sketch = sheet(replace(shape, path=ROUND))
+    sketch = build_sheet(replace(shape, path=ROUND))
     one = Selection.of(0)
     moved = transform.move(sketch, one, 1.0, -0.5).sketch
     assert get_path(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
@@ -123,13 +123,13 @@ def test_transforms_apply_to_paths(shape) -> None:
 
 
 def test_a_circle_that_becomes_a_polygon_keeps_its_path() -> None:
-    change = properties.convert_to_polygons(sheet(MOVING), Selection.of(0))
+    change = properties.convert_to_polygons(build_sheet(MOVING), Selection.of(0))
     (item,) = change.sketch.obstacles
     assert isinstance(item.shape, PolygonObstacle) and item.shape.path == ROUND
 
 
 def test_paths_are_saved() -> None:
-    sketch = paths.add_waypoint(sheet(DESK), 0, (1.0, 3.0)).sketch
+    sketch = paths.add_waypoint(build_sheet(DESK), 0, (1.0, 3.0)).sketch
     again = parse_sketch(dump_sketch(sketch), "map")
     assert get_path(again) == get_path(sketch)
     assert again.build_environment().has_moving_obstacles
@@ -139,7 +139,7 @@ def test_paths_are_saved() -> None:
 
 
 def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(CART, DESK)) as driver:
+    with open_editor(tmp_path, build_sheet(CART, DESK)) as driver:
         editor = driver.editor
         editor.snaps = set()
         driver.press_key("o")
@@ -172,7 +172,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
 
 
 def test_the_tool_continues_with_another_obstacle(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(MOVING, DESK)) as driver:
+    with open_editor(tmp_path, build_sheet(MOVING, DESK)) as driver:
         driver.press_key("o")
         driver.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
         assert paths.list_moving_obstacles(driver.sketch) == (0, 1)
@@ -191,7 +191,7 @@ def test_the_tool_continues_with_another_obstacle(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: str) -> None:
-    still = sheet(CART)
+    still = build_sheet(CART)
     with open_editor(tmp_path, still, theme=theme) as driver:
         driver.press_key("l")
         assert "no obstacle moves" in driver.editor.message
@@ -220,7 +220,7 @@ def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: st
 
 def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
-    with open_editor(tmp_path, sheet(CART)) as driver:
+    with open_editor(tmp_path, build_sheet(CART)) as driver:
         driver.editor.apply(paths.add_waypoint(driver.sketch, 0, (8.0, 2.0)))
         driver.editor.document.save(path)
     environment = load_map(path)
@@ -228,7 +228,7 @@ def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:
 
 
 def test_commands_and_buttons_change_paths(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(MOVING)) as driver:
+    with open_editor(tmp_path, build_sheet(MOVING)) as driver:
         driver.editor.select(Selection.of(0))
         run_typed_command(driver.editor, "0.75", "speed")
         assert get_path(driver.sketch).speed == 0.75

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pygame
-from driven_editor import EditorDriver, load_sketch, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
@@ -23,7 +23,7 @@ def start_trial(driver: EditorDriver):
 
 
 def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as driver:
+    with open_editor(tmp_path, build_sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as driver:
         driver.press_key("r")
         driver.drag_at((4, 4), (4.5, 4.5), (5, 5))
         driver.press_key("v")
@@ -67,20 +67,20 @@ def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
 
 def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
-    with open_editor(tmp_path, sheet(crossed)) as driver:
+    with open_editor(tmp_path, build_sheet(crossed)) as driver:
         driver.press_key("f5")
         assert driver.window.play_window is None and driver.editor.has_error_message and driver.message
     with open_editor(tmp_path, Sketch(boundary=None)) as driver:
         driver.press_key("f5")
         assert driver.window.play_window is None and driver.editor.has_error_message
-    with open_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
+    with open_editor(tmp_path, build_sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
         driver.editor.robots = 50
         driver.press_key("f5")
         assert driver.window.play_window is None and "space for about" in driver.message
 
 
 def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(PILLAR)) as driver:
+    with open_editor(tmp_path, build_sheet(PILLAR)) as driver:
         driver.editor.apply(properties.set_note(driver.sketch, Selection.of(0), "old oak"))
         trial = start_trial(driver)
         driver.press_key("c")
@@ -94,7 +94,7 @@ def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
 
 
 def test_another_map_opened_in_a_trial_is_discarded(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet(PILLAR)) as driver:
+    with open_editor(tmp_path, build_sheet(PILLAR)) as driver:
         trial = start_trial(driver)
         trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
         assert trial.viewer.files.has_left_edited_map and "Untitled" in trial.viewer.files.list_maps()
@@ -111,7 +111,7 @@ def test_another_map_opened_in_a_trial_is_discarded(tmp_path: Path) -> None:
 
 
 def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         driver.press_key("c")
         driver.drag_at((4, 4), (4.5, 4), (5, 4))
         start_trial(driver)
@@ -126,7 +126,7 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
 
 
 def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         start_trial(driver)
         driver.press_key("t")
         driver.press_key("f5")
@@ -134,7 +134,7 @@ def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
 
 
 def test_a_trial_without_changes_is_no_edit() -> None:
-    sketch = sheet(PILLAR, PILLAR)
+    sketch = build_sheet(PILLAR, PILLAR)
     environment = sketch.build_environment()
     assert build_play_change(sketch, environment, environment) is None
     assert build_play_change(sketch, environment, sketch.build_environment()) is None

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Selection, Vertex
@@ -22,7 +22,7 @@ WALL = WallObstacle(((6, 1), (6, 3), (8, 3)), 0.2)
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
     start = (("corner", DiscStart((1, 8.5), 0.6)),)
-    with open_editor(tmp_path, sheet(SQUARE, PILLAR, WALL, starts=start)) as driver:
+    with open_editor(tmp_path, build_sheet(SQUARE, PILLAR, WALL, starts=start)) as driver:
         yield driver
 
 
@@ -213,7 +213,7 @@ def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(driver: EditorDrive
 def test_clicking_again_selects_the_object_below(tmp_path: Path) -> None:
     lower = PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6)))
     upper = PolygonObstacle(((2, 2), (4, 2), (4, 4)))
-    with open_editor(tmp_path, sheet(lower, upper)) as driver:
+    with open_editor(tmp_path, build_sheet(lower, upper)) as driver:
         driver.click_all((3.5, 2.5))
         assert driver.editor.selection == Selection.of(1)
         driver.click_all((3.5, 2.5))
@@ -227,7 +227,7 @@ def test_many_objects_are_dragged_as_an_image_with_the_same_result(tmp_path: Pat
     from robocov_app.editor.tools.selection_drags import MANY_POINTS
 
     ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(MANY_POINTS + 10))
-    with open_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as driver:
+    with open_editor(tmp_path, build_sheet(WallObstacle(ring, 0.01), SQUARE)) as driver:
         expected = transform.move(driver.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
         driver.select(0, 1)
         driver.press(*driver.find_pixel((3, 3)))
@@ -264,7 +264,7 @@ def test_the_cursor_shows_the_effect_of_a_press(driver: EditorDriver) -> None:
 
 def test_small_objects_are_dragged_instead_of_their_vertices(tmp_path: Path) -> None:
     pillar = PolygonObstacle(((5, 5), (5.4, 5), (5.4, 5.4), (5, 5.4)))
-    wide = replace(sheet(pillar), boundary=((0, 0), (80, 0), (80, 80), (0, 80)))
+    wide = replace(build_sheet(pillar), boundary=((0, 0), (80, 0), (80, 80), (0, 80)))
     with open_editor(tmp_path, wide) as driver:
         driver.press_key("f")
         driver.click_at((5.2, 5.2))
@@ -327,7 +327,7 @@ def test_the_menu_of_a_wall_changes_its_width(driver: EditorDriver) -> None:
 
 def test_menus_fit_into_the_smallest_window(tmp_path: Path) -> None:
     shapes = [SQUARE, PILLAR, WALL, PolygonObstacle(((1, 1), (9, 9), (9, 1), (1, 9)))]
-    with open_editor(tmp_path, sheet(*shapes), size=MIN_SIZE_PX) as driver:
+    with open_editor(tmp_path, build_sheet(*shapes), size=MIN_SIZE_PX) as driver:
         driver.select(0, 1, 2, 3)
         assert len(open_menu(driver, (3, 3))) > 15
         window = driver.window.screen.get_rect()

@@ -43,34 +43,34 @@ def sketch() -> Sketch:
     return Sketch("Hall", boundary=HALL, starts=STARTS).with_obstacles([LOW, HIGH, WALL])[0]
 
 
-def owner_at(sketch: Sketch, point, reach: float):
+def find_owner_at(sketch: Sketch, point, reach: float):
     return next(iter(find_owners(sketch, point, reach)), None)
 
 
 def test_a_click_finds_the_topmost_obstacle(sketch):
-    assert owner_at(sketch, (4.0, 4.0), 0.1) == 1
+    assert find_owner_at(sketch, (4.0, 4.0), 0.1) == 1
     assert find_owners(sketch, (4.0, 4.0), 0.1) == (1, 0)
-    assert owner_at(sketch, (1.2, 1.2), 0.1) == 0
+    assert find_owner_at(sketch, (1.2, 1.2), 0.1) == 0
     # through a hole there is nothing, but near its edge there is
-    assert owner_at(sketch, (2.7, 2.3), 0.05) is None
-    assert owner_at(sketch, (2.7, 2.05), 0.1) == 0
+    assert find_owner_at(sketch, (2.7, 2.3), 0.05) is None
+    assert find_owner_at(sketch, (2.7, 2.05), 0.1) == 0
 
 
 def test_starts_are_above_obstacles_at_their_center_and_rim(sketch):
-    assert owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
-    assert owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
+    assert find_owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
+    assert find_owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
     assert find_owners(sketch, (4.5, 1.5), 0.1) == (0, "disc")
-    assert owner_at(sketch, (5.3, 2.0), 0.1) == "disc"
-    assert owner_at(sketch, (8.05, 6.0), 0.1) == "two"
+    assert find_owner_at(sketch, (5.3, 2.0), 0.1) == "disc"
+    assert find_owner_at(sketch, (8.05, 6.0), 0.1) == "two"
 
 
 def test_nearby_obstacles_are_found_where_none_covers_the_point(sketch):
-    assert owner_at(sketch, (9.0, 1.1), 0.1) == 2
-    assert owner_at(sketch, (9.0, 1.2), 0.1) is None
-    assert owner_at(sketch, (12.0, 6.0), 0.1) == BOUNDARY
-    assert owner_at(sketch, (11.95, 6.0), 0.1) == BOUNDARY
-    assert owner_at(sketch, (10.0, 5.0), 0.1) is None
-    assert owner_at(Sketch(), (0.0, 0.0), 1.0) is None
+    assert find_owner_at(sketch, (9.0, 1.1), 0.1) == 2
+    assert find_owner_at(sketch, (9.0, 1.2), 0.1) is None
+    assert find_owner_at(sketch, (12.0, 6.0), 0.1) == BOUNDARY
+    assert find_owner_at(sketch, (11.95, 6.0), 0.1) == BOUNDARY
+    assert find_owner_at(sketch, (10.0, 5.0), 0.1) is None
+    assert find_owner_at(Sketch(), (0.0, 0.0), 1.0) is None
 
 
 @given(valid_sketches(least=2), places, st.sampled_from([0.05, 0.5]))
@@ -182,7 +182,7 @@ def test_picking_among_a_thousand_obstacles_measures_only_nearby_ones(monkeypatc
         shapely, "distance", lambda shape, *more: measured.append(np.size(shape)) or distance(shape, *more)
     )
     for x, y in rng.uniform(0, 50, (50, 2)).tolist():
-        owner_at(sketch, (x, y), 0.1)
+        find_owner_at(sketch, (x, y), 0.1)
         find_edge(sketch, (x, y), 0.1, keys)
         find_in_box(sketch, (x, y), (x + 5, y + 5), includes_partial=True)
     assert measured and sum(measured) < 50 * 20

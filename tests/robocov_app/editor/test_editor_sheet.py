@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from driven_editor import load_sketch, sheet
+from driven_editor import build_sheet, load_sketch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -60,7 +60,7 @@ def copy_page(page: pygame.Surface, at: View) -> np.ndarray:
     st.booleans(),
 )
 def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
-    sketch = sheet(*SHAPES)
+    sketch = build_sheet(*SHAPES)
     theme = DARK if dark else LIGHT
     kept = Sheet()
     center = (5.0, 5.0)
@@ -105,7 +105,7 @@ class Watched(Sheet):
 
 
 def test_only_changes_are_redrawn() -> None:
-    sketch = sheet(*SHAPES)
+    sketch = build_sheet(*SHAPES)
     page = Watched()
     assert page.painted(build_view(), sketch) == "all"
     assert page.painted(build_view(), sketch) == 0
@@ -118,7 +118,7 @@ def test_only_changes_are_redrawn() -> None:
 
 
 def test_lifted_obstacles_are_not_on_the_page() -> None:
-    sketch = sheet(*SHAPES)
+    sketch = build_sheet(*SHAPES)
     at = build_view()
     x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
     page = Sheet()
@@ -128,22 +128,22 @@ def test_lifted_obstacles_are_not_on_the_page() -> None:
 
 def test_a_hole_shows_what_lies_below() -> None:
     at = build_view(shown=frozenset())
-    page = Sheet().draw(at, sheet(*SHAPES))
+    page = Sheet().draw(at, build_sheet(*SHAPES))
 
-    def color(point: tuple[float, float]) -> tuple[int, ...]:
+    def get_color(point: tuple[float, float]) -> tuple[int, ...]:
         x, y = at.camera.to_pixels(np.array(point))
         return tuple(page.get_at((round(x), round(y))))[:3]
 
-    assert color((2.8, 2.3)) == LIGHT.background
-    assert color((1.5, 1.5)) == LIGHT.obstacle
-    assert color((11.0, 5.0)) == choose_outside_color(LIGHT)
+    assert get_color((2.8, 2.3)) == LIGHT.background
+    assert get_color((1.5, 1.5)) == LIGHT.obstacle
+    assert get_color((11.0, 5.0)) == choose_outside_color(LIGHT)
 
 
 def test_areas_added_by_the_hull_are_distinguished() -> None:
     sketch = load_sketch("l-shape")
     area = compute_hull_excess(sketch)
     assert area is not None and area.area > 1.0
-    assert compute_hull_excess(sheet()).is_empty
+    assert compute_hull_excess(build_sheet()).is_empty
     assert compute_hull_excess(replace(sketch, boundary=None)).is_empty
     assert compute_hull_excess(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))).is_empty
 
@@ -153,7 +153,7 @@ def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
     laid = Background(str(tmp_path / "red.png"), (100, 100), 0.1, opacity=1.0)
     for turn in (0.0, 90.0):
         corner = (0.0, 0.0) if turn == 0.0 else (10.0, 0.0)
-        sketch = replace(sheet(*SHAPES), background=replace(laid, rotation_deg=turn, corner=corner))
+        sketch = replace(build_sheet(*SHAPES), background=replace(laid, rotation_deg=turn, corner=corner))
         at = build_view(shown=frozenset({"picture"}))
         page = Sheet().draw(at, sketch)
         x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
@@ -170,7 +170,7 @@ def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
 def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
     Image.new(mode, (40, 30)).save(tmp_path / "one.png")
     page = Sheet()
-    sketch = replace(sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
+    sketch = replace(build_sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
     page.draw(build_view(), sketch)
     assert page.reference_image.error == ""
 
@@ -178,7 +178,7 @@ def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
 def test_an_unreadable_picture_is_reported_and_the_rest_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     page = Sheet()
-    sketch = replace(sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
+    sketch = replace(build_sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
     page.draw(build_view(), sketch)
     assert "bad.png" in page.reference_image.error
 
@@ -203,7 +203,7 @@ def test_names_are_written_where_they_fit() -> None:
 
 def test_outlines_are_built_once_for_each_obstacle() -> None:
     outlines = Outlines()
-    sketch = sheet(*SHAPES)
+    sketch = build_sheet(*SHAPES)
     first = outlines.get(sketch.obstacles[0])
     moved = transform.move(sketch, Selection.of(1), 1, 0).sketch
     assert outlines.get(moved.obstacles[0]) is first and first.has_holes

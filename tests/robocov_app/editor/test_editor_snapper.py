@@ -2,13 +2,15 @@
 
 import time
 
-from driven_editor import sheet
+from driven_editor import build_sheet
 
 from robocov.environment import PolygonObstacle
 from robocov_app.editor.tools.snap_targets import MANY_VERTICES, Snapper, count_vertices
 
-SMALL = sheet(PolygonObstacle(((1, 1), (2, 1), (2, 2))))
-LARGE = sheet(PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY_VERTICES + 1))))
+SMALL = build_sheet(PolygonObstacle(((1, 1), (2, 1), (2, 2))))
+LARGE = build_sheet(
+    PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY_VERTICES + 1)))
+)
 
 
 def test_targets_of_small_maps_are_available_at_once_and_cached() -> None:

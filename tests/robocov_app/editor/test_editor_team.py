@@ -3,7 +3,7 @@
 import time
 
 import numpy as np
-from driven_editor import load_sketch, sheet
+from driven_editor import build_sheet, load_sketch
 
 from robocov.environment import PolygonObstacle
 from robocov_app.editor.model.sketch import Sketch
@@ -25,7 +25,7 @@ def test_the_team_has_the_positions_of_a_run() -> None:
 
 def test_a_team_that_does_not_fit_has_a_message() -> None:
     assert "space for about" in sample_team(build_request(load_sketch("rooms"), 900)).message
-    crossed = sheet(PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))))
+    crossed = build_sheet(PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))))
     team = sample_team(build_request(crossed, 3))
     assert team.positions == ()
     assert team.message

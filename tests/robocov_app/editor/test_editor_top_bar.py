@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_editor import EditorDriver, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, open_editor
 
 from robocov.environment import DiscStart, PolygonObstacle, StartSpec, WallObstacle
 from robocov_app.editor.canvas.start_labels import place_start_label
@@ -22,7 +22,7 @@ LABEL_SIZE = (60, 12)
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet(BOX)) as driver:
+    with open_editor(tmp_path, build_sheet(BOX)) as driver:
         yield driver
 
 
@@ -68,7 +68,7 @@ def test_the_bar_creates_tries_and_explains(driver: EditorDriver) -> None:
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1920, 1080)])
 def test_bar_and_rail_have_their_buttons_side_by_side(tmp_path: Path, size: tuple[int, int]) -> None:
-    with open_editor(tmp_path, sheet(BOX), size=size) as driver:
+    with open_editor(tmp_path, build_sheet(BOX), size=size) as driver:
         bar = driver.window.top_bar.ui
         rects = [widget.rect for widget in bar.widgets.values()]
         assert all(bar.box.contains(rect) for rect in rects)
@@ -125,14 +125,14 @@ def test_labels_of_starts_are_above_unless_there_is_a_wall(
 ) -> None:
     start = DiscStart((5.0, 5.0), 1.0)
     wall = WallObstacle(((2.0, wall_y), (8.0, wall_y)), 0.2)
-    with open_editor(tmp_path, sheet(wall)) as driver:
+    with open_editor(tmp_path, build_sheet(wall)) as driver:
         (low_x, low_y), (high_x, high_y) = place_label(driver, start).tolist()
         assert (low_y > 6.0) == is_above
         assert high_y < wall_y - 0.1 or low_y > wall_y + 0.1 or low_x > 8.0 or high_x < 2.0
 
 
 def test_labels_of_starts_avoid_the_boundary(tmp_path: Path) -> None:
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         (_, low_y), (_, high_y) = place_label(driver, DiscStart((5.0, 9.0), 0.95)).tolist()
         assert high_y < 9.95
         assert low_y > 0.0
@@ -140,13 +140,13 @@ def test_labels_of_starts_avoid_the_boundary(tmp_path: Path) -> None:
 
 def test_a_start_between_walls_has_no_free_place_for_its_label(tmp_path: Path) -> None:
     block = PolygonObstacle(((3, 3), (7, 3), (7, 7), (3, 7)))
-    with open_editor(tmp_path, sheet(block)) as driver, pytest.raises(AssertionError):
+    with open_editor(tmp_path, build_sheet(block)) as driver, pytest.raises(AssertionError):
         place_label(driver, DiscStart((5.0, 5.0), 0.1))
 
 
 def test_new_entries_of_the_legend_do_not_move_the_map(tmp_path: Path) -> None:
     walls = [WallObstacle(((0.0, y), (10.0, y)), 0.1) for y in (3.0, 3.15, 6.0)]
-    with open_editor(tmp_path, sheet()) as driver:
+    with open_editor(tmp_path, build_sheet()) as driver:
         camera = driver.window.canvas.camera
         before = len(driver.window.canvas.entries)
         for wall in walls:

@@ -21,11 +21,11 @@ from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 from robocov_app.editor.model.validation import translate_message
 
 
-def hall(*shapes, starts=(), **others) -> Sketch:
+def build_hall(*shapes, starts=(), **others) -> Sketch:
     return (
         Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0]
         if not others
-        else replace(hall(*shapes, starts=starts), **others)
+        else replace(build_hall(*shapes, starts=starts), **others)
     )
 
 
@@ -67,59 +67,64 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
     ("sketch", "message", "where", "of"),
     [
         (Sketch("n"), "there is no boundary: draw one around the free space", None, BOUNDARY),
-        (hall(name=""), "the map has no name", None, None),
-        (hall(name="x" * 101), "the map has a name of 101 characters: it must not exceed 100", None, None),
-        (hall(boundary=()), "boundary: it has no corners: it needs three", None, BOUNDARY),
+        (build_hall(name=""), "the map has no name", None, None),
         (
-            hall(boundary=((0.0, 0.0), (4.0, 0.0), (0.0, 0.0))),
+            build_hall(name="x" * 101),
+            "the map has a name of 101 characters: it must not exceed 100",
+            None,
+            None,
+        ),
+        (build_hall(boundary=()), "boundary: it has no corners: it needs three", None, BOUNDARY),
+        (
+            build_hall(boundary=((0.0, 0.0), (4.0, 0.0), (0.0, 0.0))),
             "boundary: it has two corners: it needs three",
             (2.0, 0.0),
             BOUNDARY,
         ),
         (
-            hall(boundary=((0.0, 0.0), (4.0, 0.0), (2.0, 0.0))),
+            build_hall(boundary=((0.0, 0.0), (4.0, 0.0), (2.0, 0.0))),
             "boundary: it encloses nothing: its corners lie on one line",
             (2.0, 0.0),
             BOUNDARY,
         ),
         (
-            hall(boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))),
+            build_hall(boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))),
             "boundary: it crosses or touches itself at (2, 2)",
             (2.0, 2.0),
             BOUNDARY,
         ),
         (
-            hall(boundary=((0.0, 0.0), (2e4, 0.0), (0.0, 5.0))),
+            build_hall(boundary=((0.0, 0.0), (2e4, 0.0), (0.0, 5.0))),
             "boundary: it is 20000 × 5 m large: it must not exceed 10 km",
             (1e4, 2.5),
             BOUNDARY,
         ),
         (
-            hall(boundary=((0.0, 0.0), (1e8, 0.0), (0.0, 5.0))),
+            build_hall(boundary=((0.0, 0.0), (1e8, 0.0), (0.0, 5.0))),
             "boundary: (1e+08, 0) is too far away: coordinates must be within 10000 km of the origin",
             (1e8, 0.0),
             BOUNDARY,
         ),
         (
-            hall(PolygonObstacle(BOW_TIE, (), "desk")),
+            build_hall(PolygonObstacle(BOW_TIE, (), "desk")),
             "polygon “desk”: its outline crosses or touches itself at (2, 2)",
             (2.0, 2.0),
             0,
         ),
         (
-            hall(PolygonObstacle(((1.0, 1.0),))),
+            build_hall(PolygonObstacle(((1.0, 1.0),))),
             "polygon 1: its outline has one corner: it needs three",
             (1.0, 1.0),
             0,
         ),
         (
-            hall(PolygonObstacle(BOX, (((2.0, 2.0), (5.0, 2.0), (5.0, 2.5), (2.0, 2.5)),))),
+            build_hall(PolygonObstacle(BOX, (((2.0, 2.0), (5.0, 2.0), (5.0, 2.5), (2.0, 2.5)),))),
             "polygon 1: a hole sticks out of its outline",
             (4.0, 2.25),
             0,
         ),
         (
-            hall(
+            build_hall(
                 PolygonObstacle(
                     BOX,
                     (
@@ -133,68 +138,70 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
             0,
         ),
         (
-            hall(PolygonObstacle(BOX, (((1.5, 1.5), (2.0, 1.5)),))),
+            build_hall(PolygonObstacle(BOX, (((1.5, 1.5), (2.0, 1.5)),))),
             "polygon 1: a hole has two corners: it needs three",
             (1.75, 1.5),
             0,
         ),
         (
-            hall(CircleObstacle((2.0, 3.0), 0.0, "")),
+            build_hall(CircleObstacle((2.0, 3.0), 0.0, "")),
             "circle 1: its radius is 0 m: it must be at least 1 mm",
             (2.0, 3.0),
             0,
         ),
-        (hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle 1: has no name", None, 0),
+        (build_hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle 1: has no name", None, 0),
         (
-            hall(WallObstacle(((2.0, 3.0),), 0.1)),
+            build_hall(WallObstacle(((2.0, 3.0),), 0.1)),
             "wall 1: it has no length: it needs two different points",
             (2.0, 3.0),
             0,
         ),
         (
-            hall(WallObstacle(((2.0, 3.0), (4.0, 3.0)), -1.0)),
+            build_hall(WallObstacle(((2.0, 3.0), (4.0, 3.0)), -1.0)),
             "wall 1: its width is -1 m: it must be at least 1 mm",
             (2.0, 3.0),
             0,
         ),
         (
-            hall(PolygonObstacle(((-1.0, -1.0), (20.0, -1.0), (20.0, 20.0), (-1.0, 20.0)))),
+            build_hall(PolygonObstacle(((-1.0, -1.0), (20.0, -1.0), (20.0, 20.0), (-1.0, 20.0)))),
             "no free space is left inside the boundary",
             (6.0, 4.0),
             BOUNDARY,
         ),
         (
-            hall(PolygonObstacle(BOX, (), "desk"), starts=(("a", PointsStart(((5.0, 5.0), (2.0, 2.0)))),)),
+            build_hall(
+                PolygonObstacle(BOX, (), "desk"), starts=(("a", PointsStart(((5.0, 5.0), (2.0, 2.0)))),)
+            ),
             "start “a”: position 2 at (2, 2) is inside polygon “desk”",
             (2.0, 2.0),
             "a",
         ),
         (
-            hall(starts=(("a", PointsStart(((50.0, 5.0),))),)),
+            build_hall(starts=(("a", PointsStart(((50.0, 5.0),))),)),
             "start “a”: position 1 at (50, 5) is outside the boundary",
             (50.0, 5.0),
             "a",
         ),
         (
-            hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)),
+            build_hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)),
             "start “a”: the position (1, 1) occurs twice: each robot needs its own",
             (1.0, 1.0),
             "a",
         ),
         (
-            hall(starts=(("a", PointsStart(())),)),
+            build_hall(starts=(("a", PointsStart(())),)),
             "start “a”: has no positions: it needs one for each robot",
             None,
             "a",
         ),
         (
-            hall(starts=(("", DiscStart((2.0, 2.0), 1.0)),)),
+            build_hall(starts=(("", DiscStart((2.0, 2.0), 1.0)),)),
             "a start has no name",
             None,
             "",
         ),
         (
-            hall(PolygonObstacle(BOX), starts=(("a", DiscStart((2.0, 2.0), 0.5)),)),
+            build_hall(PolygonObstacle(BOX), starts=(("a", DiscStart((2.0, 2.0), 0.5)),)),
             "start “a”: a robot of radius 0.1 m does not fit into its disc",
             (2.0, 2.0),
             "a",
@@ -214,7 +221,7 @@ def test_problems_are_reported_at_their_position(sketch, message, where, of):
 
 
 def test_a_broken_object_does_not_hide_other_problems():
-    sketch = hall(
+    sketch = build_hall(
         PolygonObstacle(BOW_TIE),
         CircleObstacle((6.0, 6.0), 1.0),
         WallObstacle((), 0.1),
@@ -237,31 +244,33 @@ def list_warnings(sketch: Sketch, radius: float = 0.15) -> list[str]:
 
 
 def test_possible_mistakes_are_warnings():
-    assert list_warnings(hall()) == []
-    assert list_warnings(hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
+    assert list_warnings(build_hall()) == []
+    assert list_warnings(build_hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
         "circle “lamp” lies outside the boundary"
     ]
     # one that only touches from outside does nothing either
     beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
-    assert list_warnings(hall(beside)) == ["polygon 1 lies outside the boundary"]
+    assert list_warnings(build_hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")
-    assert list_warnings(hall(twice, replace(twice, name="b"))) == ["circle “b” duplicates another obstacle"]
+    assert list_warnings(build_hall(twice, replace(twice, name="b"))) == [
+        "circle “b” duplicates another obstacle"
+    ]
     doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
-    assert list_warnings(hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
+    assert list_warnings(build_hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
-    assert not [message for message in list_warnings(hall(ended)) if "two vertices" in message]
+    assert not [message for message in list_warnings(build_hall(ended)) if "two vertices" in message]
 
 
 def test_paths_through_obstacles_are_reported_at_the_overlap():
     wall = WallObstacle(((6.0, 0.0), (6.0, 4.0)), 0.2, "screen")
     cart = CircleObstacle((2.0, 2.0), 0.5, "cart", ObstaclePath(((2.0, 2.0), (10.0, 2.0)), 1.0))
-    assert list_warnings(hall(cart)) == []
-    (problem,) = list_problems(hall(wall, cart))
+    assert list_warnings(build_hall(cart)) == []
+    (problem,) = list_problems(build_hall(wall, cart))
     assert problem.message == "circle “cart” moves through wall “screen”"
     assert problem.owner == 1 and not problem.is_error
     assert problem.geometry.bounds == pytest.approx((5.9, 1.5, 6.1, 2.5), abs=1e-3)
     out = replace(cart, path=ObstaclePath(((2.0, 2.0), (14.0, 2.0)), 1.0))
-    assert list_warnings(hall(out)) == ["circle “cart” moves through the boundary"]
+    assert list_warnings(build_hall(out)) == ["circle “cart” moves through the boundary"]
 
 
 def test_sealed_rooms_and_pockets_are_reported():
@@ -271,7 +280,7 @@ def test_sealed_rooms_and_pockets_are_reported():
     box = PolygonObstacle(
         ((8.0, 2.0), (9.0, 2.0), (9.0, 3.0), (8.0, 3.0)), (((8.4, 2.4), (8.6, 2.4), (8.6, 2.6), (8.4, 2.6)),)
     )
-    message = list_warnings(hall(frame, box))
+    message = list_warnings(build_hall(frame, box))
     assert message == [
         "the room of 9 m² around (4, 4) is sealed: it has no entrance",
         "1 sealed pocket is smaller than a robot, 0.04 m² in total",
@@ -282,22 +291,22 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     room = PolygonObstacle(
         ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0)), (((3.0, 3.0), (3.8, 3.0), (3.8, 3.8), (3.0, 3.8)),)
     )
-    sketch = hall(
+    sketch = build_hall(
         room, starts=(("a", DiscStart((3.4, 3.4), 0.2)), ("b", PointsStart(((1.0, 1.0), (1.5, 1.0)))))
     )
     assert not [message for message in list_warnings(sketch, 0.2) if "start" in message]
     message = [message for message in list_warnings(sketch, 0.5) if "start" in message]
     assert message[0] == "start “a”: a robot of radius 0.5 m does not fit into its disc"
     assert message[1] == "start “b”: position 1 at (1, 1) and position 2 are 0.5 m apart: robots need 1 m"
-    assert list_warnings(hall(starts=(("all", UniformStart()),)), 3.9) == []
-    assert list_warnings(hall(starts=(("all", UniformStart()),)), 4.0) == [
+    assert list_warnings(build_hall(starts=(("all", UniformStart()),)), 3.9) == []
+    assert list_warnings(build_hall(starts=(("all", UniformStart()),)), 4.0) == [
         "start “all”: a robot of radius 4 m does not fit into the free space"
     ]
 
 
 def test_tight_positions_are_reported_at_their_position():
     spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
-    found = list_problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
+    found = list_problems(build_hall(starts=(("a", PointsStart(spots)),)), 0.2)
     assert [(problem.message, problem.geometry.centroid.coords[0]) for problem in found] == [
         ("start “a”: position 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
         (
@@ -313,7 +322,7 @@ def test_tight_positions_are_reported_at_their_position():
 
 def test_messages_name_objects_instead_of_paths():
     pillar = CircleObstacle((1.0, 1.0), 0.3, "pillar")
-    sketch = hall(pillar, PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 3.0))))
+    sketch = build_hall(pillar, PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 3.0))))
     for message, message in [
         ("map: obstacles[0]: is odd", "circle “pillar”: is odd"),
         ("map: obstacles[1].vertices[0]: is odd", "polygon 2, corner 1: is odd"),

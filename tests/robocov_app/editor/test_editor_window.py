@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_editor import EditorDriver, load_sketch, open_editor, sheet
+from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.canvas import layers
@@ -28,7 +28,9 @@ PILLAR = CircleObstacle((7, 7), 1.0)
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[EditorDriver]:
-    with open_editor(tmp_path, sheet(BOX, PILLAR, starts=(("door", DiscStart((8, 2), 0.8)),))) as driver:
+    with open_editor(
+        tmp_path, build_sheet(BOX, PILLAR, starts=(("door", DiscStart((8, 2), 0.8)),))
+    ) as driver:
         yield driver
 
 
@@ -188,7 +190,7 @@ def test_the_history_page_undoes_and_redoes(driver: EditorDriver) -> None:
         driver.editor.apply(add_circle(driver.sketch, (5, 5), radius))
     driver.open_tab("history")
 
-    def lines() -> list[tuple[str, bool]]:
+    def list_lines() -> list[tuple[str, bool]]:
         driver.run_frames(1)
         shown = driver.window.panel.ui.widgets.values()
         return [(each.text, bool(each.value)) for each in shown if each.key.startswith("step:")]
@@ -197,10 +199,10 @@ def test_the_history_page_undoes_and_redoes(driver: EditorDriver) -> None:
         driver.wait()
         driver.click(*driver.get_widget("option", f"step:{row}").rect.center)
 
-    assert [chosen for _, chosen in lines()] == [True, False, False, False]
+    assert [chosen for _, chosen in list_lines()] == [True, False, False, False]
     click(2)
     assert len(driver.shapes) == 3
-    assert [chosen for _, chosen in lines()] == [False, False, True, False]
+    assert [chosen for _, chosen in list_lines()] == [False, False, True, False]
     click(3)
     assert len(driver.shapes) == 2
     click(0)
@@ -433,7 +435,7 @@ def test_many_selected_objects_are_outlined_once_with_the_same_pixels(tmp_path: 
     pictures = []
     for many in (200, 10_000):
         monkeypatch.setattr(layers, "MANY_OBJECTS", many)
-        with open_editor(tmp_path, sheet(*shapes)) as driver:
+        with open_editor(tmp_path, build_sheet(*shapes)) as driver:
             driver.press_key("ctrl+a")
             driver.run_frames(2)
             pictures.append(pygame.surfarray.array3d(driver.window.screen).astype(int))

@@ -65,11 +65,11 @@ class TestEveryKind:
         path.write_bytes(b"older")
         figure = plot_environment(HALL)
 
-        def full(part, **options):
+        def fail_as_disk_is_full(part, **options):
             Path(part).write_bytes(b"half")
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr(figure, "savefig", full)
+        monkeypatch.setattr(figure, "savefig", fail_as_disk_is_full)
         with pytest.raises(OutputError, match=rf"a\.{kind}: cannot be written.*No space"):
             save_figure(figure, path)
         assert path.read_bytes() == b"older"

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 
-def peak() -> float:
+def read_peak_mb() -> float:
     """Return the most memory that this process has had, in MB; 0 where that is not known."""
     try:
         lines = Path("/proc/self/status").read_text().splitlines()
@@ -34,7 +34,7 @@ def main(paths: list[str]) -> None:
             "POLYGON((0 0,9 0,9 9,0 9,0 0))" if suffix == "wkt" else "<svg><path d='M0 0h9v9z'/></svg>"
         )
         detect_format(warm).read(warm, ReadOptions(scale=1.0))
-    before = peak()
+    before = read_peak_mb()
     answer = {}
     for name in paths:
         path = Path(name)
@@ -49,7 +49,7 @@ def main(paths: list[str]) -> None:
         except RobocovError as error:
             said = str(error)
         answer[path.name] = (time.process_time() - begin, said)
-    print(json.dumps({"files": answer, "grown_mb": peak() - before}))
+    print(json.dumps({"files": answer, "grown_mb": read_peak_mb() - before}))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ WALL = '<box id="{}" size="{},{},0.5" movable="false"><body position="{},{},0" o
 ROBOT = '<foot-bot id="fb"><body position="{},{},0" orientation="0,0,0"/><controller config="c"/></foot-bot>'
 
 
-def arena(folder: Path, body: str, size: str = '"6, 4, 1" center="1,0,0.5"') -> Path:
+def write_arena(folder: Path, body: str, size: str = '"6, 4, 1" center="1,0,0.5"') -> Path:
     path = folder / "test.argos"
     path.write_text(
         '<?xml version="1.0" ?>\n<argos-configuration><framework/>\n'
@@ -27,7 +27,7 @@ def arena(folder: Path, body: str, size: str = '"6, 4, 1" center="1,0,0.5"') -> 
 
 
 def read(folder: Path, body: str, **options: object) -> ForeignMap:
-    return IMPORTER.read(arena(folder, body), ReadOptions(**options))  # type: ignore[arg-type]
+    return IMPORTER.read(write_arena(folder, body), ReadOptions(**options))  # type: ignore[arg-type]
 
 
 ARENA = box(-2, -2, 4, 2)
@@ -121,11 +121,13 @@ def test_a_file_without_an_arena_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="no <arena>"):
         IMPORTER.read(path, ReadOptions())
     with pytest.raises(MapError, match="expected lengths above 0"):
-        IMPORTER.read(arena(tmp_path, "", '"0,4,1"'), ReadOptions())
+        IMPORTER.read(write_arena(tmp_path, "", '"0,4,1"'), ReadOptions())
 
 
 def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
-    environment, report, _ = import_map(arena(tmp_path, WALL.format("a", 1, 1, 2, 0, 0) + ROBOT.format(0, 0)))
+    environment, report, _ = import_map(
+        write_arena(tmp_path, WALL.format("a", 1, 1, 2, 0, 0) + ROBOT.format(0, 0))
+    )
     assert environment.free_area == pytest.approx(23)
     assert len(environment.obstacles) == 1
     assert (environment.starts["robots"].positions, report.size) == (((0.0, 0.0),), (6.0, 4.0))  # type: ignore[union-attr]
@@ -135,7 +137,7 @@ def test_the_room_with_the_robots_is_kept(tmp_path: Path) -> None:
     # walls within the arena, as in most experiments: around them is more room than in them
     walls = [WALL.format(k, 2.1, 0.1, 0, y, 0) for k, y in enumerate((-1, 1))]
     walls += [WALL.format(k, 0.1, 2.1, x, 0, 0) for k, x in enumerate((-1, 1))]
-    path = arena(tmp_path, "".join(walls) + ROBOT.format(0.25, 0.5), '"3,3,1"')
+    path = write_arena(tmp_path, "".join(walls) + ROBOT.format(0.25, 0.5), '"3,3,1"')
     environment, report, _ = import_map(path)
     assert shapely.Polygon(environment.boundary).equals(box(-0.95, -0.95, 0.95, 0.95))
     assert environment.obstacles == ()

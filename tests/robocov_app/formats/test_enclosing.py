@@ -9,14 +9,14 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import box
-from vector_files import square
+from vector_files import build_square
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ReadOptions
 from robocov_app.formats.files import MAX_VERTICES
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry, WallLine
 
-HALL = square(0, 0, 20, 10)
+HALL = build_square(0, 0, 20, 10)
 
 
 def collect_shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Shapes:
@@ -41,7 +41,9 @@ def build_map(collected: Shapes, solid: bool = True) -> ForeignMap:
 
 
 def test_the_largest_outline_that_contains_the_rest_is_the_boundary() -> None:
-    foreign = build_map(collect_shapes(square(2, 2, 1, 1), HALL, square(5, 5, 2, 1), square(30, 0, 1, 1)))
+    foreign = build_map(
+        collect_shapes(build_square(2, 2, 1, 1), HALL, build_square(5, 5, 2, 1), build_square(30, 0, 1, 1))
+    )
     assert foreign.dropped == ("1 shape outside of the boundary",)
     assert foreign.boundary is not None
     assert foreign.boundary.equals(box(0, 0, 20, 10))
@@ -51,10 +53,10 @@ def test_the_largest_outline_that_contains_the_rest_is_the_boundary() -> None:
 
 
 def test_a_named_boundary_may_have_any_size() -> None:
-    named = collect_shapes((square(1, 1, 8, 8), "Boundary"), HALL, square(2, 2, 1, 1))
+    named = collect_shapes((build_square(1, 1, 8, 8), "Boundary"), HALL, build_square(2, 2, 1, 1))
     assert build_map(named).boundary.area == pytest.approx(64.0)  # type: ignore[union-attr]
     chosen = collect_shapes(
-        (square(1, 1, 8, 8), "east wing"), (HALL, "frame"), boundary="East Wing", skip=("frame",)
+        (build_square(1, 1, 8, 8), "east wing"), (HALL, "frame"), boundary="East Wing", skip=("frame",)
     )
     foreign = build_map(chosen)
     assert foreign.free.area == pytest.approx(64.0)
@@ -65,7 +67,7 @@ def test_a_named_boundary_may_have_any_size() -> None:
 
 def test_closed_lines_with_its_name_are_the_boundary() -> None:
     sides = [([a, b], "boundary") for a, b in pairwise(HALL)]
-    foreign = build_map(collect_shapes(square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
+    foreign = build_map(collect_shapes(build_square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(200 - 1 - 0.5)
     assert foreign.notes[-1] == "1 line treated as walls, 0.1 m wide (--thickness)"
@@ -82,7 +84,7 @@ def test_the_outer_edge_of_closed_walls_is_the_boundary() -> None:
 
 
 def test_a_missing_boundary_becomes_a_rectangle_around_everything() -> None:
-    foreign = build_map(collect_shapes(square(0, 0, 2, 2), square(5, 5, 2, 2), around=3.0))
+    foreign = build_map(collect_shapes(build_square(0, 0, 2, 2), build_square(5, 5, 2, 2), around=3.0))
     assert foreign.boundary.equals(box(-3, -3, 10, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(13 * 13 - 8)
     assert "--around" in foreign.boundary_source
@@ -90,12 +92,12 @@ def test_a_missing_boundary_becomes_a_rectangle_around_everything() -> None:
 
 
 def test_geometries_are_free_unless_one_contains_the_others() -> None:
-    rooms = collect_shapes(square(0, 0, 4, 4), square(3, 1, 6, 2), square(50, 0, 5, 5))
+    rooms = collect_shapes(build_square(0, 0, 4, 4), build_square(3, 1, 6, 2), build_square(50, 0, 5, 5))
     free = build_map(rooms, solid=False)
     assert free.boundary is None
     assert free.free.area == pytest.approx(16 + 12 - 2 + 25)
     assert free.notes == ("3 closed outlines treated as free space (--outlines solid: as obstacles)",)
-    nested = build_map(collect_shapes(HALL, square(2, 2, 1, 1), square(5, 5, 2, 1)), solid=False)
+    nested = build_map(collect_shapes(HALL, build_square(2, 2, 1, 1), build_square(5, 5, 2, 1)), solid=False)
     assert nested.free.area == pytest.approx(197.0)
     alone = build_map(collect_shapes(HALL, lines=[[[5, 0], [5, 5]]]), solid=False)
     assert alone.free.area == pytest.approx(200 - 0.5)
@@ -105,15 +107,19 @@ def test_geometries_are_free_unless_one_contains_the_others() -> None:
 
 def test_islands_of_free_space_in_obstacles_are_free() -> None:
     court = collect_shapes(HALL)
-    court.add_outline([np.array(square(30, 0, 10, 10)), np.array(square(32, 2, 6, 6))])
-    court.add_outline([np.array(square(34, 4, 2, 2))])
+    court.add_outline([np.array(build_square(30, 0, 10, 10)), np.array(build_square(32, 2, 6, 6))])
+    court.add_outline([np.array(build_square(34, 4, 2, 2))])
     assert build_map(court, solid=False).free.area == pytest.approx(200 + 64 + 4)
 
 
 def test_walls_drawn_as_one_shape_are_solid() -> None:
-    walls = collect_shapes(square(4, 4, 1, 1))
+    walls = collect_shapes(build_square(4, 4, 1, 1))
     walls.add_outline(
-        [np.array(square(0, 0, 20, 10)), np.array(square(1, 1, 8, 8)), np.array(square(10, 1, 9, 8))]
+        [
+            np.array(build_square(0, 0, 20, 10)),
+            np.array(build_square(1, 1, 8, 8)),
+            np.array(build_square(10, 1, 9, 8)),
+        ]
     )
     foreign = build_map(walls)
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
@@ -121,10 +127,12 @@ def test_walls_drawn_as_one_shape_are_solid() -> None:
 
 
 def test_outlines_can_be_declared() -> None:
-    areas = (HALL, square(2, 2, 1, 1))
+    areas = (HALL, build_square(2, 2, 1, 1))
     assert build_map(collect_shapes(*areas, outlines="free")).free.area == pytest.approx(200.0)
     assert build_map(collect_shapes(*areas, outlines="solid"), solid=False).free.area == pytest.approx(199.0)
-    rooms = collect_shapes(square(1, 1, 4, 4), square(6, 1, 4, 4), (HALL, "boundary"), outlines="free")
+    rooms = collect_shapes(
+        build_square(1, 1, 4, 4), build_square(6, 1, 4, 4), (HALL, "boundary"), outlines="free"
+    )
     foreign = build_map(rooms)
     assert foreign.free.area == pytest.approx(32.0)
     assert foreign.boundary.area == pytest.approx(200.0)  # type: ignore[union-attr]
@@ -153,7 +161,7 @@ def test_adjacent_lines_are_joined_to_whole_corners() -> None:
 
 
 def test_shapes_are_selected_by_name() -> None:
-    areas = ((HALL, "hall"), (square(2, 2, 1, 1), "desk"), (square(5, 5, 2, 1), "Plant"))
+    areas = ((HALL, "hall"), (build_square(2, 2, 1, 1), "desk"), (build_square(5, 5, 2, 1), "Plant"))
     assert build_map(collect_shapes(*areas, only=("HALL", "plant"))).free.area == pytest.approx(198.0)
     assert build_map(collect_shapes(*areas, skip=("plant", "desk"))).free.area == pytest.approx(200.0)
     with pytest.raises(ParameterError, match=r"plan: skip: unknown name 'plants': did you mean 'Plant'\?"):
@@ -212,7 +220,7 @@ def test_coordinates_out_of_range_are_refused(far: float) -> None:
 
 
 def test_drawings_larger_than_any_map_are_refused() -> None:
-    far = collect_shapes(square(0, 0, 1e6, 9))
+    far = collect_shapes(build_square(0, 0, 1e6, 9))
     with pytest.raises(MapError, match=r"plan: expected at most 10 km, got 1e.06 x 9 m: is the scale right."):
         build_map(far)
 
@@ -240,8 +248,8 @@ _ROOM = st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(1, 12), st
 @settings(max_examples=100)
 @given(st.lists(_ROOM, min_size=1, max_size=6), st.sampled_from(["free", "solid"]))
 def test_free_and_solid_are_complements(rooms: list[tuple[int, int, int, int]], what: str) -> None:
-    frame = (square(-1, -1, 60, 60), "boundary")
-    foreign = build_map(collect_shapes(frame, *(square(*room) for room in rooms), outlines=what))
+    frame = (build_square(-1, -1, 60, 60), "boundary")
+    foreign = build_map(collect_shapes(frame, *(build_square(*room) for room in rooms), outlines=what))
     together = shapely.union_all([box(x, y, x + w, y + h) for x, y, w, h in rooms])
     expected = together if what == "free" else box(-1, -1, 59, 59) - together
     assert foreign.free.is_valid

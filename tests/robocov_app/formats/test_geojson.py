@@ -8,30 +8,35 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vector_files import read, square
+from vector_files import build_square, read
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
 
-def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
+def build_feature(geometry: Any, **properties: Any) -> dict[str, Any]:
     return {"type": "Feature", "properties": properties, "geometry": geometry}
 
 
-def polygon(*rings: Any) -> dict[str, Any]:
+def build_polygon(*rings: Any) -> dict[str, Any]:
     return {"type": "Polygon", "coordinates": list(rings)}
 
 
-def collection(*features: Any, **members: Any) -> dict[str, Any]:
+def build_collection(*features: Any, **members: Any) -> dict[str, Any]:
     return {"type": "FeatureCollection", **members, "features": list(features)}
 
 
-HALL = polygon(square(0, 0, 20, 10), square(1, 1, 2, 2))
+HALL = build_polygon(build_square(0, 0, 20, 10), build_square(1, 1, 2, 2))
 
 
 @pytest.mark.parametrize(
     "document",
-    [HALL, feature(HALL), collection(feature(HALL)), {"type": "GeometryCollection", "geometries": [HALL]}],
+    [
+        HALL,
+        build_feature(HALL),
+        build_collection(build_feature(HALL)),
+        {"type": "GeometryCollection", "geometries": [HALL]},
+    ],
 )
 def test_polygons_are_found_in_every_container(tmp_path: Path, document: Any) -> None:
     foreign = read(tmp_path, "geojson", document)
@@ -40,13 +45,15 @@ def test_polygons_are_found_in_every_container(tmp_path: Path, document: Any) ->
 
 
 def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
-    document = collection(
-        feature(polygon(square(0, 0, 20, 10)), name="yard"),
-        feature(polygon(square(1, 1, 2, 2)), name="shed"),
-        feature({"type": "MultiPolygon", "coordinates": [[square(5, 1, 2, 2)], [square(9, 1, 2, 2)]]}),
-        feature({"type": "LineString", "coordinates": [[15, 0], [15, 5]]}, kind="fence"),
-        feature({"type": "Point", "coordinates": [1, 8, 3]}),
-        feature(None),
+    document = build_collection(
+        build_feature(build_polygon(build_square(0, 0, 20, 10)), name="yard"),
+        build_feature(build_polygon(build_square(1, 1, 2, 2)), name="shed"),
+        build_feature(
+            {"type": "MultiPolygon", "coordinates": [[build_square(5, 1, 2, 2)], [build_square(9, 1, 2, 2)]]}
+        ),
+        build_feature({"type": "LineString", "coordinates": [[15, 0], [15, 5]]}, kind="fence"),
+        build_feature({"type": "Point", "coordinates": [1, 8, 3]}),
+        build_feature(None),
         name="the yard",
         description="With\nsheds.",
     )
@@ -65,30 +72,30 @@ def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
 
 
 def test_a_line_with_the_name_of_the_boundary_is_a_wall(tmp_path: Path) -> None:
-    document = collection(
-        feature(polygon(square(0, 0, 20, 10)), kind="boundary"),
-        feature(polygon(square(1, 1, 2, 2)), kind="obstacle", name="boundary"),
+    document = build_collection(
+        build_feature(build_polygon(build_square(0, 0, 20, 10)), kind="boundary"),
+        build_feature(build_polygon(build_square(1, 1, 2, 2)), kind="obstacle", name="boundary"),
     )
     assert read(tmp_path, "geojson", document).free.area == pytest.approx(196.0)
 
 
 def test_degrees_are_projected(tmp_path: Path) -> None:
-    foreign = read(tmp_path, "geojson", polygon(square(8.4, 49, 0.001, 0.0005)))
+    foreign = read(tmp_path, "geojson", build_polygon(build_square(8.4, 49, 0.001, 0.0005)))
     assert foreign.free.area == pytest.approx(73.17 * 55.6, rel=1e-3)
     assert foreign.notes[0].startswith(
         "degrees projected to meters about longitude 8.40050, latitude 49.00025"
     )
     line = [[179.9999, 10], [-179.9999, 10], [-179.9999, 10.0001], [179.9999, 10.0001]]
-    across = read(tmp_path, "geojson", polygon(line))
+    across = read(tmp_path, "geojson", build_polygon(line))
     assert across.free.area == pytest.approx(21.93 * 11.06, rel=1e-3)
     assert across.repaired == ("1 ring closed: the last point was not the first",)
 
 
 def test_coordinate_systems_in_the_file_are_used(tmp_path: Path) -> None:
-    utm = polygon(square(456000, 5430000, 100, 50))
+    utm = build_polygon(build_square(456000, 5430000, 100, 50))
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
     assert read(tmp_path, "geojson", {**utm, "crs": crs}).free.area == pytest.approx(5000, rel=2e-3)
-    small = polygon(square(0, 0, 0.05, 0.05))
+    small = build_polygon(build_square(0, 0, 0.05, 0.05))
     assert read(tmp_path, "geojson", small).free.area > 1e6
     assert read(tmp_path, "geojson", {**small, "units": "meters"}).free.area == pytest.approx(0.0025)
     assert read(tmp_path, "geojson", {**small, "units": "metres"}).free.area == pytest.approx(0.0025)
@@ -108,10 +115,10 @@ def test_coordinate_systems_in_the_file_are_used(tmp_path: Path) -> None:
             '{"type":"Polygon",\n"coordinates":[[[0,0],[1,NaN]]]}',
             ":2:26: coordinates[0][1][1]: expected a finite",
         ),
-        (polygon([[0, 0], [1, True]]), "coordinates[0][1]: expected a point"),
-        (polygon([[0, 0], [1, 1, 1, 1, 1]]), "coordinates[0][1]: expected a point"),
-        (polygon([[0, 0], [1e200, 1]]), "coordinates[0][1]: expected a point"),
-        (polygon(7), "coordinates[0]: expected a list of at least 1 point"),
+        (build_polygon([[0, 0], [1, True]]), "coordinates[0][1]: expected a point"),
+        (build_polygon([[0, 0], [1, 1, 1, 1, 1]]), "coordinates[0][1]: expected a point"),
+        (build_polygon([[0, 0], [1e200, 1]]), "coordinates[0][1]: expected a point"),
+        (build_polygon(7), "coordinates[0]: expected a list of at least 1 point"),
         ({"type": "Polygon"}, "coordinates: expected a list of rings"),
         ({"type": "MultiPolygon", "coordinates": {}}, "coordinates: expected a list, got {}"),
         (
@@ -121,10 +128,13 @@ def test_coordinate_systems_in_the_file_are_used(tmp_path: Path) -> None:
         ({"type": "Topology"}, "type: expected GeoJSON, not TopoJSON"),
         ({"type": "Curve"}, "type: expected one of Point, LineString"),
         ([], "expected one of Point"),
-        (collection(7), "features[0]: expected a Feature, got 7"),
-        (collection(features=1), None),
+        (build_collection(7), "features[0]: expected a Feature, got 7"),
+        (build_collection(features=1), None),
         ({"type": "FeatureCollection"}, "features: expected a list of features"),
-        (collection(feature(HALL) | {"properties": 3}), "features[0].properties: expected an object"),
+        (
+            build_collection(build_feature(HALL) | {"properties": 3}),
+            "features[0].properties: expected an object",
+        ),
         ({"type": "GeometryCollection"}, "geometries: expected a list of geometries"),
         ({**HALL, "crs": {"type": "link"}}, "crs: expected the name of a reference system"),
         ({**HALL, "units": "feet"}, "units: expected meters or degrees"),
@@ -147,10 +157,10 @@ def test_invalid_geojson_is_reported_with_its_path(
 
 
 def test_two_reference_systems_are_refused(tmp_path: Path) -> None:
-    first = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25832"}}}
-    second = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25833"}}}
+    first = build_feature(HALL) | {"crs": {"properties": {"name": "EPSG:25832"}}}
+    second = build_feature(HALL) | {"crs": {"properties": {"name": "EPSG:25833"}}}
     with pytest.raises(MapError, match=r"features\[1\]\.crs: expected the same system as before, EPSG:25832"):
-        read(tmp_path, "geojson", collection(first, second))
+        read(tmp_path, "geojson", build_collection(first, second))
 
 
 _COORDINATE = st.floats(-4e3, 4e3).map(lambda value: round(value, 4))

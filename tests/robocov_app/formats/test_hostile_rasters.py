@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from raster_files import PLAN, chunk, draw_pixels, pgm, raw_png
+from raster_files import PLAN, build_chunk, build_pgm, draw_pixels, encode_png
 
 MEMORY = 200 * 2**20
 SECONDS = 3.0
@@ -58,14 +58,14 @@ def write_sparse_file(path: Path, head: bytes, size: int) -> Path:
     return path
 
 
-def text_bomb() -> bytes:
+def build_text_bomb() -> bytes:
     """Return a PNG whose text unpacks to 40 MB."""
     packed = zlib.compress(b"a" * 40_000_000)
-    good = raw_png(4, 4, 8, 0, (b"\0" + b"\xff" * 4) * 4)
-    return good[:33] + chunk(b"zTXt", b"Comment\0\0" + packed) + good[33:]
+    good = encode_png(4, 4, 8, 0, (b"\0" + b"\xff" * 4) * 4)
+    return good[:33] + build_chunk(b"zTXt", b"Comment\0\0" + packed) + good[33:]
 
 
-def large(kind: str, side: int, keep: int | None = None, **options: object) -> bytes:
+def paint(kind: str, side: int, keep: int | None = None, **options: object) -> bytes:
     """Return a white picture, complete or only its first bytes."""
     stream = io.BytesIO()
     Image.new("1" if options.get("compression") == "group4" else "L", (side, side), 255).save(
@@ -80,7 +80,7 @@ def write_header(data: bytes, old: int, new: int) -> bytes:
     return data.replace(struct.pack(form, old), struct.pack(form, new))
 
 
-def deep_yaml() -> bytes:
+def build_deep_yaml() -> bytes:
     return b"image: a.pgm\nresolution: 1\norigin: " + b"[" * 30_000
 
 
@@ -91,43 +91,44 @@ def build_yaml_bomb() -> bytes:
 
 
 TOO_MANY = "at most 64 million"
+CHESS_BOARD = 255 * (np.indices((2500, 2500)).sum(axis=0) % 2)
 GRID = b"type octile\nheight %d\nwidth %d\nmap\n"
 
 HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     # name: (file, content, options, what it says)
-    "pixels of a bomb": ("a.png", lambda: raw_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
-    "GBs of pixels": ("a.png", lambda: raw_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
-    "more than it says": ("a.png", lambda: raw_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),
-    "text": ("a.png", text_bomb, "cell", "expected a complete PNG"),
+    "pixels of a bomb": ("a.png", lambda: encode_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
+    "GBs of pixels": ("a.png", lambda: encode_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
+    "more than it says": ("a.png", lambda: encode_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),
+    "text": ("a.png", build_text_bomb, "cell", "expected a complete PNG"),
     "10^9 cells": ("a.pgm", lambda: b"P5 31623 31623 255\n" + b"\xff" * 1000, "cell", TOO_MANY),
     "10^9 plain cells": ("a.pgm", lambda: b"P2 1 999999999 255\n" + b"1 " * 1000, "cell", TOO_MANY),
     "cut off": ("a.pgm", lambda: b"P5 8000 8000 65535\n" + b"\xff" * 1000, "cell", "pixels, got 500"),
     "a grid of 10^9": ("a.map", lambda: GRID % (31623, 31623), "", TOO_MANY),
     "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 characters"),
-    "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
-    "10^9 of a JPEG": ("a.jpg", lambda: write_header(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
-    "a JPEG cut off": ("a.jpg", lambda: write_header(large("JPEG", 997), 997, 8000), "cell", "complete JPEG"),
-    "a BMP cut off": ("a.bmp", lambda: write_header(large("BMP", 997), 997, 8000), "cell", "complete BMP"),
+    "noise": ("a.pgm", lambda: build_pgm(CHESS_BOARD), "cell", "vertices"),
+    "10^9 of a JPEG": ("a.jpg", lambda: write_header(paint("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
+    "a JPEG cut off": ("a.jpg", lambda: write_header(paint("JPEG", 997), 997, 8000), "cell", "complete JPEG"),
+    "a BMP cut off": ("a.bmp", lambda: write_header(paint("BMP", 997), 997, 8000), "cell", "complete BMP"),
     "a TIFF cut off": (
-        "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "complete TIFF"
+        "a.tif", lambda: paint("TIFF", 4000, 9000, compression="packbits"), "cell", "complete TIFF"
     ),
-    "10^9 of a TIFF": ("a.tif", lambda: write_header(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
+    "10^9 of a TIFF": ("a.tif", lambda: write_header(paint("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
     "a TIFF of nothing": (
         "a.tif",
-        lambda: write_header(large("TIFF", 997, compression="tiff_lzw"), 997, 8000),
+        lambda: write_header(paint("TIFF", 997, compression="tiff_lzw"), 997, 8000),
         "cell",
         "complete TIFF",
     ),
     "a wide TIFF": (
         "a.tif",
-        lambda: write_header(large("TIFF", 997, compression="group4"), 997, 8000),
+        lambda: write_header(paint("TIFF", 997, compression="group4"), 997, 8000),
         "cell",
         "complete TIFF",
     ),
     "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "pixels, got 333"),
     "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "complete PPM"),
     "laughs": ("a.yaml", build_yaml_bomb, "", "expected at most 50000 values, including those of aliases"),
-    "depth": ("a.yaml", deep_yaml, "", "nested too deeply"),
+    "depth": ("a.yaml", build_deep_yaml, "", "nested too deeply"),
     "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "most 0.262 MB"),
     "a terabyte": ("a.pgm", None, "cell", "expected at most 256 MB"),
 }  # fmt: skip
@@ -159,7 +160,7 @@ def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_valid_raster_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "a.pgm"
-    path.write_bytes(pgm(draw_pixels(PLAN)))
+    path.write_bytes(build_pgm(draw_pixels(PLAN)))
     ((said, _, memory),) = measure_import([(path, 1.0)])
     assert said == "accepted"
     assert memory < MEMORY

@@ -16,25 +16,25 @@ SECONDS = 4.0
 """CPU time: four times the documented limit (twice for files of 50 MB), because machines are busy."""
 
 
-def _knot(count: int) -> list[list[float]]:
+def _build_knot(count: int) -> list[list[float]]:
     return np.random.default_rng(0).random((count, 2)).round(3).tolist()
 
 
-def _svg(body: str) -> bytes:
+def _build_svg(body: str) -> bytes:
     return f'<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>'.encode()
 
 
-def _lol() -> bytes:
+def _build_billion_laughs() -> bytes:
     entities = "".join(f'<!ENTITY l{k + 1} "{f"&l{k};" * 10}">' for k in range(9))
     return f'<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY l0 "lol">{entities}]><svg>&l9;</svg>'.encode()
 
 
 def _uses(levels: int) -> bytes:
     groups = "".join(f'<g id="g{k + 1}">' + f'<use href="#g{k}"/>' * 10 + "</g>" for k in range(levels))
-    return _svg(f'<defs><path id="g0" d="M0 0h1v1z"/>{groups}</defs><use href="#g{levels}"/>')
+    return _build_svg(f'<defs><path id="g0" d="M0 0h1v1z"/>{groups}</defs><use href="#g{levels}"/>')
 
 
-def _blocks(folder: Path, levels: int) -> bytes:
+def _build_blocks(folder: Path, levels: int) -> bytes:
     document = ezdxf.new()
     document.blocks.new("b0").add_line((0, 0), (1, 1))
     for k in range(levels):
@@ -46,44 +46,46 @@ def _blocks(folder: Path, levels: int) -> bytes:
     return (folder / "made.dxf").read_bytes()
 
 
-def _tmx(body: str, size: int = 4) -> bytes:
+def _build_tmx(body: str, size: int = 4) -> bytes:
     sides = f'width="{size}" height="{size}" tilewidth="8" tileheight="8"'
     return f'<map {sides}><layer name="walls" width="{size}" height="{size}">{body}</layer></map>'.encode()
 
 
-def _macros(levels: int) -> bytes:
+def _build_macros(levels: int) -> bytes:
     """Return a world of Stage in which each macro is ten of the next."""
     calls = "".join(f"define m{k} model ( {f'm{k + 1} ( ) ' * 10} )\n" for k in range(levels))
     return f"{calls}m0 ( )".encode()
 
 
-def _files(folder: Path) -> dict[str, bytes]:
+def _build_files(folder: Path) -> dict[str, bytes]:
     head = b"0\nSECTION\n2\nENTITIES\n"
     circle = b"0\nCIRCLE\n8\n0\n10\n0\n20\n0\n40\n9e6\n"
-    knot = _knot(5000)
+    knot = _build_knot(5000)
     ring = ",".join(f"{x} {y}" for x, y in knot)
     return {
-        "lol.svg": _lol(),
+        "lol.svg": _build_billion_laughs(),
         "uses.svg": _uses(9),
-        "loop.svg": _svg('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>'),
+        "loop.svg": _build_svg('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>'),
         "deep.svg": b"<svg>" + b"<g>" * 500_000,
-        "many.svg": _svg("<g/>" * 1_000_000),
+        "many.svg": _build_svg("<g/>" * 1_000_000),
         "attributes.svg": b"<svg " + b" ".join(b"a%d='1'" % k for k in range(1_100_000)) + b"/>",
-        "path.svg": _svg(f'<path d="M0 0{"l1 1" * (10 * MB)}"/>'),
-        "arcs.svg": _svg('<path d="M0 0' + "A1e7 1e7 0 1 1 0 1A1e7 1e7 0 1 0 0 0" * 5000 + 'z"/>'),
-        "circles.svg": _svg('<circle r="9e6"/>' * 50_000),
-        "knot.svg": _svg('<path d="M' + " ".join(f"{x} {y}" for x, y in knot) + 'z"/>'),
-        "knots.svg": _svg(
+        "path.svg": _build_svg(f'<path d="M0 0{"l1 1" * (10 * MB)}"/>'),
+        "arcs.svg": _build_svg('<path d="M0 0' + "A1e7 1e7 0 1 1 0 1A1e7 1e7 0 1 0 0 0" * 5000 + 'z"/>'),
+        "circles.svg": _build_svg('<circle r="9e6"/>' * 50_000),
+        "knot.svg": _build_svg('<path d="M' + " ".join(f"{x} {y}" for x, y in knot) + 'z"/>'),
+        "knots.svg": _build_svg(
             '<path fill="none" stroke="red" d="M' + " ".join(f"{x} {y}" for x, y in knot) + '"/>'
         ),
-        "rules.svg": _svg("<style>" + "*{fill:red}" * 9000 + "</style>" + "<rect/>" * 90_000),
-        "digits.svg": _svg(f'<rect width="{"1" * MB}!" height="1"/>'),
-        "spaces.svg": _svg(f'<rect width="1{" " * MB}!" height="1"/>'),
-        "style.svg": _svg("<style>" + "x" * (MB - 10) + "</style>"),
-        "comments.svg": _svg("<style>" + "/*" * (MB // 2 - 10) + "</style>"),
-        "important.svg": _svg("<style>a{b:" + " " * (MB - 50) + "x}</style>"),
-        "huge.svg": _svg('<rect width="1e300" height="1e300"/>'),
-        "scales.svg": _svg('<g transform="scale(1e25)">' * 20 + '<rect width="1" height="1"/>' + "</g>" * 20),
+        "rules.svg": _build_svg("<style>" + "*{fill:red}" * 9000 + "</style>" + "<rect/>" * 90_000),
+        "digits.svg": _build_svg(f'<rect width="{"1" * MB}!" height="1"/>'),
+        "spaces.svg": _build_svg(f'<rect width="1{" " * MB}!" height="1"/>'),
+        "style.svg": _build_svg("<style>" + "x" * (MB - 10) + "</style>"),
+        "comments.svg": _build_svg("<style>" + "/*" * (MB // 2 - 10) + "</style>"),
+        "important.svg": _build_svg("<style>a{b:" + " " * (MB - 50) + "x}</style>"),
+        "huge.svg": _build_svg('<rect width="1e300" height="1e300"/>'),
+        "scales.svg": _build_svg(
+            '<g transform="scale(1e25)">' * 20 + '<rect width="1" height="1"/>' + "</g>" * 20
+        ),
         "vertices.wkt": b"POLYGON((" + b"0 0," * (12 * MB) + b"0 0))",
         "deep.wkt": b"GEOMETRYCOLLECTION(" * 200_000,
         "knot.wkt": f"POLYGON(({ring}))".encode(),
@@ -101,20 +103,20 @@ def _files(folder: Path) -> dict[str, bytes]:
         "knot.json": json.dumps([knot]).encode(),
         "plan.json": json.dumps({"verts": knot}).encode(),
         "vertices.json": b'{"verts":[' + b"[0,0]," * MB + b"[0,0]]}",
-        "bomb.tmx": _tmx(
+        "bomb.tmx": _build_tmx(
             '<data encoding="base64" compression="zlib">'
             + base64.b64encode(zlib.compress(bytes(500 * MB // 2), 9)).decode()
             + "</data>"
         ),
-        "wide.tmx": _tmx('<data encoding="csv">1</data>', 10**9),
-        "chunks.tmx": _tmx(
+        "wide.tmx": _build_tmx('<data encoding="csv">1</data>', 10**9),
+        "chunks.tmx": _build_tmx(
             '<data encoding="csv">'
             + "".join(f'<chunk x="{x}" y="{x}" width="1" height="1">1</chunk>' for x in (-(10**7), 10**7))
             + "</data>"
         ).replace(b"<map", b'<map infinite="1"'),
-        "numbers.tmx": _tmx(f'<data encoding="csv">{"1," * (20 * MB)}1</data>'),
-        "rough.tmx": _tmx(f'<data encoding="csv">{",".join(("01" * MB)[: 1413**2])}</data>', 1413),
-        "macros.world": _macros(30),
+        "numbers.tmx": _build_tmx(f'<data encoding="csv">{"1," * (20 * MB)}1</data>'),
+        "rough.tmx": _build_tmx(f'<data encoding="csv">{",".join(("01" * MB)[: 1413**2])}</data>', 1413),
+        "macros.world": _build_macros(30),
         "words.world": b"model ( a 1 ) " * (MB // 3),
         "deep.world": b"model ( " * (MB // 2),
         "blank.world": b"#\n" * (5 * MB // 2),
@@ -132,8 +134,8 @@ def _files(folder: Path) -> dict[str, bytes]:
         "knot.yaml": b"world: {}\nobstacle: {shape: {name: polygon, vertices: "
         + json.dumps(knot).encode()
         + b"}}",
-        "blocks.dxf": _blocks(folder, 9),
-        "towers.dxf": _blocks(folder, 31),
+        "blocks.dxf": _build_blocks(folder, 9),
+        "towers.dxf": _build_blocks(folder, 31),
         "vertices.dxf": head + b"10\n0\n20\n0\n" * MB,
         "lines.dxf": head + b"1\n\n" * (9 * MB),
         "circles.dxf": head + circle * 5_000 + b"0\nENDSEC\n0\nEOF\n",
@@ -146,7 +148,7 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_hostile_files_are_refused_within_seconds_and_200_mb(tmp_path: Path) -> None:
-    files = _files(tmp_path)
+    files = _build_files(tmp_path)
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
         assert len(content) <= 52 * MB

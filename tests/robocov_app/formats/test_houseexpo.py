@@ -30,7 +30,7 @@ def write(folder: Path, document: Any, name: str = "plan.json") -> Path:
     return path
 
 
-def plan(verts: Any, **others: Any) -> dict[str, Any]:
+def build_plan(verts: Any, **others: Any) -> dict[str, Any]:
     return {"verts": verts, "id": "abc", "room_num": 2, "room_category": {}, "bbox": {}} | others
 
 
@@ -41,7 +41,7 @@ def import_plan(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
 
 
 def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
-    path = write(tmp_path, plan(PLAN))
+    path = write(tmp_path, build_plan(PLAN))
     assert detect_format(path).name == "houseexpo"
     environment, report = import_plan(path)
     assert environment.name == "HouseExpo abc"
@@ -58,20 +58,20 @@ def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
 
 
 def test_cut_corners_are_completed(tmp_path: Path) -> None:
-    environment, report = import_plan(write(tmp_path, plan(PLAN)))
+    environment, report = import_plan(write(tmp_path, build_plan(PLAN)))
     assert report.vertices_kept == 12
     assert set(environment.boundary) == {
         (0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (4.1, 1.0), (4.1, 0.0), (8.1, 0.0),
         (8.1, 3.0), (4.1, 3.0), (4.1, 1.9), (4.0, 1.9), (4.0, 3.0), (0.0, 3.0),
     }  # fmt: skip
-    untouched, report = import_plan(write(tmp_path, plan(PLAN)), simplify=0.0)
+    untouched, report = import_plan(write(tmp_path, build_plan(PLAN)), simplify=0.0)
     assert report.vertices_kept == 17
     assert set(untouched.boundary) == {(float(x), float(y)) for x, y in PLAN}
 
 
 def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
     verts = [[0, 0], [5, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
-    environment, report = import_plan(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert len(environment.boundary) == 4
     assert environment.area == 15.0
     assert report.repaired == ("2 repeated vertices removed",)
@@ -80,7 +80,7 @@ def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
 def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
     # a bow tie of 8 m² and 2 m²
     verts = [[0, 0], [0, 4], [6, -2], [6, 0]]
-    environment, report = import_plan(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert environment.area == pytest.approx(8.0)
     assert report.area_read == pytest.approx(10.0)
     assert report.area_kept == pytest.approx(8.0)
@@ -91,14 +91,14 @@ def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
 def test_a_ring_around_a_block_gives_an_obstacle(tmp_path: Path) -> None:
     # the outline runs in to a block, round it, and out again the same way
     verts = [[0, 0], [6, 0], [6, 6], [0, 6], [0, 3], [2, 3], [2, 4], [4, 4], [4, 2], [2, 2], [2, 3], [0, 3]]
-    environment, report = import_plan(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert environment.free_area == pytest.approx(36 - 4)
     assert [type(obstacle) for obstacle in environment.obstacles] == [PolygonObstacle]
     assert report.repaired
 
 
 def test_starts_are_added(tmp_path: Path) -> None:
-    path = write(tmp_path, plan(PLAN))
+    path = write(tmp_path, build_plan(PLAN))
     environment, _ = import_plan(path)
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
     assert len(environment.start("room").sample(6)) == 6
@@ -113,17 +113,17 @@ def test_starts_are_added(tmp_path: Path) -> None:
     [
         ([], "not a HouseExpo plan"),
         ({"vertices": []}, 'expected an object with "verts"'),
-        (plan([]), "verts: expected a list of at least 3 points"),
-        (plan("many"), "verts: expected a list"),
-        (plan([[0, 0], [1, 0], [1, "1"]]), "verts[2]: expected a point [x, y] in meters"),
-        (plan([[0, 0], [1, True], [1, 1]]), "verts[1]: expected a point"),
-        (plan([[0, 0], [1, 0, 0], [1, 1]]), "verts[1]: expected a point"),
-        (plan([[0, 0], [1, 0], [1e9, 1]]), "verts[2]: expected a point"),
-        (plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "verts: expected an outline with an area"),
-        (plan([[0, 0], [0, 0], [1, 1]]), "verts: expected at least 3"),
-        (plan([[0, 0], [1, 1], [3, 3]]), "verts: expected an outline with an area"),
-        (plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no position has enough clearance for a robot"),
-        (plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
+        (build_plan([]), "verts: expected a list of at least 3 points"),
+        (build_plan("many"), "verts: expected a list"),
+        (build_plan([[0, 0], [1, 0], [1, "1"]]), "verts[2]: expected a point [x, y] in meters"),
+        (build_plan([[0, 0], [1, True], [1, 1]]), "verts[1]: expected a point"),
+        (build_plan([[0, 0], [1, 0, 0], [1, 1]]), "verts[1]: expected a point"),
+        (build_plan([[0, 0], [1, 0], [1e9, 1]]), "verts[2]: expected a point"),
+        (build_plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "verts: expected an outline with an area"),
+        (build_plan([[0, 0], [0, 0], [1, 1]]), "verts: expected at least 3"),
+        (build_plan([[0, 0], [1, 1], [3, 3]]), "verts: expected an outline with an area"),
+        (build_plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no position has enough clearance for a robot"),
+        (build_plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
     ],
 )
 def test_invalid_plans_are_refused_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
@@ -150,7 +150,7 @@ def test_only_cut_corners_are_completed() -> None:
 
 
 def test_options_out_of_range_are_refused(tmp_path: Path) -> None:
-    path = write(tmp_path, plan(PLAN))
+    path = write(tmp_path, build_plan(PLAN))
     for tolerance in (-1.0, math.nan, 11.0):
         with pytest.raises(ParameterError, match="simplify"):
             import_plan(path, simplify=tolerance)
@@ -173,7 +173,7 @@ def test_other_files_are_not_recognized(tmp_path: Path) -> None:
 def test_any_ring_is_imported_or_refused(
     tmp_path_factory: pytest.TempPathFactory, verts: list[tuple[int, int]], tolerance: float
 ) -> None:
-    path = write(tmp_path_factory.getbasetemp(), plan([[x / 4, y / 4] for x, y in verts]))
+    path = write(tmp_path_factory.getbasetemp(), build_plan([[x / 4, y / 4] for x, y in verts]))
     message = None
     try:
         environment, report = import_plan(path, simplify=tolerance)

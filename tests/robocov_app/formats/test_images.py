@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, PngImagePlugin
-from raster_files import chunk, pgm, raw_png
+from raster_files import build_chunk, build_pgm, encode_png
 
 from robocov.errors import MapError
 from robocov_app.formats.raster.picture import Brightness, is_picture, read_picture
@@ -19,7 +19,7 @@ GRAY = np.array([[0, 17, 34, 255], [255, 204, 119, 0], [136, 0, 255, 51]], dtype
 """Multiples of 17: as exact in 4 bits as in 8."""
 
 
-def png(image: Image.Image, **options: object) -> bytes:
+def save_png(image: Image.Image, **options: object) -> bytes:
     stream = io.BytesIO()
     image.save(stream, format="PNG", **options)
     return stream.getvalue()
@@ -41,17 +41,17 @@ def test_pgm_of_8_and_16_bits_is_read(tmp_path: Path) -> None:
     )
     deep = np.rint(GRAY / 255 * 65535).astype(int)
     files = [
-        pgm(GRAY),
-        pgm(GRAY, head="# one\n#two\n\n"),
-        pgm(GRAY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
+        build_pgm(GRAY),
+        build_pgm(GRAY, head="# one\n#two\n\n"),
+        build_pgm(GRAY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
         b"P5\r\n4 3\r\n255\r\n" + GRAY.tobytes(),
-        pgm(GRAY) + b"and more after it",
+        build_pgm(GRAY) + b"and more after it",
         plain.encode(),
         plain.replace("\n", "\r\n").encode(),
         plain.replace("17 34", "17 # in the midst\n34").encode(),
-        pgm(deep, 65535),
+        build_pgm(deep, 65535),
         f"P2 4 3 65535 {' '.join(map(str, deep.ravel()))}".encode(),
-        pgm(np.rint(GRAY / 255 * 15), 15),
+        build_pgm(np.rint(GRAY / 255 * 15), 15),
     ]
     for data in files:
         picture = read(tmp_path, data)
@@ -70,12 +70,12 @@ def test_png_of_every_depth_and_color_is_read(tmp_path: Path) -> None:
     )
     deep = b"".join(b"\0" + (row.astype(">u2") * 257).tobytes() for row in GRAY)
     files = {
-        "8 bit": png(base),
-        "4 bit": raw_png(4, 3, 4, 0, packed),
-        "16 bit": raw_png(4, 3, 16, 0, deep),
-        "palette": png(base.convert("P")),
-        "RGB": png(base.convert("RGB")),
-        "interlaced": raw_png(1, 1, 8, 0, b"\0\x77", interlaced=1),
+        "8 bit": save_png(base),
+        "4 bit": encode_png(4, 3, 4, 0, packed),
+        "16 bit": encode_png(4, 3, 16, 0, deep),
+        "palette": save_png(base.convert("P")),
+        "RGB": save_png(base.convert("RGB")),
+        "interlaced": encode_png(1, 1, 8, 0, b"\0\x77", interlaced=1),
     }
     for name, data in files.items():
         picture = read(tmp_path, data)
@@ -85,22 +85,22 @@ def test_png_of_every_depth_and_color_is_read(tmp_path: Path) -> None:
     for bits, step in ((1, 255), (2, 85)):
         levels = np.array([0, 1, 1, 0] if bits == 1 else [0, 1, 3, 2])
         row = int(sum(int(v) << (8 - bits * (k + 1)) for k, v in enumerate(levels)))
-        picture = read(tmp_path, raw_png(4, 1, bits, 0, bytes((0, row))))
+        picture = read(tmp_path, encode_png(4, 1, bits, 0, bytes((0, row))))
         np.testing.assert_array_equal(shade(picture)[0], levels * step / 255)
 
 
 def test_colors_are_averaged_and_alpha_is_separate(tmp_path: Path) -> None:
     colors = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
-    picture = read(tmp_path, png(Image.fromarray(colors)))
+    picture = read(tmp_path, save_png(Image.fromarray(colors)))
     assert picture.max_level == 765
     assert picture.level.tolist() == [[255, 255, 60]]
     assert picture.alpha is not None
     assert picture.alpha.tolist() == [[255, 128, 0]]
-    gray = read(tmp_path, png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
+    gray = read(tmp_path, save_png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
     assert (gray.max_level, gray.level.tolist()) == (255, [[7, 9]])
     assert gray.alpha is not None and gray.alpha.tolist() == [[255, 3]]
     deep = b"\0" + struct.pack(">8H", 65535, 0, 0, 65535, 257, 514, 771, 0)
-    picture = read(tmp_path, raw_png(2, 1, 16, 6, deep))
+    picture = read(tmp_path, encode_png(2, 1, 16, 6, deep))
     assert picture.level.tolist() == [[255, 6]]
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0]]
 
@@ -110,10 +110,10 @@ def test_transparent_colors_are_recognized(tmp_path: Path) -> None:
     palette = Image.new("P", (3, 1))
     palette.putpalette([0, 0, 0, 255, 255, 255, 100, 100, 100])
     palette.putdata([0, 1, 2])
-    picture = read(tmp_path, png(palette, transparency=2))
+    picture = read(tmp_path, save_png(palette, transparency=2))
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 255, 0]]
     assert picture.level.tolist() == [[0, 765, 300]]
-    picture = read(tmp_path, png(image, transparency=1))
+    picture = read(tmp_path, save_png(image, transparency=1))
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0, 255]]
 
 
@@ -121,7 +121,7 @@ def test_texts_in_png_are_read(tmp_path: Path) -> None:
     texts = PngImagePlugin.PngInfo()
     texts.add_text("Title", "a plan")
     texts.add_itxt("robocov", "α", zip=True)
-    picture = read(tmp_path, png(Image.fromarray(GRAY), pnginfo=texts))
+    picture = read(tmp_path, save_png(Image.fromarray(GRAY), pnginfo=texts))
     assert picture.texts["Title"] == "a plan"
     assert picture.texts["robocov"] == "α"
 
@@ -134,7 +134,7 @@ def test_long_plain_pictures_are_read_piece_by_piece(tmp_path: Path) -> None:
 
 def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
     tall = np.random.default_rng(1).integers(0, 256, (1500, 3, 3), dtype=np.uint8)
-    picture = read(tmp_path, png(Image.fromarray(tall)))
+    picture = read(tmp_path, save_png(Image.fromarray(tall)))
     np.testing.assert_array_equal(picture.level, tall.sum(axis=2))
 
 
@@ -200,27 +200,30 @@ def test_tiff_of_16_bits_is_read(tmp_path: Path, kind: str, white_is_zero: bool)
     np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - expected if white_is_zero else expected)
 
 
-def floats(values: list[list[float]]) -> bytes:
+def encode_floats(values: list[list[float]]) -> bytes:
     return save_picture(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
 
 
 def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
-    picture = read(tmp_path, floats([[0.0, 0.25, 1.0], [0.5, math.nan, -0.0]]))
+    picture = read(tmp_path, encode_floats([[0.0, 0.25, 1.0], [0.5, math.nan, -0.0]]))
     np.testing.assert_allclose(shade(picture), [[0, 0.25, 1], [0.5, 0, 0]], atol=1e-4)
     assert picture.alpha is not None
     assert (picture.alpha == [[255, 255, 255], [255, 0, 255]]).all()
-    assert read(tmp_path, floats([[0.0, 1.0]])).alpha is None
+    assert read(tmp_path, encode_floats([[0.0, 1.0]])).alpha is None
 
 
 @pytest.mark.parametrize(
     ("image", "found"),
     [
         (
-            floats([[0.0, 812.5], [-3.0, 1.0]]),
+            encode_floats([[0.0, 812.5], [-3.0, 1.0]]),
             "floating-point samples from 0 (black) to 1 (white), got -3 to 812.5",
         ),
-        (floats([[0.0, 255.0]]), "floating-point samples from 0 (black) to 1 (white), got 0 to 255"),
-        (floats([[math.nan, math.inf]]), "samples from 0 (black) to 1 (white), got none that is a number"),
+        (encode_floats([[0.0, 255.0]]), "floating-point samples from 0 (black) to 1 (white), got 0 to 255"),
+        (
+            encode_floats([[math.nan, math.inf]]),
+            "samples from 0 (black) to 1 (white), got none that is a number",
+        ),
         (save_picture(Image.new("I", (3, 3)), "TIFF"), "unsigned samples of up to 16 bits"),
     ],
     ids=["heights", "bytes", "nan", "whole"],
@@ -264,7 +267,7 @@ def test_ppm_of_16_bits_and_in_ascii_is_read(tmp_path: Path) -> None:
         np.testing.assert_array_equal(shade(read(tmp_path, data)), COLORS.sum(axis=2) / 765)
 
 
-WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), dtype=np.uint8)))
+WHOLE = save_png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), dtype=np.uint8)))
 
 
 @pytest.mark.parametrize(
@@ -300,13 +303,13 @@ WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), 
         (WHOLE[:-60], "got a broken one: image file is truncated"),
         (WHOLE.replace(b"IHDR", b"JHDR"), "got a broken one: cannot identify image file"),
         (WHOLE[:50] + b"\0\0\0\0\0\0\0\0" + WHOLE[58:], "got a broken one: "),
-        (raw_png(100000, 100000, 8, 0, b"\0" * 1000), "at most 64 million"),
-        (raw_png(9000, 9000, 8, 0, b"\0" * 1000), "expected at most 64 million"),
-        (raw_png(0, 5, 8, 0, b""), "got a broken one: "),
-        (raw_png(8000, 8000, 16, 6, b"\0" * 10**6), "got a broken one: image file is truncated"),
-        (raw_png(2, 2, 3, 0, b"\0\0\0\0"), "got a broken one: "),
-        (raw_png(2, 2, 8, 5, b"\0\0\0\0\0\0"), "PNG"),
-        (WHOLE[:33] + chunk(b"iCCP", b"") + WHOLE[33:], "got a broken one: cannot identify image file"),
+        (encode_png(100000, 100000, 8, 0, b"\0" * 1000), "at most 64 million"),
+        (encode_png(9000, 9000, 8, 0, b"\0" * 1000), "expected at most 64 million"),
+        (encode_png(0, 5, 8, 0, b""), "got a broken one: "),
+        (encode_png(8000, 8000, 16, 6, b"\0" * 10**6), "got a broken one: image file is truncated"),
+        (encode_png(2, 2, 3, 0, b"\0\0\0\0"), "got a broken one: "),
+        (encode_png(2, 2, 8, 5, b"\0\0\0\0\0\0"), "PNG"),
+        (WHOLE[:33] + build_chunk(b"iCCP", b"") + WHOLE[33:], "got a broken one: cannot identify image file"),
     ],
     ids=map(str, range(99)),
 )  # fmt: skip

@@ -21,11 +21,11 @@ GROUND = "11111111-0000"
 UPSTAIRS = "11111111-0001"
 
 
-def degrees(points: list[tuple[float, float]]) -> list[list[float]]:
+def convert_to_degrees(points: list[tuple[float, float]]) -> list[list[float]]:
     return [[round(value, 9) for value in PLANE(x, y, inverse=True)] for x, y in points]
 
 
-def feature(kind: str, geometry: Any, **properties: Any) -> dict[str, Any]:
+def build_feature(kind: str, geometry: Any, **properties: Any) -> dict[str, Any]:
     return {
         "id": f"{kind}-0",
         "type": "Feature",
@@ -35,48 +35,50 @@ def feature(kind: str, geometry: Any, **properties: Any) -> dict[str, Any]:
     }
 
 
-def polygon(*points: tuple[float, float]) -> dict[str, Any]:
-    return {"type": "Polygon", "coordinates": [degrees([*points, points[0]])]}
+def build_polygon(*points: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [convert_to_degrees([*points, points[0]])]}
 
 
-def area(x: float, y: float, right: float, top: float) -> dict[str, Any]:
-    return polygon((x, y), (right, y), (right, top), (x, top))
+def build_area(x: float, y: float, right: float, top: float) -> dict[str, Any]:
+    return build_polygon((x, y), (right, y), (right, top), (x, top))
 
 
-def line(*points: tuple[float, float]) -> dict[str, Any]:
-    return {"type": "LineString", "coordinates": degrees([*points])}
+def build_line(*points: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": convert_to_degrees([*points])}
 
 
-def unit(category: str, *sides: float, level: str = GROUND, name: str | None = None) -> dict[str, Any]:
+def build_unit(category: str, *sides: float, level: str = GROUND, name: str | None = None) -> dict[str, Any]:
     names = None if name is None else {"en": name}
-    return feature("unit", area(*sides), category=category, level_id=level, name=names)
+    return build_feature("unit", build_area(*sides), category=category, level_id=level, name=names)
 
 
-def venue() -> dict[str, list[dict[str, Any]]]:
+def build_venue() -> dict[str, list[dict[str, Any]]]:
     """Return a walkway between rooms: A with an edge in common, B behind a wall, C without an opening."""
     levels = []
     for number, ordinal, short, name in ((GROUND, 0, "EG", "Ground"), (UPSTAIRS, 1, "OG", "Upper floor")):
-        one = feature(
-            "level", area(0, 0, 30, 20), ordinal=ordinal, short_name={"de": short}, name={"en": name}
+        one = build_feature(
+            "level", build_area(0, 0, 30, 20), ordinal=ordinal, short_name={"de": short}, name={"en": name}
         )
         levels.append({**one, "id": number})
     return {
-        "venue": [feature("venue", area(0, 0, 30, 20), name={"en": "Old mill"}, category="museum")],
+        "venue": [
+            build_feature("venue", build_area(0, 0, 30, 20), name={"en": "Old mill"}, category="museum")
+        ],
         "level": levels,
         "unit": [
-            feature("unit", polygon(*WALKWAY), category="walkway", level_id=GROUND),
-            unit("office", 0, 12, 10, 20, name="A"),
-            unit("office", 0, 0, 10, 7.8, name="B"),
-            unit("office", 20, 12, 30, 20, name="C"),
-            unit("stairs", 20, 0, 30, 8),
-            unit("column", 14, 9, 15, 10),
-            unit("walkway", 0, 0, 30, 20, level=UPSTAIRS),
+            build_feature("unit", build_polygon(*WALKWAY), category="walkway", level_id=GROUND),
+            build_unit("office", 0, 12, 10, 20, name="A"),
+            build_unit("office", 0, 0, 10, 7.8, name="B"),
+            build_unit("office", 20, 12, 30, 20, name="C"),
+            build_unit("stairs", 20, 0, 30, 8),
+            build_unit("column", 14, 9, 15, 10),
+            build_unit("walkway", 0, 0, 30, 20, level=UPSTAIRS),
         ],
         "opening": [
-            feature("opening", line((4, 12), (5.5, 12)), category="pedestrian", level_id=GROUND),
-            feature("opening", line((4, 7.8), (5, 7.8)), category="pedestrian", level_id=GROUND),
+            build_feature("opening", build_line((4, 12), (5.5, 12)), category="pedestrian", level_id=GROUND),
+            build_feature("opening", build_line((4, 7.8), (5, 7.8)), category="pedestrian", level_id=GROUND),
         ],
-        "fixture": [feature("fixture", area(2, 16, 4, 18), category="desk", level_id=GROUND)],
+        "fixture": [build_feature("fixture", build_area(2, 16, 4, 18), category="desk", level_id=GROUND)],
     }
 
 
@@ -109,7 +111,7 @@ def move_to_corner(free: Any) -> Any:
 
 @pytest.mark.parametrize("kind", ["folder", "zip", "zip in a folder"])
 def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -> None:
-    files = venue()
+    files = build_venue()
     if kind == "folder":
         path = write_folder(tmp_path / "mill", files)
     else:
@@ -130,7 +132,7 @@ def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -
 
 
 def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:
-    environment, report, _ = import_map(write_folder(tmp_path / "mill", venue()))
+    environment, report, _ = import_map(write_folder(tmp_path / "mill", build_venue()))
     # the walls stand on the outlines, half of them in each room
     walkway = 30 * 4 - 1
     rooms = 10 * 8 + 10 * 7.8 - 4
@@ -140,17 +142,17 @@ def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("asked", ["1", "1.0", "OG", "upper floor", UPSTAIRS])
 def test_a_level_is_chosen_by_number_or_name(tmp_path: Path, asked: str) -> None:
-    foreign = read(write_folder(tmp_path / "mill", venue()), level=asked)
+    foreign = read(write_folder(tmp_path / "mill", build_venue()), level=asked)
     assert foreign.free.area == pytest.approx(600, rel=1e-4)
 
 
 def test_a_missing_level_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got '7'"):
-        read(write_folder(tmp_path / "mill", venue()), level="7")
+        read(write_folder(tmp_path / "mill", build_venue()), level="7")
 
 
 def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:
-    files = venue()
+    files = build_venue()
     del files["opening"]
     foreign = read(write_folder(tmp_path / "mill", files))
     part = next(part for part in move_to_corner(foreign.free).geoms if part.contains(Point(1, 10)))
@@ -158,7 +160,7 @@ def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:
     assert "no door or opening on this level: 3 rooms are open to adjacent spaces" in foreign.notes
 
 
-def bomb() -> bytes:
+def build_bomb() -> bytes:
     """Return a zip of 100 kB that unpacks to 100 MB."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -166,7 +168,7 @@ def bomb() -> bytes:
     return file.getvalue()
 
 
-def many() -> bytes:
+def build_many_files() -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for k in range(1001):
@@ -177,10 +179,10 @@ def many() -> bytes:
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        (bomb(), "expected at most 50 MB when unpacked, got more"),
-        (many(), "expected an archive of at most 1000 files, got more"),
-        (bomb()[:50_000], "expected a whole zip archive, got a broken one: File is not a zip file"),
-        (many()[:300] + bomb()[300:], "expected a whole zip archive, got a broken one"),
+        (build_bomb(), "expected at most 50 MB when unpacked, got more"),
+        (build_many_files(), "expected an archive of at most 1000 files, got more"),
+        (build_bomb()[:50_000], "expected a whole zip archive, got a broken one: File is not a zip file"),
+        (build_many_files()[:300] + build_bomb()[300:], "expected a whole zip archive, got a broken one"),
     ],
     ids=["bomb", "many", "cut", "mixed"],
 )
@@ -198,17 +200,17 @@ def test_invalid_content_is_refused(tmp_path: Path) -> None:
         ("level", [], "expected units on its levels, got none"),
         ("unit", [], "expected units on its levels, got none"),
         ("unit", [3], "unit.geojson:1:44: features[0]: expected a feature with properties, got 3"),
-        ("unit", [{**unit("office", 0, 0, 9, 9), "properties": {"level_id": []}}], "got none"),
+        ("unit", [{**build_unit("office", 0, 0, 9, 9), "properties": {"level_id": []}}], "got none"),
         (
             "level",
-            [feature("level", None)],
+            [build_feature("level", None)],
             "features[0].properties.ordinal: expected the number of a floor, got null",
         ),
-        ("unit", [unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
-        ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
+        ("unit", [build_unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
+        ("unit", [build_unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
     ]
     for k, (name, features, expected) in enumerate(cases):
-        path = write_folder(tmp_path / f"mill{k}", {**venue(), name: features})
+        path = write_folder(tmp_path / f"mill{k}", {**build_venue(), name: features})
         with pytest.raises(MapError) as caught:
             read(path)
         assert expected in str(caught.value)
@@ -223,17 +225,17 @@ def test_other_folders_and_archives_are_not_imdf(tmp_path: Path) -> None:
         archive.writestr("readme.txt", b"hello")
     with pytest.raises(MapError, match="zip archive"):
         detect_format(other)
-    half = write_zip(tmp_path / "half.zip", {"unit": venue()["unit"]})
+    half = write_zip(tmp_path / "half.zip", {"unit": build_venue()["unit"]})
     with pytest.raises(MapError, match=r"expected level\.geojson in it"):
         read(half)
 
 
 def test_hairlines_between_units_are_closed(tmp_path: Path) -> None:
-    files = venue()
+    files = build_venue()
     del files["opening"]
     # Rotated, and without the corners of adjacent rooms: edges miss each other by some micrometers.
-    files["unit"][0]["geometry"] = polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
-    files["unit"][1]["geometry"] = polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
+    files["unit"][0]["geometry"] = build_polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
+    files["unit"][1]["geometry"] = build_polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
     foreign = read(write_folder(tmp_path / "mill", files))
     assert any(part.contains(Point(-10, 0)) and part.contains(Point(-10, 5)) for part in foreign.free.geoms)
     assert "1 gap between outlines closed" in foreign.repaired[-1]

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from raster_files import PLAN, draw_pixels, pgm, write_ros_map
+from raster_files import PLAN, build_pgm, draw_pixels, write_ros_map
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, get_importer, import_map
@@ -42,7 +42,7 @@ def test_no_format_accepts_noise(tmp_path: Path) -> None:
 
 
 def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
-    (tmp_path / "plan.map").write_bytes(pgm(draw_pixels(PLAN)))
+    (tmp_path / "plan.map").write_bytes(build_pgm(draw_pixels(PLAN)))
     assert detect_format(tmp_path / "plan.map").name == "picture"
     assert detect_format(write_ros_map(tmp_path, draw_pixels(PLAN))).name == "ros"
     (tmp_path / "half.yaml").write_text("image: plan.map\n")

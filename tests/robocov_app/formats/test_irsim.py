@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from raster_files import draw_pixels, pgm
+from raster_files import build_pgm, draw_pixels
 from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
@@ -130,7 +130,7 @@ obstacle:
 
 
 def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> None:
-    (tmp_path / "grid.pgm").write_bytes(pgm(draw_pixels("#...\n....\n...#")))
+    (tmp_path / "grid.pgm").write_bytes(build_pgm(draw_pixels("#...\n....\n...#")))
     foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")
     # cells of 2.5 x 2 m, the top row of the picture is the highest
     assert foreign.free.equals(SPACE - box(-1, 6, 1.5, 8) - box(6.5, 2, 9, 4))
@@ -143,7 +143,7 @@ def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> Non
 
 
 def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
-    (tmp_path / "far.pgm").write_bytes(pgm(draw_pixels("#.\n..")))
+    (tmp_path / "far.pgm").write_bytes(build_pgm(draw_pixels("#.\n..")))
     folder = tmp_path / "worlds"
     folder.mkdir()
     with pytest.raises(MapError, match=r"world\.obstacle_map: '\.\./far\.pgm' is outside"):
@@ -173,7 +173,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
-    (tmp_path / "a.pgm").write_bytes(pgm(np.full((2, 2), 255, np.uint8)))
+    (tmp_path / "a.pgm").write_bytes(build_pgm(np.full((2, 2), 255, np.uint8)))
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
     assert expected in str(caught.value) and "\n" not in str(caught.value)
@@ -250,7 +250,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
 ) -> None:
     cells = np.full((6, 10), 255, np.uint8)
     cells[0, 0] = 0
-    install_irsim(tmp_path, monkeypatch, pgm(cells))
+    install_irsim(tmp_path, monkeypatch, build_pgm(cells))
     foreign = read(tmp_path, BUNDLED)
     assert compute_obstacles(foreign).equals(box(-1, 7, 0, 8))
     assert "world.obstacle_map: 'cave.png' read from the installed ir-sim" in foreign.notes
@@ -259,7 +259,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
     ):
         read(tmp_path, "  obstacle_map: hall.png\n")
     # A picture next to the file has priority.
-    (tmp_path / "cave.png").write_bytes(pgm(np.full((6, 10), 255, np.uint8)))
+    (tmp_path / "cave.png").write_bytes(build_pgm(np.full((6, 10), 255, np.uint8)))
     assert compute_obstacles(read(tmp_path, BUNDLED)).is_empty
 
 

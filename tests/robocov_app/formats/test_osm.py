@@ -65,11 +65,11 @@ def format_tags(tags: dict[str, str]) -> str:
     return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
 
 
-def square(x: float, y: float, side: float) -> list[tuple[float, float]]:
+def list_corners(x: float, y: float, side: float) -> list[tuple[float, float]]:
     return [(x, y), (x + side, y), (x + side, y + side), (x, y + side)]
 
 
-def solid(folder: Path, extract: Extract, **options: Any) -> Any:
+def read_solid(folder: Path, extract: Extract, **options: Any) -> Any:
     path = folder / "town.osm"
     path.write_text(extract.text())
     assert detect_format(path) is IMPORTERS["osm"]
@@ -80,23 +80,23 @@ def solid(folder: Path, extract: Extract, **options: Any) -> Any:
 
 def test_buildings_are_projected_with_north_up(tmp_path: Path) -> None:
     extract = Extract()
-    extract.way(square(10, 5, 8), building="yes")
-    extract.way(square(-30, -20, 5), building="church", name="St. Anna")
-    found = solid(tmp_path, extract)
+    extract.way(list_corners(10, 5, 8), building="yes")
+    extract.way(list_corners(-30, -20, 5), building="church", name="St. Anna")
+    found = read_solid(tmp_path, extract)
     expected = shapely.union_all([box(10, 5, 18, 13), box(-30, -20, -25, -15)])
     assert found.symmetric_difference(expected).area < 0.05
-    assert solid(tmp_path, extract, skip=("church",)).area == pytest.approx(64, abs=0.05)
+    assert read_solid(tmp_path, extract, skip=("church",)).area == pytest.approx(64, abs=0.05)
 
 
 @pytest.mark.parametrize("roles", [("outer", "outer", "inner"), ("", "", "")])
 def test_a_relation_is_made_up_of_ways(tmp_path: Path, roles: tuple[str, str, str]) -> None:
     extract = Extract()
-    corners = [extract.node(*place) for place in square(0, 0, 20)]
+    corners = [extract.node(*place) for place in list_corners(0, 0, 20)]
     one = extract.way_through(corners[:3])
     other = extract.way_through([corners[0], corners[3], corners[2]])  # against its direction
-    court = extract.way(square(5, 5, 10))
+    court = extract.way(list_corners(5, 5, 10))
     extract.relation(*zip((one, other, court), roles, strict=True), building="school")
-    found = solid(tmp_path, extract)
+    found = read_solid(tmp_path, extract)
     assert found.symmetric_difference(box(0, 0, 20, 20) - box(5, 5, 15, 15)).area < 0.1
 
 
@@ -105,7 +105,7 @@ def test_barriers_are_walls_and_posts_are_points(tmp_path: Path) -> None:
     extract.way([(0, 0), (10, 0)], closed=False, barrier="wall", width="0.5 m")
     extract.way([(0, 10), (10, 10)], closed=False, barrier="hedge")
     extract.way([(0, 15), (10, 15)], closed=False, barrier="kerb")
-    extract.way(square(20, 10, 4), barrier="hedge", area="yes")
+    extract.way(list_corners(20, 10, 4), barrier="hedge", area="yes")
     extract.node(-10, 0, barrier="bollard")
     extract.node(0, 5, barrier="gate")
     path = tmp_path / "town.osm"
@@ -120,14 +120,14 @@ def test_barriers_are_walls_and_posts_are_points(tmp_path: Path) -> None:
 
 def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     extract = Extract()
-    extract.way(square(0, 0, 10), natural="water")
-    extract.way(square(20, 0, 10), building="roof")
-    extract.way(square(20, 0, 10), building="yes", layer="-1")
-    extract.way(square(-20, 0, 10), highway="residential")
+    extract.way(list_corners(0, 0, 10), natural="water")
+    extract.way(list_corners(20, 0, 10), building="roof")
+    extract.way(list_corners(20, 0, 10), building="yes", layer="-1")
+    extract.way(list_corners(-20, 0, 10), highway="residential")
     extract.way_through([1, 2, 999, 1], building="yes")
     extract.way([(0, 20), (5, 20), (5, 25)], closed=False, building="yes")
-    assert solid(tmp_path, extract).area == pytest.approx(100, abs=0.05)
-    assert solid(tmp_path, extract, water="free").area < 0.05
+    assert read_solid(tmp_path, extract).area == pytest.approx(100, abs=0.05)
+    assert read_solid(tmp_path, extract, water="free").area < 0.05
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     assert foreign.dropped == (
         "1 element below the ground",
@@ -138,8 +138,8 @@ def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
 
 def test_data_without_bounds_gets_a_rectangle(tmp_path: Path) -> None:
     extract = Extract()
-    extract.way(square(-10, -10, 5), building="yes")
-    extract.way(square(5, 5, 5), building="yes")
+    extract.way(list_corners(-10, -10, 5), building="yes")
+    extract.way(list_corners(5, 5, 5), building="yes")
     path = tmp_path / "town.osm"
     path.write_text(extract.text(None))
     free = IMPORTERS["osm"].read(path, ReadOptions(around=2.0)).free
@@ -199,12 +199,12 @@ def test_a_way_of_one_repeated_node_is_omitted(tmp_path: Path, tags: dict[str, s
 
 def test_a_degenerate_way_is_omitted(tmp_path: Path) -> None:
     extract = Extract()
-    extract.way(square(0, 0, 5), building="yes")
+    extract.way(list_corners(0, 0, 5), building="yes")
     extract.way_through([1, 1, 1], building="yes")
     extract.way_through([1, 2, 1], building="yes")
     extract.relation((999, "outer"), building="yes")
     extract.ways.append('<way id="999">' + '<nd ref="1"/>' * 3 + "</way>")
-    assert solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
+    assert read_solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     expected = ("1 outline without an area", "1 relation without an area", "1 way without an area")
     assert foreign.dropped == expected
@@ -213,11 +213,11 @@ def test_a_degenerate_way_is_omitted(tmp_path: Path) -> None:
 # JSON of Overpass
 
 
-def overpass(*elements: dict[str, Any], **more: Any) -> str:
+def build_overpass(*elements: dict[str, Any], **more: Any) -> str:
     return json.dumps({"version": 0.6, "generator": "Overpass API 0.7.62", "elements": elements, **more})
 
 
-def nodes(points: list[tuple[float, float]], first: int = 1) -> list[dict[str, Any]]:
+def build_nodes(points: list[tuple[float, float]], first: int = 1) -> list[dict[str, Any]]:
     found = []
     for k, (x, y) in enumerate(points):
         longitude, latitude = PLANE(x, y, inverse=True)
@@ -225,34 +225,34 @@ def nodes(points: list[tuple[float, float]], first: int = 1) -> list[dict[str, A
     return found
 
 
-def geometry(points: list[tuple[float, float]]) -> list[dict[str, float]]:
-    return [{"lat": each["lat"], "lon": each["lon"]} for each in nodes(points)]
+def build_geometry(points: list[tuple[float, float]]) -> list[dict[str, float]]:
+    return [{"lat": each["lat"], "lon": each["lon"]} for each in build_nodes(points)]
 
 
 def compute_bounds(points: list[tuple[float, float]]) -> dict[str, float]:
-    low, _, high, _ = geometry(points)
+    low, _, high, _ = build_geometry(points)
     return {"minlat": low["lat"], "minlon": low["lon"], "maxlat": high["lat"], "maxlon": high["lon"]}
 
 
-ROOM = square(-20, -20, 40)
-DESK = square(0, 0, 10)
+ROOM = list_corners(-20, -20, 40)
+DESK = list_corners(0, 0, 10)
 
 
 @pytest.mark.parametrize("style", ["out", "out geom", "out ids geom"])
 def test_overpass_json_agrees_with_xml(tmp_path: Path, style: str) -> None:
     ring = [*DESK, DESK[0]]
     way: dict[str, Any] = {"type": "way", "id": 10, "tags": {"building": "yes"}}
-    post = {**nodes([(-10, -10)], 50)[0], "tags": {"barrier": "bollard"}}
+    post = {**build_nodes([(-10, -10)], 50)[0], "tags": {"barrier": "bollard"}}
     before: list[dict[str, Any]] = [post]
     if style == "out":
-        before += nodes(DESK)
+        before += build_nodes(DESK)
     if style != "out ids geom":
         way["nodes"] = [1, 2, 3, 4, 1]
     if style != "out":
-        way["geometry"] = geometry(ring)
+        way["geometry"] = build_geometry(ring)
     path = tmp_path / "town.json"
     path.write_text(
-        overpass(*before, way, bounds=compute_bounds(ROOM), remark="runtime error: Query timed out")
+        build_overpass(*before, way, bounds=compute_bounds(ROOM), remark="runtime error: Query timed out")
     )
     assert detect_format(path) is IMPORTERS["osm"]
     foreign = IMPORTERS["osm"].read(path, ReadOptions(pillar=0.5))
@@ -262,14 +262,14 @@ def test_overpass_json_agrees_with_xml(tmp_path: Path, style: str) -> None:
 
 def test_overpass_relations_contain_their_ways(tmp_path: Path) -> None:
     members = [
-        {"type": "way", "ref": 7, "role": "outer", "geometry": geometry([*ROOM, ROOM[0]])},
-        {"type": "way", "ref": 8, "role": "inner", "geometry": geometry([*DESK, DESK[0]])},
+        {"type": "way", "ref": 7, "role": "outer", "geometry": build_geometry([*ROOM, ROOM[0]])},
+        {"type": "way", "ref": 8, "role": "inner", "geometry": build_geometry([*DESK, DESK[0]])},
         {"type": "node", "ref": 9, "role": "label"},
     ]
     tags = {"type": "multipolygon", "building": "yes"}
     path = tmp_path / "town.json"
     house = {"type": "relation", "id": 1, "members": members, "tags": tags}
-    path.write_text(overpass(house, bounds=compute_bounds(square(-30, -30, 60))))
+    path.write_text(build_overpass(house, bounds=compute_bounds(list_corners(-30, -30, 60))))
     foreign = IMPORTERS["osm"].read(path, ReadOptions())
     assert foreign.free.area == pytest.approx(3600 - 1600 + 100, rel=1e-3)
 
@@ -303,7 +303,7 @@ def test_invalid_overpass_json_is_refused(tmp_path: Path, elements: str, expecte
 # Indoors
 
 
-def floor_plan(doors: bool = True) -> Extract:
+def build_floor_plan(doors: bool = True) -> Extract:
     """Return a corridor with a room north of it, entered by a door, one south of it, and stairs."""
     extract = Extract()
     names = ("a", "b", "c", "d", "e", "f")
@@ -331,7 +331,7 @@ def floor_plan(doors: bool = True) -> Extract:
     return extract
 
 
-def indoors(folder: Path, extract: Extract, **options: Any) -> Any:
+def read_indoors(folder: Path, extract: Extract, **options: Any) -> Any:
     path = folder / "house.osm"
     path.write_text(extract.text(None))
     return IMPORTERS["osm"].read(path, ReadOptions(**options))
@@ -343,7 +343,7 @@ def move_to_plan(free: Any) -> Any:
 
 
 def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
-    foreign = indoors(tmp_path, floor_plan(), thickness=0.1)
+    foreign = read_indoors(tmp_path, build_floor_plan(), thickness=0.1)
     free = move_to_plan(foreign.free)
     corridor = next(part for part in free.geoms if part.contains(shapely.Point(5, 2)))
     assert corridor.contains(shapely.Point(5, 8)), "the north room has a door"
@@ -357,41 +357,42 @@ def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
 
 
 def test_rooms_without_doors_are_open_to_adjacent_spaces(tmp_path: Path) -> None:
-    foreign = indoors(tmp_path, floor_plan(doors=False))
+    foreign = read_indoors(tmp_path, build_floor_plan(doors=False))
     assert len(foreign.free.geoms) == 1
     assert foreign.free.area == pytest.approx(20 * 10 + 10 * 6 - 4, rel=1e-3)
 
 
 def test_a_level_is_chosen(tmp_path: Path) -> None:
-    assert indoors(tmp_path, floor_plan(), level="1").free.area == pytest.approx(120, rel=1e-3)
-    assert indoors(tmp_path, floor_plan(), level="2").free.area == pytest.approx(80, rel=1e-3)
+    assert read_indoors(tmp_path, build_floor_plan(), level="1").free.area == pytest.approx(120, rel=1e-3)
+    assert read_indoors(tmp_path, build_floor_plan(), level="2").free.area == pytest.approx(80, rel=1e-3)
     for asked in ("3", "x", "nan"):
         with pytest.raises(ParameterError, match=f"level: expected one of 0, 1, 2, got '{asked}'"):
-            indoors(tmp_path, floor_plan(), level=asked)
+            read_indoors(tmp_path, build_floor_plan(), level=asked)
     town = Extract()
-    town.way(square(0, 0, 9), building="yes")
+    town.way(list_corners(0, 0, 9), building="yes")
     with pytest.raises(ParameterError, match="level: expected none, got '0': no indoor spaces"):
-        indoors(tmp_path, town, level="0")
+        read_indoors(tmp_path, town, level="0")
 
 
 def test_a_town_with_one_house_from_inside_is_read_outdoors(tmp_path: Path) -> None:
-    extract = floor_plan()
-    extract.way(square(30, 0, 25), building="yes")
-    extract.way(square(30, 30, 25), building="yes")
-    foreign = indoors(tmp_path, extract)
+    extract = build_floor_plan()
+    extract.way(list_corners(30, 0, 25), building="yes")
+    extract.way(list_corners(30, 30, 25), building="yes")
+    foreign = read_indoors(tmp_path, extract)
     assert "indoor spaces on level 0, 1, 2 left out (--level reads a floor)" in foreign.notes
-    assert indoors(tmp_path, extract, level="2").free.area == pytest.approx(80, rel=1e-3)
+    assert read_indoors(tmp_path, extract, level="2").free.area == pytest.approx(80, rel=1e-3)
 
 
 def test_spellings_of_walls_columns_and_levels_are_accepted(tmp_path: Path) -> None:
     extract = Extract()
-    extract.way(square(0, 0, 10), indoor="area", level="-1-1")
+    extract.way(list_corners(0, 0, 10), indoor="area", level="-1-1")
     extract.way([(5, 0), (5, 6)], closed=False, indoor="wall", level="1", width="0.5")
-    extract.way(square(8, 8, 1), indoor="column", repeat_on="0,1")
+    extract.way(list_corners(8, 8, 1), indoor="column", repeat_on="0,1")
     extract.node(2, 2, indoor="column", level="1")
-    extract.way(square(0, 0, 10), indoor="corridor", level="7--3")
+    extract.way(list_corners(0, 0, 10), indoor="corridor", level="7--3")
     found = {
-        level: indoors(tmp_path, extract, level=level, pillar=0.1).free.area for level in ("-1", "0", "1")
+        level: read_indoors(tmp_path, extract, level=level, pillar=0.1).free.area
+        for level in ("-1", "0", "1")
     }
     assert found["-1"] == pytest.approx(100, rel=1e-3)
     assert found["0"] == pytest.approx(99, rel=1e-3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image, PngImagePlugin
-from raster_files import pgm
+from raster_files import build_pgm
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
@@ -48,7 +48,7 @@ def test_dark_is_an_obstacle(tmp_path: Path) -> None:
 
 def test_a_pgm_is_a_picture_too(tmp_path: Path) -> None:
     path = tmp_path / "plan.pgm"
-    path.write_bytes(pgm(LEVELS))
+    path.write_bytes(build_pgm(LEVELS))
     assert detect_format(path) is IMPORTER
     assert read(path, cell=0.5).area == 6 / 4
 

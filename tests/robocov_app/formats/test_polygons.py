@@ -22,7 +22,7 @@ from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area
 _RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, max_size=9)
 
 
-def windings(ring: np.ndarray, x: float, y: float) -> float:
+def count_windings(ring: np.ndarray, x: float, y: float) -> float:
     """Return how often the ring goes around a place: the angle that it is seen to turn by."""
     angle = np.arctan2(ring[:, 1] - y, ring[:, 0] - x)
     turn = (np.diff(angle, append=angle[:1]) + math.pi) % math.tau - math.pi
@@ -41,7 +41,7 @@ def test_fills_agree_with_winding_angles(rings: list[list[tuple[int, int]]], rul
     # irrational places are on no edge
     for x in np.arange(0.123456789, 12.0, 1.7):
         for y in np.arange(0.1415926, 12.0, 1.9):
-            around = [windings(ring, x, y) for ring in arrays]
+            around = [count_windings(ring, x, y) for ring in arrays]
             inside = sum(around) != 0 if rule == "nonzero" else sum(abs(n) for n in around) % 2 == 1
             edge = min(shapely.distance(shapely.LinearRing(ring), shapely.Point(x, y)) for ring in arrays)
             assert edge < 1e-9 or area.covers(shapely.Point(x, y)) == inside

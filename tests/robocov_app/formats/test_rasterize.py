@@ -54,32 +54,32 @@ def test_rooms_that_share_a_wall_share_no_cell() -> None:
     assert both.tolist() == [[1] * 4] * 4
 
 
-def room(**others: object) -> Environment:
+def build_room(**others: object) -> Environment:
     boundary = ((1.0, 2.0), (6.0, 2.0), (6.0, 5.0), (1.0, 5.0))
     return Environment("room", boundary, **others)  # type: ignore[arg-type]
 
 
 def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
-    grid = build_grid(room(), 0.25)
+    grid = build_grid(build_room(), 0.25)
     assert (grid.rows, grid.columns, grid.cell, grid.origin) == (14, 22, 0.25, (0.75, 1.75))
-    free = find_free_cells(room(), grid)
-    assert describe_lost_passages(room(), grid, free) == ()
+    free = find_free_cells(build_room(), grid)
+    assert describe_lost_passages(build_room(), grid, free) == ()
     assert free.sum() * 0.25**2 == 15
     assert not free[[0, -1]].any() and not free[:, [0, -1]].any()
-    assert build_grid(room(), None).cell == 0.05
+    assert build_grid(build_room(), None).cell == 0.05
     # a side that is no whole number of cells has one more
-    assert build_grid(room(), 0.7).columns == 8 + 2
+    assert build_grid(build_room(), 0.7).columns == 8 + 2
 
 
 def test_cells_that_are_too_small_or_too_large_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"cell: expected at most 64 million"):
-        build_grid(room(), 1e-4)
+        build_grid(build_room(), 1e-4)
     blocks = tuple(
         PolygonObstacle(((x, 2.0), (x + 0.4, 2.0), (x + 0.4, 5.0), (x, 5.0)))
         for x in (1.0, 1.5, 2.0, 2.5, 3.0)
     )
     with pytest.raises(ParameterError, match="cell: no cell of 20 m is free, expected a smaller size"):
-        find_free_cells(room(obstacles=blocks), build_grid(room(obstacles=blocks), 20.0))
+        find_free_cells(build_room(obstacles=blocks), build_grid(build_room(obstacles=blocks), 20.0))
 
 
 _places = st.tuples(st.floats(0.8, 6.2), st.floats(1.8, 5.2))
@@ -94,7 +94,7 @@ _thin = st.one_of(
 @settings(max_examples=80)
 @given(st.lists(_thin, min_size=1, max_size=6), st.floats(0.04, 0.25))
 def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], cell: float) -> None:
-    environment = room(obstacles=tuple(things))
+    environment = build_room(obstacles=tuple(things))
     grid = build_grid(environment, cell)
     free = find_free_cells(environment, grid)
     low = np.array(grid.origin)
@@ -118,8 +118,8 @@ def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], ce
 
 
 def test_a_wall_thinner_than_a_cell_keeps_rooms_apart(tmp_path: Path) -> None:
-    upright = room(obstacles=(WallObstacle(((3.01, 2.0), (3.01, 5.0)), 0.03),))
-    slanted = room(obstacles=(WallObstacle(((1.0, 2.2), (6.0, 4.7)), 0.03),))
+    upright = build_room(obstacles=(WallObstacle(((3.01, 2.0), (3.01, 5.0)), 0.03),))
+    slanted = build_room(obstacles=(WallObstacle(((1.0, 2.2), (6.0, 4.7)), 0.03),))
     for environment in (upright, slanted):
         for name in ("map.yaml", "map.map", "map.png", "scale.yaml", "raw.yaml"):
             mode = name.removesuffix(".yaml") if name in ("scale.yaml", "raw.yaml") else None
@@ -133,29 +133,29 @@ def test_a_wall_thinner_than_a_cell_keeps_rooms_apart(tmp_path: Path) -> None:
 
 def test_closed_gaps_are_reported_with_a_cell_that_keeps_them() -> None:
     wall = PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.93), (3.0, 4.93)), name="wall")
-    environment = room(obstacles=(wall,), starts={"all": UniformStart()})
+    environment = build_room(obstacles=(wall,), starts={"all": UniformStart()})
 
-    def warnings(cell: float) -> tuple[str, ...]:
+    def list_warnings(cell: float) -> tuple[str, ...]:
         grid = build_grid(environment, cell)
         return describe_lost_passages(environment, grid, find_free_cells(environment, grid))
 
-    (warning,) = warnings(0.25)
+    (warning,) = list_warnings(0.25)
     assert warning == (
         "gaps close: the free space has 2 separate parts instead of 1; cells of 0.1 m keep it (--cell 0.1)"
     )
-    assert warnings(0.1) == ()
+    assert list_warnings(0.1) == ()
     assert describe_unsupported(environment) == ("starts: all", "names of obstacles")
-    assert describe_unsupported(room()) == ()
+    assert describe_unsupported(build_room()) == ()
 
 
 def test_lost_rooms_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     walls = (WallObstacle(((1.0, 2.2), (6.0, 2.2)), 0.01), WallObstacle(((1.0, 2.35), (6.0, 2.35)), 0.01))
-    environment = room(obstacles=walls)
+    environment = build_room(obstacles=walls)
     grid = build_grid(environment, 0.4)
     (warning,) = describe_lost_passages(environment, grid, find_free_cells(environment, grid))
     assert warning.startswith("2 separate parts of the free space are lost; cells of 0.05 m keep it")
     monkeypatch.setattr(rasterize, "_MAX_TRIED_CELLS", 1_000_000)
-    hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
+    hair = build_room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
     grid = build_grid(hair, 0.4)
     (warning,) = describe_lost_passages(hair, grid, find_free_cells(hair, grid))
     assert warning.endswith("instead of 1; no grid of at most 1 million cells keeps it")

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 from shapely import Polygon, box
-from vector_files import read, square
+from vector_files import build_square, read
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format
 
-HALL = [square(0, 0, 20, 10), square(1, 1, 2, 2), square(5, 5, 1, 1)]
+HALL = [build_square(0, 0, 20, 10), build_square(1, 1, 2, 2), build_square(5, 5, 1, 1)]
 
 
 @pytest.mark.parametrize(
@@ -53,11 +53,11 @@ def test_a_single_ring_is_free_space(tmp_path: Path) -> None:
 
 
 def test_several_polygons_are_free_together(tmp_path: Path) -> None:
-    assert read(tmp_path, "rings", [HALL, [square(20, 0, 5, 5)]]).free.area == pytest.approx(195 + 25)
+    assert read(tmp_path, "rings", [HALL, [build_square(20, 0, 5, 5)]]).free.area == pytest.approx(195 + 25)
 
 
 def test_a_self_crossing_hole_beyond_the_outline_is_repaired(tmp_path: Path) -> None:
-    bad = [square(0, 0, 20, 10), [[15, 2], [25, 4], [25, 2], [15, 4]]]
+    bad = [build_square(0, 0, 20, 10), [[15, 2], [25, 4], [25, 2], [15, 4]]]
     foreign = read(tmp_path, "rings", bad)
     # of the bow tie of two triangles of 5 m² the left one is in the outline
     assert foreign.free.area == pytest.approx(195.0)

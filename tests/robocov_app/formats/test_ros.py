@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, draw_pixels, pgm, write_ros_map
+from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, build_pgm, draw_pixels, write_ros_map
 from shapely import MultiPolygon
 
 from robocov.errors import MapError, ParameterError
@@ -124,7 +124,7 @@ def test_a_cut_map_keeps_the_island_with_most_free_space(tmp_path: Path) -> None
     assert foreign.dropped == ("2 m² of free space on other islands of known cells",)
 
 
-def occupancy(level: int, mode: str, negate: bool, low: float, high: float, alpha: int) -> int:
+def compute_occupancy(level: int, mode: str, negate: bool, low: float, high: float, alpha: int) -> int:
     """Return what map_server makes of a gray pixel, -1 to 100, word for word as it is documented."""
     if mode == "raw":
         return level if level <= 100 else -1
@@ -160,7 +160,7 @@ def test_every_pixel_agrees_with_map_server(
     else:
         cells = classify_raw(picture, 0.5)
     for value in range(256):
-        expected = occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
+        expected = compute_occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
         kind = 2 if expected < 0 else int(expected >= 50)
         near = mode != "raw" and any(
             abs(x - t) < 1e-9 for x in ((255 - value) / 255, value / 255) for t in (low, high)
@@ -194,7 +194,7 @@ def test_scale_and_raw_use_the_threshold(tmp_path: Path) -> None:
 
 def test_pictures_of_16_bits_are_read(tmp_path: Path) -> None:
     deep = np.array([[65535, 65535, 52685, 0]])
-    path = write_ros_map(tmp_path, pgm(deep, 65535), resolution=1.0)
+    path = write_ros_map(tmp_path, build_pgm(deep, 65535), resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 1))
     assert "25 % unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
 
@@ -227,7 +227,9 @@ def test_single_cells_are_noise_by_default(tmp_path: Path) -> None:
 
 
 def test_line_ends_byte_order_marks_and_comments_are_accepted(tmp_path: Path) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n"))
+    (tmp_path / "plan.pgm").write_bytes(
+        build_pgm(draw_pixels(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n")
+    )
     text = (
         "# saved\r\nimage: plan.pgm\r\nresolution: 2.5e-1\r\norigin: [-1.0, -2.0, 0.0]\r\nnegate: 0\r\n\r\n"
         "occupied_thresh: 0.65\r\nfree_thresh: 0.196\r\n"
@@ -240,8 +242,8 @@ def test_line_ends_byte_order_marks_and_comments_are_accepted(tmp_path: Path) ->
 def test_the_picture_must_be_next_to_the_file(tmp_path: Path) -> None:
     maps = tmp_path / "maps"
     (maps / "pictures").mkdir(parents=True)
-    (maps / "pictures" / "a.pgm").write_bytes(pgm(draw_pixels(PLAN)))
-    (tmp_path / "secret.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    (maps / "pictures" / "a.pgm").write_bytes(build_pgm(draw_pixels(PLAN)))
+    (tmp_path / "secret.pgm").write_bytes(build_pgm(draw_pixels(PLAN)))
     assert read(write_ros_map(maps, b"", image="pictures/a.pgm")).area > 0
     assert read(write_ros_map(maps, b"", image="./pictures/../pictures/a.pgm")).area > 0
     (maps / "link.pgm").symlink_to(tmp_path / "secret.pgm")
@@ -268,7 +270,7 @@ def test_the_picture_must_be_next_to_the_file(tmp_path: Path) -> None:
     ],
 )
 def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, name: str) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    (tmp_path / "plan.pgm").write_bytes(build_pgm(draw_pixels(PLAN)))
     foreign = IMPORTER.read(write_ros_map(tmp_path, b"", "a", image=name), ReadOptions())
     assert foreign.free.area > 0
     assert foreign.repaired == (f"image: {name!r} not found, used 'plan.pgm' next to the file",)
@@ -310,7 +312,7 @@ def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, n
     ],
 )
 def test_invalid_maps_are_refused(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    (tmp_path / "plan.pgm").write_bytes(build_pgm(draw_pixels(PLAN)))
     os.mkfifo(tmp_path / "pipe")
     keys = {"image": "plan.pgm"} | keys
     path = write_ros_map(tmp_path, b"", **keys)  # type: ignore[arg-type]

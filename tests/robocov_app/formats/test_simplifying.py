@@ -29,7 +29,7 @@ def build_cells(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> Mu
     return affinity.affine_transform(outline, [cell, 0, 0, cell, low_x - rim * cell, low_y - rim * cell])
 
 
-def vertices(shape: shapely.Geometry) -> int:
+def count_vertices(shape: shapely.Geometry) -> int:
     rings = shapely.get_rings(shapely.get_parts(shape))
     return int(shapely.get_num_coordinates(rings).sum()) - len(rings)
 
@@ -42,7 +42,7 @@ def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert result.changed == ()
     # four walls; at a sharp tip of cells a corner may stay cut
-    assert vertices(result.free) <= 8
+    assert count_vertices(result.free) <= 8
     long = [
         line
         for line in map(shapely.LineString, np.stack([np.array(result.free.geoms[0].exterior.coords)[:-1],
@@ -71,7 +71,7 @@ def test_a_bump_of_a_cell_is_removed() -> None:
     result = simplify_free_space(
         affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0)), CELL, CELL, 0.1
     )
-    assert vertices(result.free) == 4
+    assert count_vertices(result.free) == 4
     assert shapely.equals_exact(
         result.free.normalize(), MultiPolygon([shapely.box(0, 0, 3, 2)]).normalize(), 1e-9
     )
@@ -99,7 +99,7 @@ def test_a_wall_of_one_cell_keeps_its_shape(length: int, turned: bool) -> None:
     outline = affinity.scale(cells, CELL, CELL, origin=(0, 0))
     result = simplify_free_space(outline, CELL, CELL, 0.1)
     assert result.free.symmetric_difference(outline).area < 1e-9
-    assert vertices(result.free) == 12
+    assert count_vertices(result.free) == 12
 
 
 @pytest.mark.parametrize("angle", [0.0, 5.0, 30.0, 45.0])
@@ -152,7 +152,7 @@ def test_reduced_simplification_is_noted() -> None:
     assert len(find_rooms(result.free, 0.115)) == 1
     (line,) = [line for line in result.changed if "narrow" in line]
     assert line.endswith("so that a robot of radius 0.115 m still fits through")
-    assert vertices(result.free) < vertices(outline) / 2
+    assert count_vertices(result.free) < count_vertices(outline) / 2
     # a smaller robot leaves more to simplify
     assert simplify_free_space(outline, 3 * CELL, CELL, 0.05).changed == ()
 
@@ -162,7 +162,7 @@ ragged = st.tuples(
 )
 
 
-def blobs(seed: int, share: float, smooth: int, rows: int = 40, columns: int = 50) -> np.ndarray:
+def build_caves(seed: int, share: float, smooth: int, rows: int = 40, columns: int = 50) -> np.ndarray:
     """Return cells of caves."""
     from scipy import ndimage
 
@@ -177,7 +177,9 @@ def blobs(seed: int, share: float, smooth: int, rows: int = 40, columns: int = 5
 @given(ragged)
 def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, tolerance = cave
-    outline = affinity.scale(trace_outline(blobs(seed, share, smooth), "grid"), CELL, CELL, origin=(0, 0))
+    outline = affinity.scale(
+        trace_outline(build_caves(seed, share, smooth), "grid"), CELL, CELL, origin=(0, 0)
+    )
     radius = 0.1
     result = simplify_free_space(outline, tolerance, CELL, radius).free
     assert result.is_valid
@@ -205,7 +207,7 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
 @given(ragged)
 def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave
-    cells = trace_outline(blobs(seed, share, smooth), "grid")
+    cells = trace_outline(build_caves(seed, share, smooth), "grid")
     outline = OriginalOutline(list(cells.geoms), 1.0)
     assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.is_neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
@@ -226,14 +228,14 @@ def test_required_vertices_are_kept() -> None:
 
 
 def test_a_gap_that_has_closed_is_found() -> None:
-    def wall(*points: tuple[float, float]) -> np.ndarray:
+    def build_wall(*points: tuple[float, float]) -> np.ndarray:
         return np.stack([np.array(points[:-1]), np.array(points[1:])], axis=1)
 
     room = MultiPolygon(
         [shapely.box(0, 0, 4, 4) - shapely.box(1.9, 0, 2.1, 1.9) - shapely.box(1.9, 2.09, 2.1, 4)]
     )
     sides = np.concatenate(
-        [wall((1.9, 1.9), (2.1, 1.9)), wall((2.1, 2.09), (1.9, 2.09)), wall((0, 0), (0, 4))]
+        [build_wall((1.9, 1.9), (2.1, 1.9)), build_wall((2.1, 2.09), (1.9, 2.09)), build_wall((0, 0), (0, 4))]
     )
     wide = np.array([
         shapely.LineString([(1.9, 1.85), (2.1, 1.9)]),
@@ -257,17 +259,17 @@ def test_a_comb_of_many_teeth_does_not_exhaust_the_stack() -> None:
     y = np.where(np.arange(2 * teeth) % 2 == 0, 5.0, 5.4)
     shape = Polygon([*zip(x, y, strict=True), (x[-1], 0.0), (0.0, 0.0)])
     result = simplify_free_space(MultiPolygon([shape]), 0.02, None, 0.1)
-    assert vertices(result.free) == vertices(shape)
+    assert count_vertices(result.free) == count_vertices(shape)
 
 
 def test_drawings_are_simplified_too() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * 3)
     result = simplify_free_space(MultiPolygon([round_room]), 0.02, None, 0.1)
-    assert 15 < vertices(result.free) < 60
+    assert 15 < count_vertices(result.free) < 60
     assert shapely.hausdorff_distance(result.free.boundary, round_room.boundary) <= 0.02
     assert simplify_free_space(MultiPolygon([round_room]), 0.0, None, 0.1).free.geoms[0] is not None
-    assert vertices(simplify_free_space(MultiPolygon([round_room]), 0.0, None, 0.1).free) == 400
+    assert count_vertices(simplify_free_space(MultiPolygon([round_room]), 0.0, None, 0.1).free) == 400
 
 
 @pytest.mark.parametrize("sides", [(0.05, 0.08), (0.1, 0.03)])
@@ -287,6 +289,6 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))
     stairs = affinity.scale(build_cells(stretched, 1.0), *sides, origin=(0, 0))
     result = simplify_free_space(stairs, max(sides), max(sides), 0.1)
-    assert vertices(result.free) <= 8
+    assert count_vertices(result.free) <= 8
     assert result.free.area == pytest.approx(24, rel=0.01)
     assert shapely.hausdorff_distance(result.free.boundary, room.boundary) < 2 * max(sides)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import shapely
 from PIL import Image
-from raster_files import draw_pixels, pgm
+from raster_files import build_pgm, draw_pixels
 from shapely import affinity, box
 
 from robocov.environment import PointsStart
@@ -33,7 +33,7 @@ def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
     # the white around the dark is not part of it, and its cells are no squares
     (tmp_path / "maps").mkdir()
     rooms = ".........\n.#######.\n.#..#..#.\n.#.....#.\n.#######.\n........."
-    (tmp_path / "maps" / "rooms.pgm").write_bytes(pgm(draw_pixels(rooms)))
+    (tmp_path / "maps" / "rooms.pgm").write_bytes(build_pgm(draw_pixels(rooms)))
     foreign = read(
         tmp_path,
         "define floorplan model ( boundary 1 obstacle_return 0 ranger_return 0.5 )\n"
@@ -193,10 +193,10 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected
 
 
 def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
-    (tmp_path / "a.pgm").write_bytes(pgm(draw_pixels("...\n...")))
+    (tmp_path / "a.pgm").write_bytes(build_pgm(draw_pixels("...\n...")))
     with pytest.raises(MapError, match=r"a\.pgm: expected a picture with dark walls, got only light pixels"):
         read(tmp_path, 'model ( bitmap "a.pgm" )')
-    (tmp_path / "a.pgm").write_bytes(pgm(draw_pixels("###\n###")))
+    (tmp_path / "a.pgm").write_bytes(build_pgm(draw_pixels("###\n###")))
     foreign = read(tmp_path, ROOM + 'room ( ) model ( bitmap "a.pgm" size [2 1] pose [5 -3 0 0] )')
     assert foreign.free.area == pytest.approx(100 - 2)
 

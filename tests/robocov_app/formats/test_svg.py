@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import shapely
 from shapely import box
-from vector_files import read, svg
+from vector_files import build_svg, read
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
@@ -24,7 +24,7 @@ def read_shapes(
     folder: Path, body: str, head: str = 'width="1000" height="600"', **options: Any
 ) -> ForeignMap:
     """Read a drawing in which a unit is a centimeter."""
-    return read(folder, "svg", svg(body, head), **{"scale": 0.01, **options})
+    return read(folder, "svg", build_svg(body, head), **{"scale": 0.01, **options})
 
 
 def compute_obstacles(folder: Path, body: str, **options: Any) -> Any:
@@ -240,7 +240,7 @@ def test_the_title_names_the_map(tmp_path: Path) -> None:
 
 
 def test_prologues_of_editors_are_accepted(tmp_path: Path) -> None:
-    text = svg(PAGE).replace('xmlns="http://www.w3.org/2000/svg"', "")
+    text = build_svg(PAGE).replace('xmlns="http://www.w3.org/2000/svg"', "")
     for content in (
         b"\xef\xbb\xbf<?xml version='1.0'?>\r\n<!-- Created with Inkscape -->\r\n" + text.encode(),
         f"<?xml version='1.0' encoding='UTF-16'?>{text}".encode("utf-16"),

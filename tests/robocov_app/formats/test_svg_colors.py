@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 import shapely
-from vector_files import read, svg
+from vector_files import build_svg, read
 
 from robocov.errors import ParameterError
 from robocov_app.formats import ForeignMap, import_map
@@ -16,7 +16,7 @@ ROOM = 9.8 * 5.8 - 0.2 * 3.9  # m² free within the walls
 
 
 def read_shapes(folder: Path, body: str, **options: object) -> ForeignMap:
-    return read(folder, "svg", svg(body, PAGE), **options)
+    return read(folder, "svg", build_svg(body, PAGE), **options)
 
 
 def read_free_space(folder: Path, body: str, **options: object) -> float:
@@ -119,13 +119,13 @@ def test_nested_outlines_within_a_named_boundary_begin_solid(tmp_path: Path) -> 
 def test_a_plan_on_a_white_page_is_taken_without_the_page(tmp_path: Path) -> None:
     path = tmp_path / "plan.svg"
     walls = '<path d="M2 1H8V5H2Z" fill="none" stroke="#000" stroke-width="0.2"/>'
-    path.write_text(svg('<rect width="10" height="6" fill="#fff"/>' + walls, PAGE))
+    path.write_text(build_svg('<rect width="10" height="6" fill="#fff"/>' + walls, PAGE))
     environment, report, _ = import_map(path)
     assert environment.free_area == pytest.approx(5.8 * 3.8)
     assert any("paper around a plan" in note for note in report.notes)
     # with a stroke it is an arena with a box in it
     path.write_text(
-        svg('<rect width="10" height="6" fill="#fff" stroke="#000" stroke-width=".1"/>' + walls, PAGE)
+        build_svg('<rect width="10" height="6" fill="#fff" stroke="#000" stroke-width=".1"/>' + walls, PAGE)
     )
     assert import_map(path)[0].free_area > 30
 

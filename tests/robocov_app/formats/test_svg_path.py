@@ -19,7 +19,7 @@ from robocov_app.formats.vector.svg.transforms import (
 )
 
 
-def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
+def list_points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
     [(found, _)], _ = parse_path(text, tolerance, 10_000)
     return [[round(x, 9) + 0.0, round(y, 9) + 0.0] for x, y in found.tolist()]
 
@@ -39,7 +39,7 @@ def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
     ],
 )
 def test_path_commands_are_parsed(text: str, expected: list[list[float]]) -> None:
-    assert points(text) == expected
+    assert list_points(text) == expected
 
 
 def test_subpaths_start_where_the_previous_one_started() -> None:
@@ -55,11 +55,11 @@ def test_subpaths_start_where_the_previous_one_started() -> None:
 
 
 def test_smooth_curves_mirror_the_previous_handle() -> None:
-    smooth = points("M0 0C0 3 2 3 3 0S6-3 6 0", 1e-2)
-    assert smooth == points("M0 0C0 3 2 3 3 0C4-3 6-3 6 0", 1e-2)
-    assert points("M0 0Q2 4 4 0T8 0", 1e-2) == points("M0 0Q2 4 4 0Q6-4 8 0", 1e-2)
+    smooth = list_points("M0 0C0 3 2 3 3 0S6-3 6 0", 1e-2)
+    assert smooth == list_points("M0 0C0 3 2 3 3 0C4-3 6-3 6 0", 1e-2)
+    assert list_points("M0 0Q2 4 4 0T8 0", 1e-2) == list_points("M0 0Q2 4 4 0Q6-4 8 0", 1e-2)
     # after another command there is no handle
-    straight = points("M0 0L4 0T8 4")[1:]
+    straight = list_points("M0 0L4 0T8 4")[1:]
     assert straight[-1] == [8, 4]
     assert all(x - y == pytest.approx(4.0) for x, y in straight)
 
@@ -122,8 +122,8 @@ def test_invalid_paths_are_reported_with_the_position(text: str, expected: str) 
 
 def test_arcs_without_extent_are_omitted_and_tiny_radii_are_lines() -> None:
     assert parse_path("M1 1A5 5 0 1 1 1 1", 1e-3, 100) == ([], 2)
-    assert points("M0 0A1e-40 1e-40 0 1 1 3 0") == [[0, 0], [3, 0]]
-    huge = points("M0 0A1e25 1e25 0 0 1 3 0")
+    assert list_points("M0 0A1e-40 1e-40 0 1 1 3 0") == [[0, 0], [3, 0]]
+    huge = list_points("M0 0A1e25 1e25 0 0 1 3 0")
     assert huge == [[0, 0], [3, 0]]
 
 

@@ -16,7 +16,7 @@ from robocov_app.formats.vector.svg.style import (
 )
 
 
-def element(tag: str = "rect", **attributes: str) -> Element:
+def build_element(tag: str = "rect", **attributes: str) -> Element:
     return Element(
         tag,
         {name.replace("_", "-").removesuffix("-"): text for name, text in attributes.items()},
@@ -25,7 +25,7 @@ def element(tag: str = "rect", **attributes: str) -> Element:
     )
 
 
-def sheet(*texts: str) -> StyleSheet:
+def read_styles(*texts: str) -> StyleSheet:
     found = StyleSheet("plan.svg")
     for text in texts:
         found.add(text)
@@ -33,23 +33,31 @@ def sheet(*texts: str) -> StyleSheet:
 
 
 def test_the_more_specific_rule_wins() -> None:
-    rules = sheet("#a{fill:red} .b{fill:green} rect{fill:blue} *{fill:white}")
-    assert rules.get_properties(element(id="a", class_="b"))["fill"] == "red"
-    assert rules.get_properties(element(class_="x b"))["fill"] == "green"
-    assert rules.get_properties(element(class_="B"))["fill"] == "blue"
-    assert rules.get_properties(element("path", fill="black"))["fill"] == "white"
-    assert rules.get_properties(element(id="a", style="fill:none"))["fill"] == "none"
-    assert sheet("rect.b{fill:red} .b{fill:green}").get_properties(element(class_="b"))["fill"] == "red"
-    assert sheet(".b{fill:red}", ".b{fill:green}").get_properties(element(class_="b"))["fill"] == "green"
+    rules = read_styles("#a{fill:red} .b{fill:green} rect{fill:blue} *{fill:white}")
+    assert rules.get_properties(build_element(id="a", class_="b"))["fill"] == "red"
+    assert rules.get_properties(build_element(class_="x b"))["fill"] == "green"
+    assert rules.get_properties(build_element(class_="B"))["fill"] == "blue"
+    assert rules.get_properties(build_element("path", fill="black"))["fill"] == "white"
+    assert rules.get_properties(build_element(id="a", style="fill:none"))["fill"] == "none"
     assert (
-        sheet(".b{fill:red !important}").get_properties(element(class_="b", style="fill:green"))["fill"]
+        read_styles("rect.b{fill:red} .b{fill:green}").get_properties(build_element(class_="b"))["fill"]
+        == "red"
+    )
+    assert (
+        read_styles(".b{fill:red}", ".b{fill:green}").get_properties(build_element(class_="b"))["fill"]
+        == "green"
+    )
+    assert (
+        read_styles(".b{fill:red !important}").get_properties(build_element(class_="b", style="fill:green"))[
+            "fill"
+        ]
         == "red"
     )
 
 
 def test_style_sheets_of_drawing_programs_are_parsed() -> None:
     text = "<!-- .cls-1,\n.cls-2{fill:none;stroke:#000;} /* a; {comment} */ .cls-2{stroke-width:2px} -->"
-    assert sheet(text).get_properties(element(class_="cls-2")) == {
+    assert read_styles(text).get_properties(build_element(class_="cls-2")) == {
         "fill": "none",
         "stroke": "#000",
         "stroke-width": "2px",
@@ -57,19 +65,19 @@ def test_style_sheets_of_drawing_programs_are_parsed() -> None:
 
 
 def test_unsupported_rules_are_counted() -> None:
-    rules = sheet(
+    rules = read_styles(
         "@import url(http://example.org/x.css); @media print { rect { fill: none } }"
         "@supports (x:y) {rect{fill:none}} g > rect {fill:none} rect:hover{fill:none} rect{fill:red}"
     )
-    assert rules.get_properties(element())["fill"] == "red"
+    assert rules.get_properties(build_element())["fill"] == "red"
     assert rules.unsupported_count == 4
 
 
 def test_unfinished_rules_are_left_out() -> None:
     assert (
-        sheet("@media {").get_properties(element())
-        == sheet("rect{fill:red").get_properties(element())
-        == sheet("}{").get_properties(element())
+        read_styles("@media {").get_properties(build_element())
+        == read_styles("rect{fill:red").get_properties(build_element())
+        == read_styles("}{").get_properties(build_element())
         == {}
     )
 
@@ -105,12 +113,12 @@ def test_expensive_style_sheets_are_refused() -> None:
     with pytest.raises(
         MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
     ):
-        sheet("*" * (MAX_SHEET_CHARACTERS + 1))
-    rules = sheet("*{fill:red} " * 9000)
+        read_styles("*" * (MAX_SHEET_CHARACTERS + 1))
+    rules = read_styles("*{fill:red} " * 9000)
     with pytest.raises(MapError, match=r"plan\.svg: too many rules for too many elements"):
         for _ in range(MAX_RULE_CHECKS // 9000 + 1):
-            rules.get_properties(element())
-    sheet("@" * 500_000)
-    sheet("@media{" * 100_000)
-    sheet("/* " * 300_000)
-    sheet("/*" * 300_000 + "*/")
+            rules.get_properties(build_element())
+    read_styles("@" * 500_000)
+    read_styles("@media{" * 100_000)
+    read_styles("/* " * 300_000)
+    read_styles("/*" * 300_000 + "*/")

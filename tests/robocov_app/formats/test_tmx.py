@@ -33,13 +33,13 @@ WALLS = box(2, 2, 4, 3) | box(1, 1, 3, 2) | box(0, 0, 1, 1)
 """The tiles 2 in `ROWS`, y up, in tiles."""
 
 
-def tiles(name: str, rows: str = ROWS, more: str = "", size: tuple[int, int] = (4, 3)) -> str:
+def build_tiles(name: str, rows: str = ROWS, more: str = "", size: tuple[int, int] = (4, 3)) -> str:
     """Return a layer of tiles."""
     sized = f'width="{size[0]}" height="{size[1]}"'
     return f'<layer name="{name}" {sized} {more}><data encoding="csv">\n{rows}\n</data></layer>'
 
 
-def objects(name: str, *given: str, more: str = "") -> str:
+def build_objects(name: str, *given: str, more: str = "") -> str:
     return f'<objectgroup name="{name}" {more}>{"".join(given)}</objectgroup>'
 
 
@@ -64,7 +64,7 @@ def are_equal(one: shapely.Geometry, other: shapely.Geometry) -> bool:
 
 
 def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
-    foreign = read(tmp_path, TILES.format(""), tiles("Ground"))
+    foreign = read(tmp_path, TILES.format(""), build_tiles("Ground"))
     assert are_equal(compute_obstacles(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
     assert foreign.notes == ("no tile size given: tiles 1 m wide assumed (--cell)",)
@@ -72,23 +72,23 @@ def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
 
 def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:
     plain = '<tileset firstgid="1" tilewidth="16" tileheight="16"/>'
-    floor = tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1")
+    floor = build_tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1")
     upper = ROWS.replace("1", "0")
     for name in ("Walls", "collision", "Collision Layer 2", "is_solid"):
-        assert are_equal(compute_obstacles(read(tmp_path, plain, floor, tiles(name, upper))), WALLS)
-    marked = tiles("Things", upper).replace("<data", SOLID.format("collides", "") + "<data")
+        assert are_equal(compute_obstacles(read(tmp_path, plain, floor, build_tiles(name, upper))), WALLS)
+    marked = build_tiles("Things", upper).replace("<data", SOLID.format("collides", "") + "<data")
     assert are_equal(compute_obstacles(read(tmp_path, plain, floor, marked)), WALLS)
-    grouped = f'<group name="obstacles">{tiles("Things", upper)}</group>'
+    grouped = f'<group name="obstacles">{build_tiles("Things", upper)}</group>'
     assert are_equal(compute_obstacles(read(tmp_path, plain, floor, grouped)), WALLS)
-    things = tiles("Things", upper)
+    things = build_tiles("Things", upper)
     with pytest.raises(MapError, match=r"nothing is solid .* --only LAYER.* 'Floor', 'Things'"):
         read(tmp_path, plain, floor, things)
     assert are_equal(compute_obstacles(read(tmp_path, plain, floor, things, only=("things",))), WALLS)
     with pytest.raises(ParameterError, match=r"only: unknown name 'thing': did you mean 'Things'\?"):
-        read(tmp_path, plain, floor, things, tiles("Walls"), only=("thing",))
+        read(tmp_path, plain, floor, things, build_tiles("Walls"), only=("thing",))
     assert are_equal(
         compute_obstacles(
-            read(tmp_path, plain, floor, tiles("Walls"), things, skip=("walls",), only=("things",))
+            read(tmp_path, plain, floor, build_tiles("Walls"), things, skip=("walls",), only=("things",))
         ),
         WALLS,
     )
@@ -101,7 +101,7 @@ PACKED: dict[str, Callable[[bytes], bytes]] = {"": bytes, "zlib": zlib.compress,
 def test_tiles_may_be_packed(tmp_path: Path, packing: str) -> None:
     raw = struct.pack("<12I", *(int(gid) for gid in ROWS.split(",")))
     text = base64.b64encode(PACKED[packing](raw)).decode()
-    layer = tiles("a", text).replace('"csv"', f'"base64" compression="{packing}"')
+    layer = build_tiles("a", text).replace('"csv"', f'"base64" compression="{packing}"')
     assert are_equal(compute_obstacles(read(tmp_path, TILES.format(""), layer)), WALLS)
 
 
@@ -124,13 +124,13 @@ def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
 
 def test_tiles_need_not_be_square(tmp_path: Path) -> None:
     tile = 'tilewidth="16" tileheight="8"'
-    foreign = read(tmp_path, TILES.format(""), tiles("a"), tile=tile, cell=0.5)
+    foreign = read(tmp_path, TILES.format(""), build_tiles("a"), tile=tile, cell=0.5)
     assert are_equal(compute_obstacles(foreign, (2, 0.75)), affinity.scale(WALLS, 0.5, 0.25, origin=(0, 0)))
     assert foreign.cell == 0.5
-    foreign = read(tmp_path, TILES.format(""), tiles("a"), tile=tile, scale=0.25)
+    foreign = read(tmp_path, TILES.format(""), build_tiles("a"), tile=tile, scale=0.25)
     assert are_equal(compute_obstacles(foreign, (16, 6)), affinity.scale(WALLS, 4, 2, origin=(0, 0)))
     with pytest.raises(ParameterError, match="both say how large a tile is"):
-        read(tmp_path, TILES.format(""), tiles("a"), scale=0.25, cell=1.0)
+        read(tmp_path, TILES.format(""), build_tiles("a"), scale=0.25, cell=1.0)
     environment, _, _ = import_map(tmp_path / "map.tmx", options=ReadOptions(cell=2.0))
     assert environment.free_area <= 4 * 3 * 2 * 1
 
@@ -140,19 +140,19 @@ def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None
     corner = '<tile id="3"><objectgroup><object x="0" y="8" width="8" height="8"/></objectgroup></tile>'
     flips = (0, 1 << 31, 1 << 30, 1 << 29)
     rows = ",".join(str(4 + flip) for flip in flips) + ",0" * 8
-    foreign = read(tmp_path, TILES.format(corner), tiles("a", rows))
+    foreign = read(tmp_path, TILES.format(corner), build_tiles("a", rows))
     quarters = [box(0, 2, 0.5, 2.5), box(1.5, 2, 2, 2.5), box(2, 2.5, 2.5, 3), box(3.5, 2.5, 4, 3)]
     assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
     # one as large as the cell is the cell, and one of a tall picture begins above it
     whole = corner.replace('y="8" width="8" height="8"', 'y="0" width="16" height="16"')
-    assert compute_obstacles(read(tmp_path, TILES.format(whole), tiles("a", "4" + ",0" * 11))).equals(
+    assert compute_obstacles(read(tmp_path, TILES.format(whole), build_tiles("a", "4" + ",0" * 11))).equals(
         box(0, 2, 1, 3)
     )
     tall = (
         '<tileset firstgid="9" name="b" tilewidth="16" tileheight="32"><tileoffset x="4" y="0"/>'
         '<tile id="0"><objectgroup><object x="0" y="8" width="8" height="24"/></objectgroup></tile></tileset>'
     )
-    foreign = read(tmp_path, tall, tiles("a", "0,0,0,0,0,9,0,0,0,0,0,0"))
+    foreign = read(tmp_path, tall, build_tiles("a", "0,0,0,0,0,9,0,0,0,0,0,0"))
     assert compute_obstacles(foreign).equals(box(1.25, 1, 1.75, 2.5))
 
 
@@ -167,7 +167,7 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
         '<object x="2" y="2" width="9" height="9"><text>no</text></object>',
         '<object name="robot" x="8" y="24"><point/></object>',
     )
-    foreign = read(tmp_path, objects("things", *given), scale=1.0, thickness=2.0)
+    foreign = read(tmp_path, build_objects("things", *given), scale=1.0, thickness=2.0)
     expected = [
         box(8, 32, 24, 40),
         box(24, 24, 32, 40),  # clockwise about its upper left corner
@@ -184,15 +184,17 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
 
 def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> None:
     square = '<object name="{}" x="0" y="0" width="16" height="16"/>'
-    things = objects("triggers", square.format("door"), square.format("wall").replace('x="0"', 'x="48"'))
-    ground = tiles("Ground", ROWS.replace("2", "1"))
+    things = build_objects(
+        "triggers", square.format("door"), square.format("wall").replace('x="0"', 'x="48"')
+    )
+    ground = build_tiles("Ground", ROWS.replace("2", "1"))
     foreign = read(tmp_path, ground, things)
     assert compute_obstacles(foreign).equals(box(3, 2, 4, 3))
     assert foreign.dropped == ("1 object that is not solid by name or property (--only NAME selects it)",)
     assert compute_obstacles(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
-    moved = objects("walls", square.format(""), more='offsetx="16" offsety="16"')
+    moved = build_objects("walls", square.format(""), more='offsetx="16" offsety="16"')
     assert compute_obstacles(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
-    shifted = tiles("walls", "2" + ",0" * 11, 'offsetx="8" offsety="4"')
+    shifted = build_tiles("walls", "2" + ",0" * 11, 'offsetx="8" offsety="4"')
     assert compute_obstacles(read(tmp_path, ground, shifted)).equals(box(0.5, 1.75, 1.5, 2.75))
 
 
@@ -203,15 +205,15 @@ def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
     (tmp_path / "far.tsx").write_text(text)
     (folder / "near.tsx").write_text(text)
     near, far = (f'<tileset firstgid="1" source="{name}"/>' for name in ("near.tsx", "../far.tsx"))
-    assert are_equal(compute_obstacles(read(folder, near, tiles("a"))), WALLS)
+    assert are_equal(compute_obstacles(read(folder, near, build_tiles("a"))), WALLS)
     with pytest.raises(
         MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected a"
     ):
-        read(folder, far, tiles("a"))
-    assert are_equal(compute_obstacles(read(folder, far, tiles("a"), anywhere=True)), WALLS)
+        read(folder, far, build_tiles("a"))
+    assert are_equal(compute_obstacles(read(folder, far, build_tiles("a"), anywhere=True)), WALLS)
     (folder / "near.tsx").write_text("<map/>")
     with pytest.raises(MapError, match=r"near\.tsx: expected <tileset>, got <map>"):
-        read(folder, near, tiles("a"))
+        read(folder, near, build_tiles("a"))
 
 
 BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
@@ -220,24 +222,24 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
-        (tiles("walls", "1,2"), "map.tmx:3: <data>: expected 12 tiles as stated, got 2"),
-        (tiles("walls", "1,x" + ",1" * 10), "expected whole numbers from 0, separated by commas"),
-        (tiles("walls", "-1" + ",1" * 11), "expected whole numbers from 0, separated by commas"),
-        (tiles("walls", ROWS, size=(3, 4)), "expected layers of 4 x 3 tiles"),
-        (tiles("walls").replace("csv", "base64"), "not base64: Only base64 data is allowed"),
-        (tiles("walls", BOMB).replace('"csv"', '"base64" compression="zlib"'), "expected 12"),
-        (tiles("walls", "QUJD").replace('"csv"', '"base64" compression="gzip"'), "not gzip: Error -3"),
-        (tiles("walls").replace('"csv"', '"base64" compression="zstd"'), "expected CSV, or base64"),
-        (tiles("walls", "A").replace("csv", "base64"), "not base64"),
-        (tiles("walls", size=(4, "9" * 9)), "expected at most 16000000 tiles in all, got more"),  # type: ignore[arg-type]
-        (tiles("walls", more='offsetx="x"'), "offsetx: expected a number within 1e7"),
-        (tiles("walls", size=(4, -3)), "expected a whole number from 1"),
-        (objects("a", '<object x="nan" y="1"/>'), "x: expected a number within 1e7"),
-        (objects("a", '<object><polygon points="1,2 3"/></object>'), "points: expected 3 points"),
-        (objects("a", '<object><polyline points="1,2"/></object>'), "points: expected 2 points"),
+        (build_tiles("walls", "1,2"), "map.tmx:3: <data>: expected 12 tiles as stated, got 2"),
+        (build_tiles("walls", "1,x" + ",1" * 10), "expected whole numbers from 0, separated by commas"),
+        (build_tiles("walls", "-1" + ",1" * 11), "expected whole numbers from 0, separated by commas"),
+        (build_tiles("walls", ROWS, size=(3, 4)), "expected layers of 4 x 3 tiles"),
+        (build_tiles("walls").replace("csv", "base64"), "not base64: Only base64 data is allowed"),
+        (build_tiles("walls", BOMB).replace('"csv"', '"base64" compression="zlib"'), "expected 12"),
+        (build_tiles("walls", "QUJD").replace('"csv"', '"base64" compression="gzip"'), "not gzip: Error -3"),
+        (build_tiles("walls").replace('"csv"', '"base64" compression="zstd"'), "expected CSV, or base64"),
+        (build_tiles("walls", "A").replace("csv", "base64"), "not base64"),
+        (build_tiles("walls", size=(4, "9" * 9)), "expected at most 16000000 tiles in all, got more"),  # type: ignore[arg-type]
+        (build_tiles("walls", more='offsetx="x"'), "offsetx: expected a number within 1e7"),
+        (build_tiles("walls", size=(4, -3)), "expected a whole number from 1"),
+        (build_objects("a", '<object x="nan" y="1"/>'), "x: expected a number within 1e7"),
+        (build_objects("a", '<object><polygon points="1,2 3"/></object>'), "points: expected 3 points"),
+        (build_objects("a", '<object><polyline points="1,2"/></object>'), "points: expected 2 points"),
         ('<tileset source="a.tsx"/>', "expected a whole number from 1"),
         ("", "expected --only LAYER with one of walls: there is none"),
-        (tiles("walls", ROWS.replace("1", "2")), "no cell is free"),
+        (build_tiles("walls", ROWS.replace("1", "2")), "no cell is free"),
     ],
     ids=range(18),
 )
@@ -250,7 +252,7 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, parts: str, expecte
 @pytest.mark.parametrize("orientation", ["isometric", "staggered", "hexagonal"])
 def test_other_maps_are_refused_by_their_names(tmp_path: Path, orientation: str) -> None:
     with pytest.raises(MapError, match=rf"map\.tmx:2: <map>: expected an orthogonal map, got {orientation}"):
-        read(tmp_path, tiles("walls"), head=f'orientation="{orientation}"')
+        read(tmp_path, build_tiles("walls"), head=f'orientation="{orientation}"')
 
 
 @pytest.mark.slow
@@ -260,7 +262,7 @@ def test_too_many_collision_objects_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.tmx"
     path.write_text(
         f'<map width="150" height="150" tilewidth="16" tileheight="16">{TILES.format(corner)}'
-        f"{tiles('a', rows, size=(150, 150))}</map>"
+        f"{build_tiles('a', rows, size=(150, 150))}</map>"
     )
     with pytest.raises(MapError, match="expected at most 10000 parts of tiles, got more"):
         IMPORTER.read(path, ReadOptions())
@@ -273,7 +275,7 @@ def test_a_large_map_is_read(tmp_path: Path) -> None:
     rows = ",".join(map(str, cells.ravel().tolist()))
     path.write_text(
         '<map width="400" height="300" tilewidth="8" tileheight="8">'
-        f"{tiles('walls', rows, size=(400, 300))}</map>"
+        f"{build_tiles('walls', rows, size=(400, 300))}</map>"
     )
     foreign = IMPORTER.read(path, ReadOptions(cell=0.1))
     # but for the necks

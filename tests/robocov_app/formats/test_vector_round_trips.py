@@ -65,7 +65,7 @@ _Y = st.integers(0, 1000).map(lambda n: n / 100)
 _SIZE = st.integers(10, 300).map(lambda n: n / 100)
 
 
-def _block(x: float, y: float, width: float, height: float, hole: bool) -> PolygonObstacle:
+def _build_block(x: float, y: float, width: float, height: float, hole: bool) -> PolygonObstacle:
     outer = ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
     a = x + width / 4
     b = y + height / 4
@@ -74,7 +74,7 @@ def _block(x: float, y: float, width: float, height: float, hole: bool) -> Polyg
 
 
 _OBSTACLE = st.one_of(
-    st.builds(_block, _X, _Y, _SIZE, _SIZE, st.booleans()),
+    st.builds(_build_block, _X, _Y, _SIZE, _SIZE, st.booleans()),
     st.builds(lambda x, y, radius: CircleObstacle((x, y), radius, "boundary"), _X, _Y, _SIZE),
     st.lists(st.tuples(_X, _Y), min_size=2, max_size=4, unique=True).map(
         lambda points: WallObstacle(tuple(points), 0.1)

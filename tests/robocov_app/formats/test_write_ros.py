@@ -20,7 +20,7 @@ CORNER = Environment(
 """An L with a block; the lower left is the origin."""
 
 
-def pixels(path: Path) -> np.ndarray:
+def read_pixels(path: Path) -> np.ndarray:
     return np.asarray(Image.open(path))
 
 
@@ -45,8 +45,8 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
     """.split()
     # The block of half a meter is one cell; the rest is unchanged.
     values = {"#": 0, ".": 254, "?": 205}
-    assert pixels(tmp_path / "corner.pgm").tolist() != []
-    found = pixels(tmp_path / "corner.pgm")
+    assert read_pixels(tmp_path / "corner.pgm").tolist() != []
+    found = read_pixels(tmp_path / "corner.pgm")
     expected = np.array([[values[c] for c in line] for line in drawing])
     expected[6, 2] = 254
     expected[6, 3] = 0
@@ -79,9 +79,9 @@ def test_scale_and_raw_give_the_solid_fraction_of_a_cell(tmp_path: Path) -> None
         PolygonObstacle(((0.875, 0.0), (1.375, 0.0), (1.375, 1.0), (0.875, 1.0))),
     ))  # fmt: skip
     export_map(half, tmp_path / "raw.yaml", options=WriteOptions(cell=0.5, mode="raw"))
-    assert pixels(tmp_path / "raw.pgm")[1].tolist() == [100, 0, 25, 100, 0, 100]
+    assert read_pixels(tmp_path / "raw.pgm")[1].tolist() == [100, 0, 25, 100, 0, 100]
     export_map(half, tmp_path / "scale.yaml", options=WriteOptions(cell=0.5, mode="scale"))
-    found = pixels(tmp_path / "scale.png")
+    found = read_pixels(tmp_path / "scale.png")
     assert found.shape[2] == 2
     dark = 1 - found[1, :, 0] / 255
     assert dark[[1, 4]].tolist() == [0, 0]

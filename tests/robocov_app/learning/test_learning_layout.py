@@ -16,7 +16,7 @@ from robocov_app.learning import ObservationLayout
 REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))  # a diameter of 10 m
 
 
-def seen_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: int = 0) -> Observations:
+def observe_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: int = 0) -> Observations:
     rng = np.random.default_rng(seed)
     n = len(positions)
     points = positions + rng.normal(scale=0.8, size=(n, 2))
@@ -32,7 +32,7 @@ def seen_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: i
     )
 
 
-def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float) -> list[float]:
+def compute_row(layout: ObservationLayout, seen: Observations, robot: int, reach: float) -> list[float]:
     """Return one row by another way, in plain Python."""
     x, y = seen.positions[robot]
     row = [(x - 4.0) / 10.0, (y - 3.0) / 10.0, *seen.velocities[robot] / 0.8]
@@ -60,12 +60,12 @@ def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float
 @pytest.mark.parametrize("n", [1, 3, 60])
 def test_rows_are_what_they_are_documented_to_be(layout: ObservationLayout, reach: float, n: int) -> None:
     positions = np.random.default_rng(n).uniform((0, 0), (8, 6), size=(n, 2))
-    seen = seen_at(positions, reach, n, layout.rays)
+    seen = observe_at(positions, reach, n, layout.rays)
     team = Team.homogeneous(n, max_speed=0.8, sensing_range=2.0, communication_range=reach)
     rows = layout.build_rows(seen, team)
     assert rows.dtype == np.float32 and rows.shape == (n, layout.size)
     for robot in range(n):
-        np.testing.assert_allclose(rows[robot], told(layout, seen, robot, reach), atol=2e-6)
+        np.testing.assert_allclose(rows[robot], compute_row(layout, seen, robot, reach), atol=2e-6)
 
 
 def test_blocks_are_all_of_a_row() -> None:
@@ -82,7 +82,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     """Changing anything outside robot i's ranges changes nothing in row i, not one bit."""
     rng = np.random.default_rng(seed)
     positions = rng.uniform((0, 0), (8, 6), size=(n, 2))
-    seen = seen_at(positions, reach, seed, rays=6)
+    seen = observe_at(positions, reach, seed, rays=6)
     layout = ObservationLayout(3, 6, True)
     team = Team.homogeneous(n, communication_range=reach)
     i = int(rng.integers(n))
@@ -94,7 +94,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
         place = rng.uniform((0, 0), (8, 6))
         if np.hypot(*(place - positions[i])) > reach:
             moved[k] = place
-    other = seen_at(moved, reach, seed + 1, rays=6)
+    other = observe_at(moved, reach, seed + 1, rays=6)
     for name in ("velocities", "obstacle_points"):
         getattr(other, name)[i] = getattr(seen, name)[i]
     other.scans.distances[i] = seen.scans.distances[i]
@@ -107,7 +107,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
 def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> None:
     """Even where a robot believes itself to be outside, or what it senses is farther than it can sense."""
     rng = np.random.default_rng(seed)
-    seen = seen_at(rng.uniform((-5, -5), (13, 11), size=(n, 2)), np.inf, seed, rays=4)
+    seen = observe_at(rng.uniform((-5, -5), (13, 11), size=(n, 2)), np.inf, seed, rays=4)
     layout = ObservationLayout(2, 4, True)
     low, high = layout.bounds
     rows = layout.build_rows(seen, Team.homogeneous(n, max_speed=0.2, sensing_range=sensing))
@@ -143,6 +143,6 @@ def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:
 
 
 def test_rays_want_a_scan() -> None:
-    seen = seen_at(np.array([[1.0, 1.0]]), rays=4)
+    seen = observe_at(np.array([[1.0, 1.0]]), rays=4)
     with pytest.raises(ParameterError, match=r"observation.rays: expected 6 rays in a scan, got 4"):
         ObservationLayout(rays=6).build_rows(seen, Team.homogeneous(1))

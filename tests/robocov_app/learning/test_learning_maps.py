@@ -12,7 +12,7 @@ from robocov_app.learning import GeneratedMaps
 from robocov_app.learning.maps import MapSampler
 
 
-def drawn(sampler: MapSampler, seed: int, count: int) -> list[str]:
+def draw_names(sampler: MapSampler, seed: int, count: int) -> list[str]:
     rng = np.random.default_rng(seed)
     return [sampler.draw(rng).name for _ in range(count)]
 
@@ -20,15 +20,15 @@ def drawn(sampler: MapSampler, seed: int, count: int) -> list[str]:
 def test_one_map_by_name_path_or_itself(empty: Environment, tmp_path: Path) -> None:
     save_map(empty, tmp_path / "mine.json")
     for maps in (empty, tmp_path / "mine.json", str(tmp_path / "mine.json")):
-        assert drawn(MapSampler(maps, 8), 0, 2) == ["empty", "empty"]
-    assert drawn(MapSampler("square", 8), 0, 1) == [load_map("square").name]
+        assert draw_names(MapSampler(maps, 8), 0, 2) == ["empty", "empty"]
+    assert draw_names(MapSampler("square", 8), 0, 1) == [load_map("square").name]
 
 
 def test_each_of_several_is_drawn_as_often(empty: Environment, cluttered: Environment) -> None:
-    names = drawn(MapSampler([empty, cluttered], 8), 0, 200)
+    names = draw_names(MapSampler([empty, cluttered], 8), 0, 200)
     assert 75 <= names.count("empty") <= 125
-    assert names == drawn(MapSampler([empty, cluttered], 8), 0, 200)
-    assert names != drawn(MapSampler([empty, cluttered], 8), 1, 200)
+    assert names == draw_names(MapSampler([empty, cluttered], 8), 0, 200)
+    assert names != draw_names(MapSampler([empty, cluttered], 8), 1, 200)
 
 
 def test_makers_get_new_seeds() -> None:
@@ -38,13 +38,13 @@ def test_makers_get_new_seeds() -> None:
         asked.append(seed)
         return Environment(f"map {seed}", ((0, 0), (1, 0), (1, 1), (0, 1)))
 
-    names = drawn(MapSampler(make, 8), 3, 5)
+    names = draw_names(MapSampler(make, 8), 3, 5)
     assert len(set(asked)) == 5 and names == [f"map {seed}" for seed in asked]
 
 
 def test_generated_maps_are_those_of_the_seeds() -> None:
     maps = GeneratedMaps("polygons", seeds=[3, 8], parameters={"obstacles": 2, "area": 0.05})
-    names = set(drawn(MapSampler(maps, 8), 0, 12))
+    names = set(draw_names(MapSampler(maps, 8), 0, 12))
     assert names == {"polygons 3", "polygons 8"}
     assert len(maps(0).obstacles) == 2
     assert GeneratedMaps(parameters={"obstacles": 2, "area": 0.05})(5).name == "polygons 5"

@@ -17,7 +17,7 @@ REGISTERED = f"robocov_app.learning.gym:{ID}"
 SMALL: dict[str, Any] = {"maps": "square", "robots": 3, "lattice": 16}
 
 
-def twin_of(env: Any, way: str) -> Any:
+def copy_environment(env: Any, way: str) -> Any:
     return copy.deepcopy(env) if way == "deepcopy" else pickle.loads(pickle.dumps(env))
 
 
@@ -34,20 +34,20 @@ def digest(outcome: Any) -> list[Any]:
 @pytest.mark.parametrize("kind", [CoverageEnv, CoverageVectorEnv, CoverageParallelEnv])
 def test_an_episode_goes_on_bit_for_bit(kind: Any, way: str) -> None:
     env = kind(2, **SMALL) if kind is CoverageVectorEnv else kind(**SMALL)
-    assert digest(twin_of(env, way).reset(seed=3)) == digest(env.reset(seed=3))
+    assert digest(copy_environment(env, way).reset(seed=3)) == digest(env.reset(seed=3))
     rng = np.random.default_rng(0)
 
-    def action() -> Any:
+    def sample_action() -> Any:
         if kind is CoverageParallelEnv:
             return {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in env.possible_agents}
         shape = env.action_space.shape
         return rng.uniform(-1, 1, shape).astype(np.float32)
 
     for _ in range(3):
-        env.step(action())
-    twin = twin_of(env, way)
+        env.step(sample_action())
+    twin = copy_environment(env, way)
     for _ in range(3):
-        act = action()
+        act = sample_action()
         assert digest(twin.step(act)) == digest(env.step(act))
     # what comes by chance goes on as well
     assert digest(twin.reset()) == digest(env.reset())

@@ -19,14 +19,14 @@ def cost(cluttered: Environment) -> CoverageCost:
     return CoverageCost(cluttered, 20)
 
 
-def places(environment: Environment, seed: int, n: int = 4) -> np.ndarray:
+def sample_places(environment: Environment, seed: int, n: int = 4) -> np.ndarray:
     return environment.start("uniform").sample(n, seed=seed, radius=0.3)
 
 
 @settings(max_examples=15)
 @given(seed=STEPS)
 def test_parts_sum_up_to_the_decrease(cost: CoverageCost, seed: int) -> None:
-    begin = places(cost.environment, seed)
+    begin = sample_places(cost.environment, seed)
     moved = begin + np.random.default_rng(seed).uniform(-0.1, 0.1, size=begin.shape)
     before = cost(begin)
     after = cost(moved)
@@ -38,7 +38,7 @@ def test_parts_sum_up_to_the_decrease(cost: CoverageCost, seed: int) -> None:
 
 def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
     """Where a single robot moves, nearly all is its own; that is the difference of two costs."""
-    begin = places(cost.environment, 5)
+    begin = sample_places(cost.environment, 5)
     for robot in range(4):
         moved = begin.copy()
         moved[robot] += 0.02, 0.01
@@ -54,7 +54,7 @@ def test_those_who_stay_get_next_to_nothing(cost: CoverageCost) -> None:
     """What two slopes leave over of a step of 22 cm: a part in a thousand of a meter, divided by four."""
     left = []
     for seed in range(12):
-        begin = places(cost.environment, seed)
+        begin = sample_places(cost.environment, seed)
         moved = begin.copy()
         moved[0] += 0.2, 0.1
         own = share_reward("own", cost(begin), cost(moved), 1.0)
@@ -72,7 +72,7 @@ def test_no_placement_goes_below_the_reference(empty: Environment) -> None:
         best = cost(grid).mean_distance / compute_reference_distance(100.0, n)
         assert 1.0 < best < 1.03
         for seed in range(5):
-            assert cost(places(empty, seed, n)).mean_distance > compute_reference_distance(100.0, n)
+            assert cost(sample_places(empty, seed, n)).mean_distance > compute_reference_distance(100.0, n)
 
 
 def test_names() -> None:

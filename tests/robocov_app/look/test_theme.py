@@ -12,7 +12,7 @@ from robocov_app.look.hues import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues
 from robocov_app.look.theme import THEMES, get_theme
 
 
-def adjacency_of(points: np.ndarray) -> np.ndarray:
+def find_adjacent_pairs(points: np.ndarray) -> np.ndarray:
     triangles = Delaunay(points).simplices
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
     return np.unique(np.sort(pairs, axis=1), axis=0).astype(np.intp)
@@ -128,7 +128,7 @@ def test_small_teams_have_one_hue_each(n):
 @settings(deadline=None, max_examples=40)
 @given(st.integers(MAX_OWN_HUES + 1, 150), st.integers(0, 10_000))
 def test_cells_of_large_teams_differ_from_their_neighbors(n, seed):
-    adjacency = adjacency_of(np.random.default_rng(seed).uniform(size=(n, 2)))
+    adjacency = find_adjacent_pairs(np.random.default_rng(seed).uniform(size=(n, 2)))
     hues = choose_robot_hues(n, adjacency)
     assert hues.min() >= 0 and hues.max() < N_SHARED_HUES
     assert (hues[adjacency[:, 0]] != hues[adjacency[:, 1]]).all()
@@ -139,9 +139,9 @@ def test_cells_of_large_teams_differ_from_their_neighbors(n, seed):
 def test_colors_stay_but_for_cells_that_conflict(n, seed):
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(n, 2))
-    before = choose_robot_hues(n, adjacency_of(points))
-    assert choose_robot_hues(n, adjacency_of(points), before).tolist() == before.tolist()
-    adjacency = adjacency_of(points + rng.normal(scale=0.01, size=(n, 2)))
+    before = choose_robot_hues(n, find_adjacent_pairs(points))
+    assert choose_robot_hues(n, find_adjacent_pairs(points), before).tolist() == before.tolist()
+    adjacency = find_adjacent_pairs(points + rng.normal(scale=0.01, size=(n, 2)))
     after = choose_robot_hues(n, adjacency, before)
     assert (after[adjacency[:, 0]] != after[adjacency[:, 1]]).all()
     conflicts = int((before[adjacency[:, 0]] == before[adjacency[:, 1]]).sum())

@@ -202,11 +202,11 @@ class TestCrowds:
         seen = {}
         disc = sprites.render_disc
 
-        def watched(radius, shift, *, ring_width, text, **colors):
+        def watch(radius, shift, *, ring_width, text, **colors):
             seen[text] = radius - ring_width
             return disc(radius, shift, ring_width=ring_width, text=text, **colors)
 
-        monkeypatch.setattr(sprites, "render_disc", watched)
+        monkeypatch.setattr(sprites, "render_disc", watch)
         positions = np.vstack([4.0 + 0.06 * np.arange(16).reshape(8, 2), [[1.0, 1.0], [7.0, 1.0]]])
         scene = build_scene(positions)
         scene = replace(scene, team=Team.homogeneous(10, radius=0.01))
@@ -468,13 +468,13 @@ class TestMovingObstacles:
         painter = Painter(self.CARTS, (480, 360), theme)
         frame = painter.render_frame(self.scene(2.0))
 
-        def at(x, y):
+        def get_color_at(x, y):
             column, row = painter.camera.to_pixels(np.array([x, y])).round().astype(int)
             return tuple(frame[row, column].tolist())
 
-        assert at(6.0, 3.3) == theme.obstacle
-        assert at(3.0, 1.3) == theme.moving_obstacle != theme.obstacle
-        assert np.abs(np.subtract(at(3.0, 1.0), theme.ink)).max() < 5  # the arrow
+        assert get_color_at(6.0, 3.3) == theme.obstacle
+        assert get_color_at(3.0, 1.3) == theme.moving_obstacle != theme.obstacle
+        assert np.abs(np.subtract(get_color_at(3.0, 1.0), theme.ink)).max() < 5  # the arrow
         assert list_legend_texts(painter, self.scene(2.0))[-1] == "moving obstacle and its path"
         assert not any(
             "moving" in words

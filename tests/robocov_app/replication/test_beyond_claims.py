@@ -228,14 +228,14 @@ def test_cells_by_time_help_or_do_not(controller):
 
 
 def test_lost_and_late_messages_are_tolerated_or_not():
-    def found(loss: float, delay: float) -> list[Degradation]:
+    def find_values(loss: float, delay: float) -> list[Degradation]:
         return [
             Degradation(axis, value, "rapf", "RAPF", Interval(ratio, ratio, ratio), 9)
             for axis, value, ratio in (("loss", 0.6, loss), ("delay", 1.0, delay))
         ]
 
-    assert judge_conditions(found(1.01, 1.02), 12).verdict == "holds"
-    assert judge_conditions(found(1.01, 1.5), 12).verdict == "holds partly"
-    assert judge_conditions(found(1.2, 1.5), 12).verdict == "does not hold"
-    assert "1.5, with delay 1" in judge_conditions(found(1.2, 1.5), 12).explanation
+    assert judge_conditions(find_values(1.01, 1.02), 12).verdict == "holds"
+    assert judge_conditions(find_values(1.01, 1.5), 12).verdict == "holds partly"
+    assert judge_conditions(find_values(1.2, 1.5), 12).verdict == "does not hold"
+    assert "1.5, with delay 1" in judge_conditions(find_values(1.2, 1.5), 12).explanation
     assert judge_conditions([], 12).verdict == "undecided"

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clear_pages import all_clear
+from clear_pages import assert_all_clear
 from drawn_run import HALL, ROOMS, SQUARE, record_walk
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
@@ -41,7 +41,7 @@ PARTITION = record_walk(SQUARE, 6)
 def test_no_text_is_covered_or_cut_off(number, theme):
     figure = draw_figure(number, RUNS, PARTITION, theme)
     if number not in (3, 5, 7):
-        all_clear(figure)
+        assert_all_clear(figure)
     assert to_rgb(figure.get_facecolor()) == to_plot_color((LIGHT if theme == "light" else DARK).background)
 
 
@@ -112,18 +112,18 @@ def test_cost_curves(number, case, other):
 
 
 def test_the_legend_names_centroids_only_if_some_are_visible():
-    def words(runs):
+    def list_words(runs):
         (legend,) = draw_figure(2, runs, PARTITION, "light").legends
         return [text.get_text() for text in legend.get_texts()]
 
-    def ending(goals):
+    def build_ending(goals):
         return {
             name: FigureRun(replace(shown.record, goals=goals(shown.record)), shown.history)
             for name, shown in RUNS.items()
         }
 
-    assert "cell centroid" in words(RUNS)
-    arrived = words(ending(lambda record: record.positions))
+    assert "cell centroid" in list_words(RUNS)
+    arrived = list_words(build_ending(lambda record: record.positions))
     assert not {"cell centroid", "goal"} & set(arrived)
-    runs = ending(lambda record: record.positions + 1.0)
-    assert "goal" in words(runs)  # which is no centroid
+    runs = build_ending(lambda record: record.positions + 1.0)
+    assert "goal" in list_words(runs)  # which is no centroid

@@ -183,7 +183,7 @@ class TestDegradations:
     def finals(self, monkeypatch, tmp_path):
         """Make up tables in which each run has its final cost, by study, value, controller and seed."""
 
-        def made_up(cost):
+        def make_up_outcomes(cost):
             class Table:
                 def __init__(self, folder):
                     self.name = folder.name
@@ -209,7 +209,7 @@ class TestDegradations:
             found = read_degradations(tmp_path, TINY)
             return {(each.axis, each.value, each.controller): each for each in found}
 
-        return made_up
+        return make_up_outcomes
 
     def test_ratios_are_of_the_same_map_and_seed(self, finals):
         def cost(name, row):

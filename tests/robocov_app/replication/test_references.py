@@ -57,12 +57,12 @@ def test_stored_references_are_reused(tmp_path):
 
 
 def test_starts_are_no_part_of_the_question():
-    def question(starts):
+    def compute_hash(starts):
         shape = Environment(HALL.name, HALL.boundary, (), starts)
         return ReferenceQuery(to_json(shape), 3, 0.1, 16, 2).input_hash
 
-    assert question({"spread": UniformStart()}) == question({})
-    assert question({}) != ReferenceQuery(to_json(SQUARE), 3, 0.1, 16, 2).input_hash
+    assert compute_hash({"spread": UniformStart()}) == compute_hash({})
+    assert compute_hash({}) != ReferenceQuery(to_json(SQUARE), 3, 0.1, 16, 2).input_hash
 
 
 @pytest.mark.slow

@@ -32,14 +32,14 @@ def test_controllers_are_timed_in_turn_with_rapf(tmp_path):
 def test_stored_times_are_not_measured_again_but_those_of_other_gains_are(tmp_path, monkeypatch):
     first = measure(tmp_path)
 
-    def never() -> float:
+    def fail() -> float:
         raise AssertionError
 
-    assert measure(tmp_path, clock=never)[3].seconds == first[3].seconds
+    assert measure(tmp_path, clock=fail)[3].seconds == first[3].seconds
     with pytest.raises(AssertionError):
-        measure(tmp_path, {3: ("rpf",)}, clock=never)
+        measure(tmp_path, {3: ("rpf",)}, clock=fail)
     with pytest.raises(AssertionError):
-        measure(tmp_path, blocks=4, clock=never)
+        measure(tmp_path, blocks=4, clock=fail)
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"format": "robocov-steps", "robots": {"3": {}}}', "{"])

@@ -229,7 +229,7 @@ class TestPaper:
         assert sum(study.duration * len(study) for study in beyond) < 4500.0
 
 
-def baseline_contests(plan):
+def select_baseline_contests(plan):
     """Return the sweeps of baselines and ours."""
     contests = studies.build_beyond_contests(plan, {}, UNTUNED)
     return {name: each for name, each in contests.items() if name == "rivals" or name.startswith("ours-")}
@@ -238,7 +238,7 @@ def baseline_contests(plan):
 class TestBeyond:
     @both
     def test_every_registered_controller_takes_part_once(self, plan):
-        contests = baseline_contests(plan).values()
+        contests = select_baseline_contests(plan).values()
         others = [law.key for each in contests for law in each.contenders]
         assert len(others) == len(set(others))
         assert {*others, *PAPER} == set(CONTROLLERS)
@@ -248,7 +248,7 @@ class TestBeyond:
         papers = list(generate_tasks(studies.build_claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
-        for each in baseline_contests(plan).values():
+        for each in select_baseline_contests(plan).values():
             for task in generate_tasks(each.study):
                 assert (task.document, task.start, task.seed) in places
                 assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
@@ -258,7 +258,7 @@ class TestBeyond:
         assert FULL.beyond.own_seeds == FULL.seeds
         assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= MIN_MAPS
         assert len(study_maps.build_baseline_maps(FULL)) == 33
-        for name, each in baseline_contests(FULL).items():
+        for name, each in select_baseline_contests(FULL).items():
             seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
             assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
 

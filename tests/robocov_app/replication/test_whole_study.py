@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_paper import TINY, options, shared
+from tiny_paper import TINY, build_options, share_folder
 
 from robocov.controllers import CONTROLLERS
 from robocov.cost import CoverageCost
@@ -63,11 +63,11 @@ def small_parts():
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """The folder, what both parts gave, and the pictures of the paper's page."""
-    with shared(tmp_path_factory, "tiny-paper") as root:
+    with share_folder(tmp_path_factory, "tiny-paper") as root:
         folder = root / "out"
         kept = root / "images"
         open_folder(folder, TINY)
-        paper = parts.run_paper(folder, TINY, options())
+        paper = parts.run_paper(folder, TINY, build_options())
         if not kept.exists():
             images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
             found = judge_paper_claims(paper.convex, paper.claims, paper.gains)
@@ -75,7 +75,7 @@ def study(tmp_path_factory):
             page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found)
             study_pages.write_text(folder / study_pages.PAGE_FILE, page)
             kept.write_bytes(pickle.dumps(images))
-        beyond = parts.run_beyond(folder, TINY, options(), paper)
+        beyond = parts.run_beyond(folder, TINY, build_options(), paper)
     return folder, paper, beyond, pickle.loads(kept.read_bytes())
 
 
@@ -109,7 +109,7 @@ def more(beyond):
     return study_pages.build_beyond_page(DRAWN, beyond)
 
 
-def text_of(found) -> str:
+def format_claims(found) -> str:
     """Return claims as text: one that is not a number equals itself there."""
     return json.dumps([claim.to_json() for claim in found])
 
@@ -138,14 +138,14 @@ class TestRuns:
     def test_the_same_call_does_nothing_again_and_gives_the_same(self, folder, paper, beyond):
         rows = sorted((folder / "studies").glob("*/runs/*/row.json"))
         before = [path.stat().st_mtime_ns for path in rows]
-        again = parts.run_paper(folder, TINY, options())
-        alone = parts.run_beyond(folder, TINY, options(), None)
+        again = parts.run_paper(folder, TINY, build_options())
+        alone = parts.run_beyond(folder, TINY, build_options(), None)
         assert [path.stat().st_mtime_ns for path in rows] == before
         assert again.contenders == paper.contenders and again.references == paper.references
         first, second = (judge_paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
-        assert text_of(first) == text_of(second)
+        assert format_claims(first) == format_claims(second)
         first, second = (judge_beyond_claims(of) for of in (beyond, alone))
-        assert text_of(first) == text_of(second)
+        assert format_claims(first) == format_claims(second)
 
     def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
         out = tmp_path / "out"
@@ -155,8 +155,8 @@ class TestRuns:
         for path in lost:
             shutil.rmtree(path)
         (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
-        again = parts.run_beyond(out, TINY, options(), paper)
-        assert text_of(judge_beyond_claims(again)) == text_of(judge_beyond_claims(beyond))
+        again = parts.run_beyond(out, TINY, build_options(), paper)
+        assert format_claims(judge_beyond_claims(again)) == format_claims(judge_beyond_claims(beyond))
         for name in ("rivals", "conditions-loss"):
             table = f"studies/{name}/results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
@@ -220,7 +220,7 @@ class TestRuns:
         }
         both = {"one": Study(controllers=("rpf",), **common)}
         both["two"] = Study(controllers=("rpf", "lloyd"), **common)
-        runner.run_studies(both, tmp_path, options(), "x")
+        runner.run_studies(both, tmp_path, build_options(), "x")
         tables = [list(read_results(tmp_path / "studies" / name).rows()) for name in both]
         assert [len(table) for table in tables] == [2, 4]
         finals = [{row["run"]: row["mean_distance_m"] for row in table} for table in tables]
@@ -294,7 +294,7 @@ TINY_COMMAND = (
 )
 
 
-def begun(*words: str) -> subprocess.Popen[str]:
+def start_study(*words: str) -> subprocess.Popen[str]:
     """Start the command with the tiny study in a process of its own."""
     return subprocess.Popen(
         [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parents[1]), *words],
@@ -305,13 +305,13 @@ def begun(*words: str) -> subprocess.Popen[str]:
     )
 
 
-def finished_runs(out: Path) -> int:
+def count_finished_runs(out: Path) -> int:
     return len(list(out.glob("studies/*/runs/[!.]*")))
 
 
 def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None:
     end = time.monotonic() + 300.0  # a hang limit: two busy cores are enough in a fifth of it
-    while finished_runs(out) < count:
+    while count_finished_runs(out) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -322,7 +322,7 @@ class TestStopping:
         self, folder, content, tmp_path
     ):
         out = tmp_path / "out"
-        process = begun("--out", str(out), "--workers", "2")
+        process = start_study("--out", str(out), "--workers", "2")
         wait_for_runs(out, 12, process)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         said, told = process.communicate(timeout=300)
@@ -331,15 +331,15 @@ class TestStopping:
         assert first.startswith("paper (quick): 114 runs, about ")
         assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps finished runs" in first
         assert f"To resume: robocov paper --out {out} --quick --without-beyond" in said
-        kept = finished_runs(out)
+        kept = count_finished_runs(out)
         assert 12 <= kept < 114
 
-        process = begun("--out", str(out), "--workers", "2")
+        process = start_study("--out", str(out), "--workers", "2")
         wait_for_runs(out, kept + 12, process)
         process.kill()
         process.communicate(timeout=300)
 
-        process = begun("--out", str(out), "--workers", "2", "--json")
+        process = start_study("--out", str(out), "--workers", "2", "--json")
         said, told = process.communicate(timeout=500)
         assert process.returncode == 0, told
         answer = json.loads(said)
@@ -354,7 +354,7 @@ class TestStopping:
 
     def test_nothing_is_done_after_ctrl_c(self, folder, tmp_path):
         open_folder(tmp_path / "out", TINY)
-        stopped = options()
+        stopped = build_options()
         stopped.stop.requested = True
         with pytest.raises(StudyInterrupted):
             parts.run_paper(tmp_path / "out", TINY, stopped)
@@ -390,7 +390,7 @@ class TestTables:
         reference = paper.references["blocks-a"]
         cells = [f"{reference.mean_distance:.3f} m", format_amount(reference.agreement, "%"), *gaps]
         row = table.partition("blocks-a</th>")[2].partition("</tr>")[0]
-        assert re.findall(r"<td.*?>(.*?)</td>", plain(row)) == cells
+        assert re.findall(r"<td.*?>(.*?)</td>", remove_escapes(row)) == cells
 
 
 class TestWords:
@@ -426,7 +426,7 @@ class _Tags(HTMLParser):
         return [attributes for tag, attributes in self.found if tag in names]
 
 
-def plain(content: str) -> str:
+def remove_escapes(content: str) -> str:
     return content.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -461,10 +461,10 @@ class TestPages:
         for claim in found:
             assert {"claim", "verdict", "estimate", "interval", "runs"} <= set(claim)
             assert claim["verdict"] == "undecided"  # on two maps nothing is decided
-            assert claim["claim"] in plain(content)
+            assert claim["claim"] in remove_escapes(content)
             p = {criterion["p"] for criterion in claim["criteria"]}
             assert claim["p"] == max(p) and (claim["p_adjusted"] or 1.0) >= claim["p"]
-            assert format_amount(claim["p"]) in plain(content)
+            assert format_amount(claim["p"]) in remove_escapes(content)
         adjusted = {claim["key"] for claim in found if claim["p_adjusted"] is not None}
         assert adjusted == set(REGISTERED)
         assert {claim["question"] for claim in found} == set(range(1, GOALS))
@@ -492,11 +492,11 @@ class TestPages:
             part = content.partition(f'id="figure-{number}"')[2].partition("</section>")[0]
             for runs in (paper.figures, paper.best_figures):
                 finals = [runs[f"{case}/{law}"].history.mean_distance[-1] for law in ("rapf", "rpf")]
-                assert "{:.3f} m, RPF with {:.3f} m".format(*finals) in plain(part)
+                assert "{:.3f} m, RPF with {:.3f} m".format(*finals) in remove_escapes(part)
             assert part.count("<img") == 2
 
     def test_the_protocol_tells_all_that_is_needed_to_do_it_again(self, content, paper):
-        said = plain(content)
+        said = remove_escapes(content)
         for words in (
             f"{paper.runs} runs; 0 failed",
             *(
@@ -514,7 +514,7 @@ class TestPages:
         assert "all non-convex ones except campus" not in said
 
     def test_every_claim_and_goal_beyond_is_told(self, more, beyond):
-        said = plain(more)
+        said = remove_escapes(more)
         ids = {attributes.get("id") for _, attributes in _Tags(more).found}
         assert {f"controller-{name}" for name in CONTROLLERS} <= ids
         assert more.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in more
@@ -528,12 +528,12 @@ class TestPages:
         assert all(describe_tuning(name, grid) in said for name, grid in beyond.gains.items())
         assert "on 1 generated maps (seeds 101)" in said
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
-        said = plain(study_pages.build_beyond_page({}, quick))
+        said = remove_escapes(study_pages.build_beyond_page({}, quick))
         assert "default gains, found by the full study" in said and "120 s on 4 generated maps" in said
 
     def test_energy_has_its_unit(self, more, beyond):
         for row in rank_contenders(beyond):
-            assert format_amount(row.medians["work"], "J") in plain(more)
+            assert format_amount(row.medians["work"], "J") in remove_escapes(more)
         assert "in joules" in more and "before any limit" in more
 
     def test_every_controller_has_a_row_of_what_it_bears(self, more, beyond):
@@ -564,7 +564,7 @@ class TestPages:
         )
         without = replace(beyond, unseen=None)
         assert f"<caption>{heading}" not in study_pages.build_beyond_page({}, without)
-        assert "goal-unseen" not in text_of(judge_beyond_claims(without))
+        assert "goal-unseen" not in format_claims(judge_beyond_claims(without))
 
     def test_the_same_runs_give_the_same_pages(self, study, content, more):
         _, paper, beyond, images = study

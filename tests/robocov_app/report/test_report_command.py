@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from called import answer, complaint
+from called import answer, read_complaint
 from drawn_run import SQUARE
 from reported_results import build_record, save_comparison, save_run
 
@@ -51,7 +51,7 @@ def test_the_answer_as_json(run, tmp_path, capsys) -> None:
 
 def test_foreign_files_are_not_replaced(run, capsys) -> None:
     (run / "report.html").write_text("mine")
-    said = complaint(capsys, "report", str(run))
+    said = read_complaint(capsys, "report", str(run))
     assert said.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
     assert (run / "report.html").read_text() == "mine"
     assert main(["report", str(run), "--overwrite", "--theme", "dark"]) == 0
@@ -81,7 +81,7 @@ def test_a_report_is_replaced_with_its_results_unlike_foreign_files(run) -> None
 def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) -> None:
     monkeypatch.chdir(tmp_path)
     if words:
-        assert message in complaint(capsys, "report", *words)
+        assert message in read_complaint(capsys, "report", *words)
     else:
         assert main(["report"]) == 2
         assert message in capsys.readouterr().err
@@ -92,7 +92,7 @@ def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) 
 def test_a_folder_that_cannot_be_written_to_is_named(run, capsys) -> None:
     run.chmod(0o500)
     try:
-        assert "cannot be written" in complaint(capsys, "report", str(run))
+        assert "cannot be written" in read_complaint(capsys, "report", str(run))
     finally:
         run.chmod(0o700)
 
@@ -155,7 +155,7 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
 
 def test_without_readable_runs_nothing_is_written(run, capsys) -> None:
     (run / "record.npz").write_bytes(b"PK")
-    said = complaint(capsys, "report", str(run))
+    said = read_complaint(capsys, "report", str(run))
     assert "no runs remain to report" in said and not (run / "report.html").exists()
 
 

@@ -24,7 +24,7 @@ from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.window.screen_video import ScreenVideo
 
 
-def plain(count, width=64, height=48):
+def generate_frames(count, width=64, height=48):
     """Yield frames of one color each, getting lighter."""
     for k in range(count):
         yield np.full((height, width, 3), 20 * k % 256, dtype=np.uint8)
@@ -77,15 +77,15 @@ class TestFrames:
         record = record_walk(SQUARE, 3, steps=21)
         rows = np.array([10])
 
-        def shown(times, values):
+        def draw_first_frame(times, values):
             mean = np.array(values)
             cost = CostHistory(np.array(times), mean, mean, mean) if times else None
             return next(draw_frames(record, VideoSettings(), size=(480, 240), rows=rows, cost=cost)).tobytes()
 
-        known = shown([0.0, 1.0, 1.5], [3.0, 2.0, 1.0])
-        assert known == shown([0.9], [2.0])
-        assert known != shown([0.9], [3.0])
-        assert shown([1.5], [1.0]) == shown([], []) == shown([0.0], [np.nan])
+        known = draw_first_frame([0.0, 1.0, 1.5], [3.0, 2.0, 1.0])
+        assert known == draw_first_frame([0.9], [2.0])
+        assert known != draw_first_frame([0.9], [3.0])
+        assert draw_first_frame([1.5], [1.0]) == draw_first_frame([], []) == draw_first_frame([0.0], [np.nan])
 
     def test_the_mean_time_is_told_with_it(self):
         record = record_walk(SQUARE, 3, steps=21)
@@ -118,34 +118,34 @@ def test_png_holds_every_pixel(frame):
 class TestSaveFrames:
     def test_names(self, tmp_path):
         folder = tmp_path / "new" / "frames"
-        save_frames_and_video(plain(3), folder, None)
+        save_frames_and_video(generate_frames(3), folder, None)
         assert sorted(path.name for path in folder.iterdir()) == ["000000.png", "000001.png", "000002.png"]
 
     def test_a_full_disk_is_named_and_leaves_whole_frames_only(self, tmp_path, monkeypatch):
         write = Path.write_bytes
         calls = itertools.count()
 
-        def full(self, data):
+        def fail_as_disk_is_full(self, data):
             if next(calls) == 2:
                 write(self, data[:10])
                 raise OSError(errno.ENOSPC, "No space left on device")
             return write(self, data)
 
-        monkeypatch.setattr(Path, "write_bytes", full)
+        monkeypatch.setattr(Path, "write_bytes", fail_as_disk_is_full)
         with pytest.raises(OutputError, match=r"000002\.png: cannot be written: No space"):
-            save_frames_and_video(plain(5), tmp_path, None)
+            save_frames_and_video(generate_frames(5), tmp_path, None)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["000000.png", "000001.png"]
 
     def test_a_file_in_the_way_is_named(self, tmp_path):
         (tmp_path / "frames").write_text("")
         with pytest.raises(OutputError, match="frames"):
-            save_frames_and_video(plain(1), tmp_path / "frames", None)
+            save_frames_and_video(generate_frames(1), tmp_path / "frames", None)
 
 
 class TestSaveFilm:
     def test_it_can_be_read_back(self, tmp_path):
         path = tmp_path / "new" / "run.mp4"
-        save_video(path, plain(10), fps=25)
+        save_video(path, generate_frames(10), fps=25)
         frames, about = read(path)
         assert len(frames) == 10
         assert frames[0].shape == (48, 64, 3)
@@ -183,7 +183,7 @@ class TestSaveFilm:
     @pytest.mark.parametrize("name", ["-dash", "pipe:1", "tcp:x", "a%d b'c"])
     def test_a_name_is_neither_an_option_nor_an_address(self, tmp_path, monkeypatch, name):
         monkeypatch.chdir(tmp_path)
-        save_video(Path(name) / "run.mp4", plain(3))
+        save_video(Path(name) / "run.mp4", generate_frames(3))
         assert len(read(tmp_path / name / "run.mp4")[0]) == 3
         film = ScreenVideo(Path(f"{name}.mp4"), (64, 48), waits=True)
         film.add(pygame.Surface((64, 48)), 0.1)
@@ -197,7 +197,7 @@ class TestSaveFilm:
 
     def test_frames_of_different_sizes(self, tmp_path):
         with pytest.raises(ParameterError, match="one size"):
-            save_video(tmp_path / "a.mp4", [*plain(2), *plain(1, width=32)])
+            save_video(tmp_path / "a.mp4", [*generate_frames(2), *generate_frames(1, width=32)])
         assert list(tmp_path.iterdir()) == []
 
     @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
@@ -205,12 +205,12 @@ class TestSaveFilm:
         path = tmp_path / "run.mp4"
         path.write_bytes(b"older")
 
-        def frames():
-            yield from plain(5)
+        def raise_stop():
+            yield from generate_frames(5)
             raise stop
 
         with pytest.raises(stop):
-            save_video(path, frames())
+            save_video(path, raise_stop())
         assert path.read_bytes() == b"older"
         assert list(tmp_path.iterdir()) == [path]
 
@@ -230,17 +230,17 @@ class TestSaveFilm:
         monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(fake))
         folder = tmp_path / "out"
         with pytest.raises(OutputError, match=r"run\.mp4: the video encoder failed .*No space left"):
-            save_video(folder / "run.mp4", plain(200, width=320, height=240))
+            save_video(folder / "run.mp4", generate_frames(200, width=320, height=240))
         assert list(folder.iterdir()) == []
 
     def test_a_missing_encoder_is_named(self, tmp_path, monkeypatch):
-        def missing():
+        def raise_missing():
             raise RuntimeError("No ffmpeg exe could be found.")
 
-        monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", missing)
+        monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", raise_missing)
         monkeypatch.setenv("PATH", str(tmp_path))
         with pytest.raises(OutputError, match=r"pip install .robocov\[film\]., or set IMAGEIO_FFMPEG_EXE"):
-            save_video(tmp_path / "run.mp4", plain(2))
+            save_video(tmp_path / "run.mp4", generate_frames(2))
         assert list(tmp_path.iterdir()) == []
         # before a run that would be in vain
         with pytest.raises(OutputError, match="ffmpeg was not found"):
@@ -252,4 +252,4 @@ class TestSaveFilm:
     def test_a_folder_that_cannot_be_made_is_named(self, tmp_path):
         (tmp_path / "file").write_text("")
         with pytest.raises(OutputError, match="file"):
-            save_video(tmp_path / "file" / "run.mp4", plain(2))
+            save_video(tmp_path / "file" / "run.mp4", generate_frames(2))

@@ -13,7 +13,7 @@ from robocov_app.runs.settings import VideoSettings
 from robocov_app.runs.video import draw_comparison_frames
 
 
-def known(record):
+def build_history(record):
     one = np.array([1.0])
     return CostHistory(record.time[:1], one, one, one)
 
@@ -21,7 +21,7 @@ def known(record):
 def film(records, theme="light", colors="robots", size=None, speed=4.0):
     style = VideoSettings(theme=theme, colors=colors, fps=5, speed=speed)
     layout = build_pane_layout(records, style, size)
-    costs = [known(record) for record in records]
+    costs = [build_history(record) for record in records]
     return layout, draw_comparison_frames(records, costs, layout, style)
 
 
@@ -86,7 +86,7 @@ class TestFrames:
             layout, frames = film(records, size=(1280, 640))
             style = VideoSettings(fps=5)
             layers = build_pane_layers("robots")
-            cost = known(records[1])
+            cost = build_history(records[1])
             alone = draw_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale
             )

@@ -29,7 +29,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("cluster")]
 
 
 @contextmanager
-def a_cluster(*, processes: bool, workers: int = 1) -> Iterator[Any]:
+def open_cluster(*, processes: bool, workers: int = 1) -> Iterator[Any]:
     with distributed.LocalCluster(
         n_workers=workers,
         threads_per_worker=2,
@@ -44,7 +44,7 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
     study = build_small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
     expected = Totals(12, 12, 0, False)
     assert sweep(study, tmp_path / "here", workers=1, quiet=True) == expected
-    with a_cluster(processes=False) as cluster:
+    with open_cluster(processes=False) as cluster:
         address = cluster.scheduler_address
         assert sweep(study, tmp_path / "there", scheduler=address, quiet=True) == expected
         with Cluster(address) as executor:
@@ -63,7 +63,7 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
     study = build_small_study(controllers=("rapf", name), seeds=range(2))
     strict = dask.config.set({"distributed.scheduler.allowed-failures": 0})
     # two, as now and then Dask does not start one again
-    with strict, a_cluster(processes=True, workers=2) as cluster:
+    with strict, open_cluster(processes=True, workers=2) as cluster:
         totals = sweep(study, tmp_path / "out", scheduler=cluster.scheduler_address, quiet=True)
     assert totals == Totals(2, 2, 0, False)
     lines = (tmp_path / "out" / "results.csv").read_text().splitlines()[1:]
@@ -74,7 +74,7 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
 def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster_module, "_THREAD_COUNT_INTERVAL_S", 0.05)
     task = next(generate_tasks(build_small_study()))
-    with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
+    with open_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         assert executor.wait_for_next(0.1) is None
         assert executor.waiting_reason == f"no workers are connected to {cluster.scheduler_address}; waiting"
@@ -96,7 +96,7 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
     here = perform(task)
     for path in tmp_path.iterdir():
         path.unlink()
-    with a_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
+    with open_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         while (back := executor.wait_for_next(0.1)) is None:
             pass
@@ -107,7 +107,7 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
 def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:
     name = write_controller(tmp_path, "        time.sleep(0.02)\n")
     study = build_small_study(controllers=(name,), seeds=range(12))
-    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
+    with open_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         for task in generate_tasks(study):
             executor.submit(task)
         while executor.wait_for_next(0.1) is None:
@@ -149,12 +149,12 @@ def test_without_dask_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    def unknown(task: object) -> None:
+    def raise_missing(task: object) -> None:
         raise ModuleNotFoundError("No module named 'robocov_app'")
 
     task = next(generate_tasks(build_small_study()))
-    monkeypatch.setattr(cluster_module, "perform", unknown)
-    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
+    monkeypatch.setattr(cluster_module, "perform", raise_missing)
+    with open_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         with pytest.raises(OutputError, match="ModuleNotFoundError: No module named 'robocov_app'"):
             while executor.unfinished_tasks:
@@ -174,9 +174,9 @@ def test_nothing_of_dask_is_loaded_without_a_scheduler(
 ) -> None:
     imported = builtins.__import__
 
-    def watched(name: str, *rest: Any, **more: Any) -> Any:
+    def watch(name: str, *rest: Any, **more: Any) -> Any:
         assert name.partition(".")[0] not in ("dask", "distributed")
         return imported(name, *rest, **more)
 
-    monkeypatch.setattr(builtins, "__import__", watched)
+    monkeypatch.setattr(builtins, "__import__", watch)
     assert sweep(build_small_study(seeds=(0,)), tmp_path, workers=1, quiet=True).done == 2

@@ -23,23 +23,23 @@ from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepare_cost, simulate
 
 
-def first(study: Study) -> Task:
+def get_first_task(study: Study) -> Task:
     return next(generate_tasks(study))
 
 
-def kept(outcome: Outcome, folder: Path) -> Record:
+def load_record(outcome: Outcome, folder: Path) -> Record:
     for name, content in outcome.files.items():
         (folder / name).write_bytes(content)
     return Record.load(folder)
 
 
 def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
-    task = first(build_small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
+    task = get_first_task(build_small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
     whole = simulate(task)
     outcome = perform(task)
     assert outcome.error is None
     assert list(outcome.files) == ["run.json", "record.npz", "cost.csv"]
-    record = kept(outcome, tmp_path)
+    record = load_record(outcome, tmp_path)
     rows = np.searchsorted(whole.time, record.time)
     assert np.array_equal(whole.time[rows], record.time)
     assert rows[0] == 0 and rows[-1] == len(whole) - 1
@@ -55,7 +55,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
 
 
 def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
-    task = first(build_small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
+    task = get_first_task(build_small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulate(task)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarize(whole, history)
@@ -65,7 +65,7 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
         **{name: summary[name] for name in FIGURES},
         "path_length_m": sum(summary["path_length_m"]) / 5,
     }
-    record = kept(outcome, tmp_path)
+    record = load_record(outcome, tmp_path)
     assert record.time.tolist() == [0.0, whole.time[-1]]
     content = json.loads(outcome.files["run.json"])
     assert content["summary"] == summary
@@ -78,7 +78,7 @@ def test_the_same_task_gives_the_same_bytes() -> None:
 
 
 def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
-    task = first(
+    task = get_first_task(
         build_small_study(controllers=("mine.py:Mine",), folder=Path(write_controller(tmp_path, "")).parent)
     )
     content = json.loads(perform(task).files["run.json"])
@@ -110,7 +110,7 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
 )
 def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -> None:
     write_controller(tmp_path, "")
-    task = first(build_small_study(controllers=("mine.py:Mine",), folder=tmp_path))
+    task = get_first_task(build_small_study(controllers=("mine.py:Mine",), folder=tmp_path))
     # the file is well when the study is made
     assert task.source is not None
     task = replace(task, source=task.source._replace(text=HEAD + law))
@@ -124,7 +124,7 @@ def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -
 
 
 def test_a_start_without_room_is_an_outcome() -> None:
-    outcome = perform(first(build_small_study(robots=(500,))))
+    outcome = perform(get_first_task(build_small_study(robots=(500,))))
     assert outcome.error is not None and outcome.error.startswith("start 'corner': space for about")
 
 
@@ -145,7 +145,7 @@ def test_nothing_of_the_physics_outlives_a_run(
     """Another thread that came upon it would free it in the midst of the next run's steps."""
     alive: list[weakref.ref[object]] = []
 
-    def watched(kind: type[Any]) -> None:
+    def watch(kind: type[Any]) -> None:
         begin = kind.__init__
 
         def init(self: object, *arguments: Any, **more: Any) -> None:
@@ -155,8 +155,8 @@ def test_nothing_of_the_physics_outlives_a_run(
         monkeypatch.setattr(kind, "__init__", init)
 
     for kind in (pymunk.Space, pymunk.Body, pymunk.Poly, pymunk.Circle):
-        watched(kind)
-    perform(first(build_small_study(controllers=(write_controller(tmp_path, law),))))
+        watch(kind)
+    perform(get_first_task(build_small_study(controllers=(write_controller(tmp_path, law),))))
     assert len(alive) > 8
     assert not [thing for thing in alive if thing() is not None]
     assert gc.isenabled()
@@ -164,7 +164,7 @@ def test_nothing_of_the_physics_outlives_a_run(
 
 def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
     law = "        ring = []\n        ring.append(ring)\n"
-    task = first(
+    task = get_first_task(
         build_small_study(controllers=(write_controller(tmp_path, law),), duration=100.0, robots=(2,))
     )
     seen: list[int] = []
@@ -178,7 +178,7 @@ def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
 
 
 def test_runs_without_a_moment_but_the_first() -> None:
-    outcome = perform(first(build_small_study(duration=0.0)))
+    outcome = perform(get_first_task(build_small_study(duration=0.0)))
     assert outcome.error is None
     with np.load(io.BytesIO(outcome.files["record.npz"])) as arrays:
         assert arrays["time"].tolist() == [0.0]
@@ -190,7 +190,7 @@ def test_runs_without_a_moment_but_the_first() -> None:
 def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
     group = ({"count": 1, "max_speed": 1.0, "radius": 0.2}, {"count": 2, "max_speed": 0.4})
     study = build_small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
-    outcome = perform(first(study))
+    outcome = perform(get_first_task(study))
     assert outcome.error is None
     known = [column.name for column in build_columns(study)]
     assert set(outcome.figures) <= {*known, "range_area_m2", "wall_clearance_m"}
@@ -198,5 +198,5 @@ def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
     assert outcome.figures["mean_time_s"] > outcome.figures["mean_distance_m"]
     assert outcome.files["cost.csv"].splitlines()[0].endswith(b",mean_time_s")
     plain = build_small_study()
-    assert set(perform(first(plain)).figures) == set(FIGURES)
+    assert set(perform(get_first_task(plain)).figures) == set(FIGURES)
     assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in build_columns(plain)}

@@ -54,14 +54,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def written(folder: Path, text: str) -> Path:
+def write_study(folder: Path, text: str) -> Path:
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")
     return path
 
 
 def test_a_study_file_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = written(folder, STUDY)
+    path = write_study(folder, STUDY)
     monkeypatch.chdir(folder.parent)  # paths begin at the file, not here
     study = read_study(path)
     assert [each.name for each in study.maps] == ["rooms", "hall"]
@@ -89,14 +89,14 @@ def test_a_study_file_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_little_needs_to_be_said(folder: Path) -> None:
-    study = read_study(written(folder, 'maps = "square"\ncontrollers = "rapf"\n'))
+    study = read_study(write_study(folder, 'maps = "square"\ncontrollers = "rapf"\n'))
     assert len(study) == 1
     assert (study.robots, study.seeds, study.duration, study.lattice) == ((6,), (0,), 60.0, 64)
     assert study.maps[0].environment.name == "Square"
 
 
 def test_all_bundled_maps(folder: Path) -> None:
-    study = read_study(written(folder, 'maps = "*"\ncontrollers = ["rapf"]\nseeds = [3]\n'))
+    study = read_study(write_study(folder, 'maps = "*"\ncontrollers = ["rapf"]\nseeds = [3]\n'))
     assert [each.name for each in study.maps] == list(list_bundled_maps())
     assert study.seeds == (3,)
 
@@ -260,7 +260,7 @@ WRONG = [
 @pytest.mark.parametrize(("part", "instead", "message"), WRONG)
 def test_mistakes_are_named_with_file_and_key(folder: Path, part: str, instead: str, message: str) -> None:
     assert part in STUDY
-    path = written(folder, STUDY.replace(part, instead))
+    path = write_study(folder, STUDY.replace(part, instead))
     with pytest.raises(InputError) as caught:
         read_study(path)
     said = str(caught.value)
@@ -274,14 +274,14 @@ def test_mistakes_are_named_with_file_and_key(folder: Path, part: str, instead: 
 def test_only_the_first_mistake_is_told_and_how_many_more_there_are(folder: Path) -> None:
     text = STUDY.replace("seeds = 4", "seeds = 4.5").replace("robots = [3, 6]", 'robot = "six"')
     with pytest.raises(InputError, match=r"unknown key 'robot'.*\(and 1 more\)$"):
-        read_study(written(folder, text))
+        read_study(write_study(folder, text))
 
 
 def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
     save_map(HALL, folder / "rooms.json")
     text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'
     with pytest.raises(InputError, match=r"maps\[1\]: expected maps with different names, got a second "):
-        read_study(written(folder, text))
+        read_study(write_study(folder, text))
 
 
 def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
@@ -289,7 +289,7 @@ def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
     with pytest.raises(
         InputError, match=r"study.toml: maps\[0\]: .*bad.json:1:1: boundary: missing, expected "
     ):
-        read_study(written(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
+        read_study(write_study(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
 
 
 def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
@@ -330,7 +330,7 @@ sensing_range = "null"
 
 
 def test_a_team_of_groups(folder: Path) -> None:
-    study = read_study(written(folder, GROUPS))
+    study = read_study(write_study(folder, GROUPS))
     assert study.robots == (3,)
     assert study.metrics
     team = build_swept_team(3, study.teams[0])
@@ -353,14 +353,14 @@ def test_a_team_of_groups(folder: Path) -> None:
     ],
 )
 def test_groups_that_are_none(folder: Path, before: str, after: str, message: str) -> None:
-    path = written(folder, GROUPS.replace(before, after))
+    path = write_study(folder, GROUPS.replace(before, after))
     with pytest.raises(InputError) as told:
         read_study(path)
     assert str(told.value).startswith(f"{path}: {message}")
 
 
 def test_a_group_that_is_no_table(folder: Path) -> None:
-    path = written(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
+    path = write_study(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
     with pytest.raises(InputError, match=r"team.group: expected tables \[\[team.group\]\], got 3"):
         read_study(path)
 
@@ -368,7 +368,7 @@ def test_a_group_that_is_no_table(folder: Path) -> None:
 # Files that stand for more runs than anybody can do, or than a parser can take
 
 
-def axes(names: list[str], values: int) -> str:
+def format_axes(names: list[str], values: int) -> str:
     listed = ", ".join(f"{1 + k / 1000:.3f}" for k in range(values))
     return "".join(f"{name} = [{listed}]\n" for name in names)
 
@@ -380,14 +380,14 @@ TEAM_AXES = ["radius", "max_speed", "max_acceleration", "viscosity", "sensing_ra
 @pytest.mark.parametrize(
     ("text", "runs"),
     [
-        (f"{HEAD}[team]\n{axes(TEAM_AXES, 100)}", "1e+12 (100 radius x 100 max_speed x "),
-        (f"{HEAD}[gains.rapf]\n{axes(['k_rep', 'k_att'], 1000)}", "1000000 (1000000 sets of gains)"),
+        (f"{HEAD}[team]\n{format_axes(TEAM_AXES, 100)}", "1e+12 (100 radius x 100 max_speed x "),
+        (f"{HEAD}[gains.rapf]\n{format_axes(['k_rep', 'k_att'], 1000)}", "1000000 (1000000 sets of gains)"),
         (
-            f"{HEAD}[conditions]\n{axes(['delay', 'forget_after'], 700)}",
+            f"{HEAD}[conditions]\n{format_axes(['delay', 'forget_after'], 700)}",
             "490000 (700 delay x 700 forget_after)",
         ),
         (
-            f"{HEAD}[gains.rapf]\n{axes(['k_rep'], 50)}k_att = {{low = 1, high = 2}}\n"
+            f"{HEAD}[gains.rapf]\n{format_axes(['k_rep'], 50)}k_att = {{low = 1, high = 2}}\n"
             "[sampling]\nmethod = 'sobol'\nsamples = 100000\n",
             "5000000 (5000000 sets of gains)",
         ),

@@ -45,7 +45,7 @@ def study_json(study: Study) -> bytes:
     ).encode()
 
 
-def written(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
+def write_table(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
     with Table(folder, build_columns(study), study_json(study), parquet=parquet) as table:
         for task, entry in zip(generate_tasks(study), entries, strict=True):
             table.add(build_row(task, entry))
@@ -74,7 +74,7 @@ def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> Non
 def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     entries = [FIGURED, FAILED, FIGURED, FIGURED]
-    written(tmp_path, study, entries)
+    write_table(tmp_path, study, entries)
     rows = list(read_results(tmp_path).rows())
     with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
         lines = list(csv.DictReader(file))
@@ -116,7 +116,7 @@ def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: P
 def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
-    written(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
+    write_table(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
     assert pq.read_table(tmp_path / "results.parquet").to_pylist() == list(read_results(tmp_path).rows())
     schema = pq.read_schema(tmp_path / "results.parquet")
     assert schema.metadata[b"format"] == b"robocov-results"
@@ -136,7 +136,7 @@ def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.M
     study = build_small_study(seeds=range(5))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        written(tmp_path / name, study, [FIGURED] * len(study), parquet=True)
+        write_table(tmp_path / name, study, [FIGURED] * len(study), parquet=True)
     assert len(read_tables(tmp_path / "one")) == 2
     assert read_tables(tmp_path / "one") == read_tables(tmp_path / "two")
     groups = pq.ParquetFile(tmp_path / "one" / "results.parquet").metadata
@@ -153,7 +153,7 @@ def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = build_small_study()
-    written(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [FIGURED] * len(study))
     assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
     wanted = 'pyarrow is not installed: pip install "robocov[parquet]"'
     for dry in ([], ["--dry-run"]):
@@ -172,7 +172,7 @@ def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
 def test_parquet_that_is_there_is_kept_up_to_date(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     for study in (build_small_study(), build_small_study(seeds=range(5))):
-        written(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
+        write_table(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
         assert pq.read_table(tmp_path / "results.parquet").num_rows == len(study)
 
 
@@ -205,7 +205,7 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
     tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
     study = build_small_study()
-    written(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [FIGURED] * len(study))
     if not finished:  # as a sweep leaves it that was killed
         (tmp_path / "study.json").write_bytes(study_json(build_small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
@@ -226,7 +226,7 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
     tmp_path: Path,
 ) -> None:
     study = build_small_study()
-    written(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [FIGURED] * len(study))
     (tmp_path / "study.json").unlink()
     lengths = []
     with Table(tmp_path, build_columns(study)) as table:
@@ -293,14 +293,14 @@ def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
 def test_a_full_disk_leaves_no_half_of_parquet(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
-    def full(*_: object, **__: object) -> None:
+    def fail_as_disk_is_full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     pq = pytest.importorskip("pyarrow.parquet")
     study = build_small_study()
     told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
     with told, Table(tmp_path, build_columns(study), parquet=True) as table:
-        monkeypatch.setattr(pq.ParquetWriter, broken, full)
+        monkeypatch.setattr(pq.ParquetWriter, broken, fail_as_disk_is_full)
         table.add(build_row(next(generate_tasks(study)), FIGURED))
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]

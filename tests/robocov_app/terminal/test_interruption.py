@@ -23,11 +23,11 @@ def test_the_first_signal_is_noted_and_the_second_ends(number: signal.Signals) -
 def test_other_threads_leave_signals_alone() -> None:
     seen = []
 
-    def work() -> None:
+    def note_request() -> None:
         with Interruption() as stop:
             seen.append(stop.requested)
 
-    thread = threading.Thread(target=work)
+    thread = threading.Thread(target=note_request)
     thread.start()
     thread.join()
     assert seen == [False]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driven_editor import open_editor, sheet
+from driven_editor import build_sheet, open_editor
 from driven_window import open_viewer, resize_window
 
 from robocov.environment import CircleObstacle
@@ -74,7 +74,7 @@ def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path)
 @pytest.mark.timeout(60)
 def test_a_background_that_is_a_pipe_does_not_block_the_window(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "plan.png")
-    sketch = sheet(background=Background("plan.png", (10, 10)))
+    sketch = build_sheet(background=Background("plan.png", (10, 10)))
     with open_editor(tmp_path, sketch) as driver:
         driver.editor.shown.add("picture")
         driver.window.run_frame(0.1)
@@ -82,7 +82,7 @@ def test_a_background_that_is_a_pipe_does_not_block_the_window(tmp_path: Path) -
 
 
 def test_a_draft_with_a_huge_circle_is_drawn(tmp_path: Path) -> None:
-    sketch = sheet(CircleObstacle((5.0, 5.0), 1e308), CircleObstacle((1e308, -1e308), 0.5))
+    sketch = build_sheet(CircleObstacle((5.0, 5.0), 1e308), CircleObstacle((1e308, -1e308), 0.5))
     with open_editor(tmp_path, sketch) as driver:
         driver.select(*(item.key for item in sketch.obstacles))
         assert driver.editor.selection == Selection.of(0, 1)

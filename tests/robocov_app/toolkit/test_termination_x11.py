@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from called import COMMAND
-from served_window import served
+from served_window import serve_window
 from x11_hands import MARKS, Hands, run_window, start_display
 
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
@@ -59,7 +59,7 @@ def test_a_compiling_window_ends(display: str, tmp_path: Path, number: int) -> N
 def test_a_compiling_served_window_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in build_environment(tmp_path, is_cold=True).items():
         monkeypatch.setenv(name, value)
-    with served("demo", "square", "--robots", "3", "--folder", str(tmp_path)) as link:
+    with serve_window("demo", "square", "--robots", "3", "--folder", str(tmp_path)) as link:
         end_process(link.process, signal.SIGTERM)
 
 

@@ -351,16 +351,16 @@ wild = numbers | st.sampled_from([np.nan, np.inf, -np.inf, 1e300, 1e9])
 def draw_arguments(draw):
     n = draw(st.integers(1, 4))
 
-    def rows(values):
+    def draw_rows(values):
         pair = st.tuples(values, values)
         return np.array(draw(st.lists(pair, min_size=n, max_size=n)), dtype=float)
 
     kinds = ["attraction", "repulsion_robots", "repulsion_obstacle", "swarm_cohesion", "viscosity"]
-    terms = {kind: rows(wild) for kind in draw(st.lists(st.sampled_from(kinds), unique=True))}
+    terms = {kind: draw_rows(wild) for kind in draw(st.lists(st.sampled_from(kinds), unique=True))}
     if draw(st.booleans()):
         forces = sum((np.nan_to_num(term, posinf=0, neginf=0) for term in terms.values()), np.zeros((n, 2)))
     else:
-        forces = rows(wild)
+        forces = draw_rows(wild)
     place = st.floats(-1, 17) | st.sampled_from([0.0, 4.0, 16.0])
     recent = draw(
         st.none() | st.lists(st.tuples(place, place), max_size=5).map(lambda r: np.reshape(r, (-1, 2)))
@@ -372,11 +372,11 @@ def draw_arguments(draw):
         "communication_range": draw(st.sampled_from([0.0, 3.0, np.inf])),
     }
     return {
-        "positions": rows(place),
-        "velocities": rows(st.floats(-2, 2) | st.sampled_from([0.0, 1e-300])),
+        "positions": draw_rows(place),
+        "velocities": draw_rows(st.floats(-2, 2) | st.sampled_from([0.0, 1e-300])),
         "forces": forces,
-        "goals": rows(place | st.just(np.nan)) if draw(st.booleans()) else None,
-        "points": rows(place | st.just(np.nan)),
+        "goals": draw_rows(place | st.just(np.nan)) if draw(st.booleans()) else None,
+        "points": draw_rows(place | st.just(np.nan)),
         "environment": draw(st.sampled_from([ROOMS, HALL, SQUARE])),
         "recent": recent,
         "robot": draw(st.integers(0, n - 1)),

@@ -337,10 +337,10 @@ def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "settings").mkdir()
     (tmp_path / "settings/window.json").write_text('{"width": 1000, "height": 640}')
 
-    def window():
+    def open_window():
         return ViewerLauncher(start_session(), "hall", tmp_path, lattice=4).window()
 
-    with window() as first:
+    with open_window() as first:
         driver = Driver(first)
         driver.press_key("t")
         driver.press_key("shift+t")
@@ -353,7 +353,7 @@ def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.Monke
     assert settings["tab"] == "show"
     assert "cells" not in settings["shown"]
     assert (settings["width"], settings["height"]) == (1000, 640)
-    with window() as second:
+    with open_window() as second:
         assert second.screen.get_size() == (1000, 640)
         assert second.viewer.view.theme == "dark"
         assert second.viewer.view.fades_trajectories

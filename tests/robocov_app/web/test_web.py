@@ -50,7 +50,7 @@ from robocov_app.web.frames import HEADER, BaseFrames, Frame, encode_frame
 from robocov_app.web.server import WebDisplay
 
 
-def decoded(data: bytes, before: np.ndarray | None) -> np.ndarray:
+def decode_picture(data: bytes, before: np.ndarray | None) -> np.ndarray:
     """Return the picture of a page that showed another: what its script does."""
     _, wide, high, left, top, width, height, from_black = HEADER.unpack_from(data)
     same = before is not None and before.shape == (high, wide) and not from_black
@@ -69,7 +69,7 @@ def test_pictures_arrive_as_they_were(sizes):
     for number, (wide, high, seed) in enumerate(sizes):
         pixels = np.random.default_rng(seed).integers(0, 3, (high, wide)).astype(np.uint32) * 0x10FF
         picture = Frame(number, pixels)
-        shown = decoded(encode_frame(picture, before), shown)
+        shown = decode_picture(encode_frame(picture, before), shown)
         assert np.array_equal(shown, pixels)
         before = picture
 
@@ -123,7 +123,7 @@ def display():
         yield shown
 
 
-def socket_of(display, query="", **headers):
+def open_socket(display, query="", **headers):
     address = f"ws://127.0.0.1:{display.port}/socket{query}"
     return connect(address, additional_headers=headers, proxy=None)
 
@@ -136,7 +136,7 @@ def cut_off(line):
     return closed.value.rcvd.code
 
 
-def cookie_of(display):
+def read_cookie(display):
     with urllib.request.urlopen(display.link) as answer:
         morsels = SimpleCookie(answer.headers["Set-Cookie"])
     name, morsel = next(iter(morsels.items()))
@@ -147,7 +147,7 @@ def cookie_of(display):
 
 def test_strangers_see_nothing_and_do_nothing(display):
     own = f"http://127.0.0.1:{display.port}"
-    cookie = cookie_of(display)
+    cookie = read_cookie(display)
     for path in ("/", "/?token=", "/?token=ä", "/?token=" + "x" * 24, "/socket", "/page.html", "//[x/"):
         with pytest.raises((urllib.error.HTTPError, UnicodeEncodeError)) as refused:
             urllib.request.urlopen(own + path)
@@ -156,13 +156,13 @@ def test_strangers_see_nothing_and_do_nothing(display):
     elsewhere = ({"Cookie": cookie, "Origin": origin} for origin in ("http://elsewhere.example", "http://[x"))
     for headers in ({}, {"Origin": own}, *elsewhere):
         with pytest.raises(InvalidStatus, match="403"):
-            socket_of(display, **headers)
-    with socket_of(display, Cookie=cookie, Origin=own):
+            open_socket(display, **headers)
+    with open_socket(display, Cookie=cookie, Origin=own):
         pass
 
 
 def test_who_controls_may_open_the_other_link_too(display):
-    asked = urllib.request.Request(display.watch_link, headers={"Cookie": cookie_of(display)})
+    asked = urllib.request.Request(display.watch_link, headers={"Cookie": read_cookie(display)})
     with urllib.request.urlopen(asked) as answer:
         assert answer.headers["Set-Cookie"] is None
     with urllib.request.urlopen(display.watch_link) as answer:
@@ -171,7 +171,7 @@ def test_who_controls_may_open_the_other_link_too(display):
 
 def test_a_proxy_may_stand_before_it(display):
     headers = {"X-Forwarded-Host": "hub.example", "Origin": "https://hub.example"}
-    with socket_of(display, Cookie=cookie_of(display), **headers):
+    with open_socket(display, Cookie=read_cookie(display), **headers):
         pass
 
 
@@ -180,14 +180,14 @@ NONSENSE = ("", "{}", "[" * 5000, '{"kind": "move", "x": 1e999, "y": 0}', b"\0\1
 
 @pytest.mark.parametrize("message", NONSENSE, ids=range(len(NONSENSE)))
 def test_who_tells_nonsense_is_cut_off(display, message):
-    with socket_of(display, Cookie=cookie_of(display)) as line:
+    with open_socket(display, Cookie=read_cookie(display)) as line:
         line.send(message)
         assert cut_off(line) == 1008
 
 
 @pytest.mark.parametrize("message", ["x" * (2 << 20), bytes(2 << 20)], ids=("text", "file"))
 def test_a_message_has_a_largest_size(display, message):
-    with socket_of(display, Cookie=cookie_of(display)) as line:
+    with open_socket(display, Cookie=read_cookie(display)) as line:
         with suppress(ConnectionClosed):
             line.send(message)
         assert cut_off(line) == 1009
@@ -195,7 +195,7 @@ def test_a_message_has_a_largest_size(display, message):
 
 def test_the_longest_text_that_a_page_pastes_is_taken(display):
     text = "\N{SNOWMAN}\n" * 50_000
-    with socket_of(display, Cookie=cookie_of(display)) as line:
+    with open_socket(display, Cookie=read_cookie(display)) as line:
         line.send(json.dumps({"kind": "paste", "text": text}))
         while not display.shared.window_input._messages:
             time.sleep(0.01)
@@ -204,7 +204,7 @@ def test_the_longest_text_that_a_page_pastes_is_taken(display):
 
 def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
     surface = pygame.Surface((200, 200), 0, 32)
-    with socket_of(display, Cookie=cookie_of(display)) as line:
+    with open_socket(display, Cookie=read_cookie(display)) as line:
         shown = None
         pictures = 0
         for shade in range(0, 250, 5):
@@ -214,7 +214,7 @@ def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
         while shown is None or not np.array_equal(shown, Frame.from_surface(surface, 0).pixels):
             data = line.recv(5)
             if isinstance(data, bytes):
-                shown = decoded(data, shown)
+                shown = decode_picture(data, shown)
                 pictures = pictures + 1
                 line.send(json.dumps({"kind": "shown", "number": HEADER.unpack_from(data)[0]}))
         assert pictures <= 50
@@ -222,7 +222,7 @@ def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
             line.recv(0.1)
 
 
-def told_to(line):
+def read_message(line):
     """Return what a page is told next beside pictures."""
     while True:
         data = line.recv(5)
@@ -230,15 +230,15 @@ def told_to(line):
             return json.loads(data)
 
 
-def watcher_of(display):
+def open_watcher(display):
     return connect(f"ws://127.0.0.1:{display.port}/socket?token={display.watch_token}", proxy=None)
 
 
-def controller(told):
+def find_controller(told):
     return next((each["number"] for each in told["participants"] if each["controls"]), None)
 
 
-def moved(display):
+def list_pointer_columns(display):
     """Return where the window's pointer has been meanwhile."""
     found = []
     while display.shared.window_input._messages:
@@ -248,40 +248,46 @@ def moved(display):
 
 def test_one_controls_the_others_watch_and_control_is_handed_over(display):
     move = {"kind": "move", "y": 1}
-    with watcher_of(display) as pupil:
-        you = told_to(pupil)["you"]
-        with socket_of(display, Cookie=cookie_of(display)) as teacher:
-            told = told_to(teacher)
-            assert controller(told) == told["you"]
-            told_to(pupil)
+    with open_watcher(display) as pupil:
+        you = read_message(pupil)["you"]
+        with open_socket(display, Cookie=read_cookie(display)) as teacher:
+            told = read_message(teacher)
+            assert find_controller(told) == told["you"]
+            read_message(pupil)
             pupil.send(json.dumps({**move, "x": 1}))
             pupil.send(json.dumps({"kind": "control", "to": you}))  # is not theirs to take
             pupil.send(json.dumps({"kind": "control", "to": 0}))
-            assert [each["requests_control"] for each in told_to(teacher)["participants"]] == [True, False]
+            assert [each["requests_control"] for each in read_message(teacher)["participants"]] == [
+                True,
+                False,
+            ]
             teacher.send(json.dumps({**move, "x": 2}))
             teacher.send(json.dumps({"kind": "control", "to": you}))
-            assert controller(told_to(teacher)) == you
-            assert moved(display) == [2]
+            assert find_controller(read_message(teacher)) == you
+            assert list_pointer_columns(display) == [2]
             teacher.send(json.dumps({**move, "x": 3}))
             teacher.send(json.dumps({"kind": "control", "to": told["you"]}))  # the teacher takes it back
-            assert controller(told_to(teacher)) == told["you"]
-            assert moved(display) == []
-        while controller(told_to(pupil)) is not None:  # the teacher is gone: nobody controls
+            assert find_controller(read_message(teacher)) == told["you"]
+            assert list_pointer_columns(display) == []
+        while find_controller(read_message(pupil)) is not None:  # the teacher is gone: nobody controls
             pass
 
 
 def test_a_page_that_lost_its_line_is_known_again(display):
-    cookie = cookie_of(display)
-    with socket_of(display, Cookie=cookie) as other, socket_of(display, "?page=a", Cookie=cookie) as before:
-        told_to(other)
-        own = told_to(before)["you"]
+    cookie = read_cookie(display)
+    with (
+        open_socket(display, Cookie=cookie) as other,
+        open_socket(display, "?page=a", Cookie=cookie) as before,
+    ):
+        read_message(other)
+        own = read_message(before)["you"]
         other.send(json.dumps({"kind": "control", "to": own}))
         before.send(json.dumps({"kind": "name", "name": "Ada"}))
-        with socket_of(display, "?page=a", Cookie=cookie) as again:  # nobody has noticed yet
-            told = told_to(again)
+        with open_socket(display, "?page=a", Cookie=cookie) as again:  # nobody has noticed yet
+            told = read_message(again)
             while len(told["participants"]) > 2 or told["participants"][1]["name"] != "Ada":
-                told = told_to(again)
-            assert told["you"] == controller(told) == own
+                told = read_message(again)
+            assert told["you"] == find_controller(told) == own
 
 
 def test_what_is_held_is_let_go_when_control_passes():
@@ -295,7 +301,7 @@ def test_what_is_held_is_let_go_when_control_passes():
 def test_the_end_does_not_wait_for_lines_on_which_nothing_comes():
     with WebDisplay() as display:
         idle = socket.create_connection(("127.0.0.1", display.port))
-        cookie_of(display)
+        read_cookie(display)
         begun = time.monotonic()
     assert time.monotonic() - begun < 3.0
     idle.close()
@@ -310,13 +316,13 @@ def test_a_port_that_is_taken_is_told_in_a_line(display):
 def test_only_who_controls_sees_the_clipboard(display):
     display.clipboard.put("a secret")
     surface = pygame.Surface((20, 20), 0, 32)
-    with socket_of(display, Cookie=cookie_of(display)) as teacher, watcher_of(display) as pupil:
+    with open_socket(display, Cookie=read_cookie(display)) as teacher, open_watcher(display) as pupil:
         display.send(surface)
-        while "copied" not in (told := told_to(teacher)):
+        while "copied" not in (told := read_message(teacher)):
             pass
         assert told["copied"] == "a secret"
         pupil.send(json.dumps({"kind": "name", "name": "Ada\n"}))
-        while (told := told_to(pupil))["participants"][1]["name"] != "Ada":
+        while (told := read_message(pupil))["participants"][1]["name"] != "Ada":
             assert "copied" not in told
         assert "copied" not in told
 
@@ -326,13 +332,13 @@ def test_the_page_in_control_downloads_a_file_that_is_offered(tmp_path):
         (tmp_path / "hall-copy-1.robocov").write_text("{}")
         display.offer_file("hall-copy-1.robocov")
         display.send(pygame.Surface((20, 20), 0, 32))
-        cookie = cookie_of(display)
-        with socket_of(display, Cookie=cookie) as teacher, watcher_of(display) as pupil:
-            while "offer" not in (told := told_to(teacher)):
+        cookie = read_cookie(display)
+        with open_socket(display, Cookie=cookie) as teacher, open_watcher(display) as pupil:
+            while "offer" not in (told := read_message(teacher)):
                 pass
             assert told["offer"] == {"number": 1, "name": "hall-copy-1.robocov"}
             assert told["saved"] == ["hall-copy-1.robocov"]
-            assert "offer" not in told_to(pupil)
+            assert "offer" not in read_message(pupil)
 
 
 def test_a_link_to_watch_is_shared_unless_another_server_stands_before_it():
@@ -344,10 +350,10 @@ def test_a_link_to_watch_is_shared_unless_another_server_stands_before_it():
 
 def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
     with WebDisplay(folder=tmp_path) as display:
-        cookie = cookie_of(display)
-        with socket_of(display, Cookie=cookie) as line:
+        cookie = read_cookie(display)
+        with open_socket(display, Cookie=cookie) as line:
             upload(line, "hall.json", b"{}")
-            assert uploaded(display) == tmp_path / "hall.json"
+            assert read_upload(display) == tmp_path / "hall.json"
             assert (tmp_path / "hall.json").read_bytes() == b"{}"
             (tmp_path / "run").mkdir()
             (tmp_path / "run/record.json").write_text("1")
@@ -357,7 +363,7 @@ def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
             (tmp_path / "other").mkdir()
             (tmp_path / "saved.json").write_text("{}")
             display.send(pygame.Surface((20, 20), 0, 32))
-            while not (saved := told_to(line).get("saved")):
+            while not (saved := read_message(line).get("saved")):
                 pass
         assert set(saved) == {"saved.json", "run"}, "what was uploaded was not saved"
         for name, begins in (("saved.json", b"{}"), ("run", b"PK")):
@@ -376,7 +382,7 @@ def upload(line, name, content, piece=1 << 17):
         line.send(content[at : at + piece])
 
 
-def uploaded(display):
+def read_upload(display):
     """Return the path of the file that the window is to open."""
     end = time.monotonic() + 5.0
     while time.monotonic() < end:
@@ -390,7 +396,7 @@ def uploaded(display):
 
 def notice_to(line):
     """Return the next message that a page shows."""
-    while (told := told_to(line))["kind"] != "notice":
+    while (told := read_message(line))["kind"] != "notice":
         pass
     return told["text"]
 
@@ -408,27 +414,27 @@ REFUSED_NAMES = [
 
 @pytest.mark.parametrize("name", REFUSED_NAMES, ids=range(len(REFUSED_NAMES)))
 def test_files_of_other_names_are_refused_with_a_message(tmp_path, name):
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         upload(line, name, bytes(300_000))
         assert notice_to(line)
         assert not list(tmp_path.iterdir())
         upload(line, "hall.json", b"{}")  # the connection stays
-        assert uploaded(display).read_bytes() == b"{}"
+        assert read_upload(display).read_bytes() == b"{}"
 
 
 def test_control_characters_are_no_part_of_a_file_name(tmp_path):
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         upload(line, "a\0b\x1b\n.json", b"{}")
-        assert uploaded(display).name == "ab.json"
+        assert read_upload(display).name == "ab.json"
 
 
 def test_a_large_file_comes_in_pieces_and_an_empty_one_too(tmp_path):
     content = np.random.default_rng(1).bytes(3_000_000)
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         upload(line, "large.png", content)
-        assert uploaded(display).read_bytes() == content
+        assert read_upload(display).read_bytes() == content
         upload(line, "large.png", b"")
-        assert uploaded(display).name == "large-1.png"
+        assert read_upload(display).name == "large-1.png"
 
 
 @pytest.mark.parametrize(
@@ -441,14 +447,14 @@ def test_a_large_file_comes_in_pieces_and_an_empty_one_too(tmp_path):
     ],
 )
 def test_an_upload_that_no_page_would_send_ends_the_connection(tmp_path, broken):
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         line.send(json.dumps(broken) if isinstance(broken, dict) else broken)
         assert cut_off(line) == 1008
         assert not list(tmp_path.iterdir())
 
 
 def test_more_than_was_announced_ends_the_connection(tmp_path):
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         line.send(json.dumps({"kind": "upload", "name": "a.json", "size": 2}))
         line.send(b"{} ")
         assert cut_off(line) == 1008
@@ -456,9 +462,9 @@ def test_more_than_was_announced_ends_the_connection(tmp_path):
 
 
 def test_only_who_controls_uploads(tmp_path):
-    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as teacher:
-        told_to(teacher)
-        with watcher_of(display) as pupil:
+    with WebDisplay(folder=tmp_path) as display, open_socket(display, Cookie=read_cookie(display)) as teacher:
+        read_message(teacher)
+        with open_watcher(display) as pupil:
             upload(pupil, "mine.json", b"{}")
             assert "controls" in notice_to(pupil)
         assert not list(tmp_path.iterdir())
@@ -493,12 +499,12 @@ def test_an_upload_that_cannot_be_written_is_a_message_and_the_connection_stays(
 ):
     folder = tmp_path / "files"
     folder.mkdir()
-    with WebDisplay(folder=folder) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+    with WebDisplay(folder=folder) as display, open_socket(display, Cookie=read_cookie(display)) as line:
         break_folder(monkeypatch, folder)
         upload(line, "hall.json", b"{}")
         assert notice_to(line).lower() == f"hall.json: cannot be saved on the server: {reason}"
         line.send(json.dumps({"kind": "move", "x": 1, "y": 1}))
-        while not moved(display):
+        while not list_pointer_columns(display):
             time.sleep(0.01)
     printed = capfd.readouterr().err
     assert printed.lower() == f"robocov: hall.json: cannot be saved on the server: {reason}\n"
@@ -578,42 +584,42 @@ def close_reason(line):
 
 def test_watchers_never_lock_the_teacher_out(display, monkeypatch):
     monkeypatch.setattr("robocov_app.web.pages.MAX_VIEWERS", 3)
-    cookie = cookie_of(display)
+    cookie = read_cookie(display)
     with ExitStack() as stack:
-        watchers = [stack.enter_context(watcher_of(display)) for _ in range(3)]
-        with watcher_of(display) as refused:
+        watchers = [stack.enter_context(open_watcher(display)) for _ in range(3)]
+        with open_watcher(display) as refused:
             code, reason = close_reason(refused)
         assert code == 1013
         assert reason.startswith("All 3 places for viewers are taken")
         for _ in range(5):  # reloads
-            with socket_of(display, Cookie=cookie) as teacher:
-                told = told_to(teacher)
-                assert controller(told) == told["you"]
+            with open_socket(display, Cookie=cookie) as teacher:
+                told = read_message(teacher)
+                assert find_controller(told) == told["you"]
         watchers[0].close()
-        with watcher_of(display) as other:
-            assert told_to(other)["participants"]
+        with open_watcher(display) as other:
+            assert read_message(other)["participants"]
 
 
 def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, monkeypatch):
     monkeypatch.setattr("robocov_app.web.pages.MAX_VIEWERS", 1)
     address = f"ws://127.0.0.1:{display.port}/socket?token={display.watch_token}&page=a"
     with connect(address, proxy=None) as before:
-        told_to(before)
+        read_message(before)
         with connect(address, proxy=None) as again:
-            assert told_to(again)["you"] == 1
+            assert read_message(again)["you"] == 1
 
 
 def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, monkeypatch):
     monkeypatch.setattr("robocov_app.web.pages.MAX_CONTROL_PAGES", 2)
-    cookie = cookie_of(display)
+    cookie = read_cookie(display)
     with ExitStack() as stack:
-        first, second = (stack.enter_context(socket_of(display, Cookie=cookie)) for _ in range(2))
-        told_to(first)
-        third = stack.enter_context(socket_of(display, Cookie=cookie))
+        first, second = (stack.enter_context(open_socket(display, Cookie=cookie)) for _ in range(2))
+        read_message(first)
+        third = stack.enter_context(open_socket(display, Cookie=cookie))
         assert close_reason(second)[0] == 4001  # the first one controls
-        told = told_to(third)
+        told = read_message(third)
         while len(told["participants"]) != 2:
-            told = told_to(third)
+            told = read_message(third)
         first.ping().wait(5)
 
 
@@ -630,8 +636,8 @@ def test_frames_that_pages_have_are_bounded():
 def test_a_page_whose_frame_was_given_up_gets_the_next_one_from_black(display, monkeypatch):
     monkeypatch.setattr(display.shared.delivery, "bases", BaseFrames(max_bytes=1))
     surface = pygame.Surface((40, 30), 0, 32)
-    with socket_of(display, Cookie=cookie_of(display)) as ahead, watcher_of(display) as behind:
-        told_to(ahead), told_to(behind)
+    with open_socket(display, Cookie=read_cookie(display)) as ahead, open_watcher(display) as behind:
+        read_message(ahead), read_message(behind)
         shown = {ahead: None, behind: None}
         for shade in (10, 20, 30):
             surface.fill((shade, 0, 0), (shade, 0, 5, 5))
@@ -639,7 +645,7 @@ def test_a_page_whose_frame_was_given_up_gets_the_next_one_from_black(display, m
             for line in (ahead, behind) if shade != 20 else (ahead,):
                 while not isinstance(data := line.recv(5), bytes):
                     pass
-                shown[line] = decoded(data, shown[line])
+                shown[line] = decode_picture(data, shown[line])
                 line.send(json.dumps({"kind": "shown", "number": HEADER.unpack_from(data)[0]}))
         assert np.array_equal(shown[ahead], Frame.from_surface(surface, 0).pixels)
 
@@ -649,10 +655,10 @@ def test_who_comes_to_a_window_at_rest_sees_it(display):
     surface.fill((1, 2, 3))
     display.send(surface)
     for _ in range(5):
-        with watcher_of(display) as line:
+        with open_watcher(display) as line:
             while not isinstance(data := line.recv(5), bytes):
                 pass
-        assert np.array_equal(decoded(data, None), Frame.from_surface(surface, 0).pixels)
+        assert np.array_equal(decode_picture(data, None), Frame.from_surface(surface, 0).pixels)
 
 
 def test_a_program_that_asks_for_heads_alone_gets_them(display):

@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
-from served_window import served
+from served_window import serve_window
 from sub_path_proxy import PREFIX, SubPathProxy
 
 pytest.importorskip("websockets")
@@ -35,60 +35,60 @@ def blank(browser):
     browser.complaints()
 
 
-def sized(browser, width, height, ratio=1.0):
+def set_size(browser, width, height, ratio=1.0):
     size = {"width": width, "height": height, "deviceScaleFactor": ratio, "mobile": width < 500}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
 
-def canvas_size(browser):
+def get_canvas_size(browser):
     return browser.js("const it = document.querySelector('canvas'); return [it.width, it.height]")
 
 
-def picture(browser):
+def read_picture(browser):
     return browser.js("return document.querySelector('canvas').toDataURL()")
 
 
-def rested(browser):
+def wait_for_rest(browser):
     """Wait until the picture stays as it is."""
     seen = [""]
 
-    def same():
+    def is_same():
         before = seen[0]
-        seen[0] = picture(browser)
+        seen[0] = read_picture(browser)
         return before == seen[0] and browser.js("return work.then(() => true)")
 
-    browser.until(same)
+    browser.until(is_same)
     return seen[0]
 
 
 def test_the_demo_follows_hands_page_and_colors(browser, tmp_path):
-    sized(browser, 1280, 720)
+    set_size(browser, 1280, 720)
     browser.prefer(color_scheme="light")
-    with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
-        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
         assert "token" not in browser.driver.current_url
-        begun = rested(browser)
+        begun = wait_for_rest(browser)
         mouse = {"button": "left", "buttons": 1, "clickCount": 1}
         for kind, x in (("mousePressed", 60), ("mouseMoved", 160), ("mouseReleased", 160)):
             event = {"type": kind, "x": x, "y": 240, **mouse}
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
-        browser.until(lambda: picture(browser) != begun)
-        panned = rested(browser)
+        browser.until(lambda: read_picture(browser) != begun)
+        panned = wait_for_rest(browser)
         browser.keys("f")
-        browser.until(lambda: picture(browser) != panned)
+        browser.until(lambda: read_picture(browser) != panned)
         browser.keys("/")  # the palette, without the letter
         browser.keys("seed 7")
-        typed = rested(browser)
+        typed = wait_for_rest(browser)
         browser.keys("\ue007")
-        browser.until(lambda: picture(browser) != typed)
-        sized(browser, 390, 844, 3.0)
-        browser.until(lambda: canvas_size(browser) == [1170, 2532])
-        light = rested(browser)
+        browser.until(lambda: read_picture(browser) != typed)
+        set_size(browser, 390, 844, 3.0)
+        browser.until(lambda: get_canvas_size(browser) == [1170, 2532])
+        light = wait_for_rest(browser)
         browser.prefer(color_scheme="dark")
-        browser.until(lambda: picture(browser) != light)
+        browser.until(lambda: read_picture(browser) != light)
         browser.driver.refresh()  # the cookie is enough
-        browser.until(lambda: canvas_size(browser) == [1170, 2532])
+        browser.until(lambda: get_canvas_size(browser) == [1170, 2532])
         assert not browser.complaints()
 
 
@@ -100,23 +100,23 @@ def press_with_control(browser, key, command=""):
 
 
 def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tmp_path):
-    sized(browser, 1280, 720)
+    set_size(browser, 1280, 720)
     (tmp_path / "down").mkdir()
     place = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
     browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", place)
     (tmp_path / "files").mkdir()
-    with served("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
         browser.driver.get(link)
-        browser.until(lambda: canvas_size(browser) == [1280, 720])
-        begun = rested(browser)
+        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        begun = wait_for_rest(browser)
         upload = (
             "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
             "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
         )
         browser.js(upload, (MAPS / "trap.json").read_text())
-        browser.until(lambda: picture(browser) != begun)
+        browser.until(lambda: read_picture(browser) != begun)
         assert not browser.all("#saved a"), "what was dropped has not been saved"
-        rested(browser)
+        wait_for_rest(browser)
         press_with_control(browser, "s")
         browser.until(lambda: browser.all("#saved a"))
         assert browser.find("#saved").get_property("open")
@@ -127,7 +127,7 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         browser.driver.get(link)
         browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
         assert browser.js("return document.body.className") == "watching"
-        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
         browser.find("summary").click()
         browser.js("prompt = () => 'Ada'")
         browser.all("#here button")[1].click()
@@ -140,21 +140,21 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         assert not browser.complaints()
 
 
-def told_by(browser):
+def record_messages(browser):
     """Let the page keep what it tells; the result returns that, and forgets it."""
     browser.js("window.kept = []; const tells = tell; tell = (one) => { kept.push(one); tells(one); }")
     return lambda: [each for each in browser.js("return kept.splice(0)") if each["kind"] != "shown"]
 
 
 def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_path):
-    sized(browser, 1280, 720)
-    with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+    set_size(browser, 1280, 720)
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
-        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
         assert not browser.find("#toast").is_displayed()
         projector = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
-        sized(browser, 390, 844, 2.0)
+        set_size(browser, 390, 844, 2.0)
         browser.driver.get(link)
         browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
         browser.js("tell({kind: 'control', to: 0})")
@@ -170,7 +170,7 @@ def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_pa
         assert not browser.find("#toast").is_displayed()
         browser.driver.switch_to.window(phone)
         browser.until(lambda: browser.js("return document.body.className") == "")
-        assert canvas_size(browser) == [1280, 720], "the projector keeps its size"
+        assert get_canvas_size(browser) == [1280, 720], "the projector keeps its size"
         assert browser.js("return canvas.getBoundingClientRect().width") <= 390
         browser.keys("w")
         browser.until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
@@ -180,20 +180,20 @@ def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_pa
 
 
 def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(browser, tmp_path):
-    sized(browser, 900, 600)
+    set_size(browser, 900, 600)
     with (
-        served("demo", "rooms", "--folder", str(tmp_path)) as link,
+        serve_window("demo", "rooms", "--folder", str(tmp_path)) as link,
         SubPathProxy(urlsplit(link).port) as proxy,
     ):
         browser.driver.get(proxy.link(link))
-        browser.until(lambda: canvas_size(browser) == [900, 600])
+        browser.until(lambda: get_canvas_size(browser) == [900, 600])
         assert urlsplit(browser.driver.current_url).path == PREFIX + "/"
         proxy.cut()
         browser.until(lambda: "Connection lost" in browser.find("#note").text)
         browser.until(lambda: browser.find("#note").text == "")
         assert browser.js("return controls")
         browser.driver.refresh()
-        browser.until(lambda: canvas_size(browser) == [900, 600])
+        browser.until(lambda: get_canvas_size(browser) == [900, 600])
         # a slow line misses pictures, and nothing that is done
         browser.js("window.seen = 0; const shows = show; show = (...all) => (seen++, shows(...all))")
         proxy.rate = 20_000.0
@@ -204,20 +204,20 @@ def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(b
         browser.keys(" " * 9)  # which pauses in the end
         time.sleep(1.0)
         proxy.rate = 0.0
-        still = rested(browser)
+        still = wait_for_rest(browser)
         browser.keys(" ")
-        browser.until(lambda: picture(browser) != still)
+        browser.until(lambda: read_picture(browser) != still)
 
 
 def test_text_is_pasted_once_and_copied(browser, tmp_path):
-    sized(browser, 1280, 720)
-    with served("edit", "--folder", str(tmp_path)) as link:
+    set_size(browser, 1280, 720)
+    with serve_window("edit", "--folder", str(tmp_path)) as link:
         allowed = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
         origin = link.partition("/?")[0]
         browser.driver.execute_cdp_cmd("Browser.grantPermissions", {"origin": origin, **allowed})
         browser.driver.get(link)
-        browser.until(lambda: canvas_size(browser) == [1280, 720])
-        rested(browser)
+        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        wait_for_rest(browser)
 
         put = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
         browser.driver.execute_async_script(put)
@@ -226,7 +226,7 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
         press_with_control(browser, "a")
         press_with_control(browser, "v", "paste")
-        rested(browser)
+        wait_for_rest(browser)
         browser.keys("!")
         press_with_control(browser, "a")
         press_with_control(browser, "c", "copy")
@@ -238,28 +238,28 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
             lambda: browser.keys("\ue007"),
         ):
             press()
-            rested(browser)
+            wait_for_rest(browser)
         browser.until(lambda: list(tmp_path.glob("*.json")))
         assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle!"
         press_with_control(browser, "z")  # what is not saved does not keep a process that is to stop
-        rested(browser)
+        wait_for_rest(browser)
 
 
 def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, tmp_path):
     touch = {"enabled": True, "maxTouchPoints": 2}
     browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
     try:
-        sized(browser, 390, 844, 3.0)
-        with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        set_size(browser, 390, 844, 3.0)
+        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
-            browser.until(lambda: canvas_size(browser) == [1170, 2400])
-            narrow = rested(browser)
+            browser.until(lambda: get_canvas_size(browser) == [1170, 2400])
+            narrow = wait_for_rest(browser)
             box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
             assert browser.js(f"{box} return [box.left, box.top, box.width, box.height]") == [0, 0, 390, 800]
             assert browser.js("return document.getElementById('touch').getBoundingClientRect().top") == 800
             browser.find("[data-key=h]").click()
-            browser.until(lambda: picture(browser) != narrow)
-            told = told_by(browser)
+            browser.until(lambda: read_picture(browser) != narrow)
+            told = record_messages(browser)
 
             def touch(*moments):
                 for moment in moments:

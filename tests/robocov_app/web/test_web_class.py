@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
-from served_window import served
+from served_window import serve_window
 
 from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 
@@ -105,7 +105,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
     words = ("demo", "square", "--robots", "3", "--lattice", "8", "--paused", "--folder", str(folder))
     browser = Browser(tmp_path / "browser")
     try:
-        with served(*words, cwd=tmp_path) as link:
+        with serve_window(*words, cwd=tmp_path) as link:
             port = urlsplit(link).port
             watch_link = watch_link_of(link)
             browser.driver.get(link)
@@ -145,7 +145,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
                 os.kill(link.process.pid, signal.SIGKILL)
                 wait_until(lambda: others.n_lost == 59)
             wait_until(lambda: "Connection lost" in note(browser))
-        with served(*words, port=port, cwd=tmp_path) as link:
+        with serve_window(*words, port=port, cwd=tmp_path) as link:
             browser.driver.switch_to.window(pupil)
             wait_until(lambda: "This link is not valid any more" in note(browser))
             browser.driver.switch_to.window(teacher)
@@ -166,7 +166,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
     assert changes[-1] == "leave"
 
 
-def memory_mb(process):
+def read_memory_mb(process):
     """Return the memory of a process that is in use."""
     status = Path(f"/proc/{process.pid}/status").read_text()
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
@@ -177,17 +177,17 @@ def test_memory_is_bounded_and_given_back_when_pages_have_come_and_gone(tmp_path
     words = ("demo", "rooms", "--robots", "20", "--start", "uniform", "--folder", str(tmp_path))
     page = {"kind": "page", "width": 1920, "height": 1080, "ratio": 1.0, "dark": False}
     slow = tuple(0.02 * number for number in range(50))
-    with served(*words, cwd=tmp_path) as link, Watchers(link, 1, (0.0,), page) as teacher:
+    with serve_window(*words, cwd=tmp_path) as link, Watchers(link, 1, (0.0,), page) as teacher:
         watch_link = watch_link_of(link)
         wait_until(lambda: teacher.n_frames[0] > 60)
         time.sleep(3.0)
-        before = memory_mb(link.process)
+        before = read_memory_mb(link.process)
         highest = before
         for _ in range(2):
             with Watchers(watch_link, 100, slow) as watchers:
                 end = time.monotonic() + 8.0
                 while time.monotonic() < end or not all(watchers.n_frames):
-                    highest = max(highest, memory_mb(link.process))
+                    highest = max(highest, read_memory_mb(link.process))
                     time.sleep(0.2)
-        wait_until(lambda: memory_mb(link.process) < before + 120)  # 30 MB is usual
+        wait_until(lambda: read_memory_mb(link.process) < before + 120)  # 30 MB is usual
     assert highest < before + 500  # 140 MB is usual

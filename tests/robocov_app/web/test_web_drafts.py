@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from sample_sessions import start_session
-from served_window import Link, served
+from served_window import Link, serve_window
 
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.ui.launch import EditorLauncher
@@ -34,7 +34,7 @@ def _drafts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # restored afterwards
 
 
-def drafts_in(folder: Path) -> list[dict]:
+def read_drafts(folder: Path) -> list[dict]:
     """Return the drafts that were written, without one that is just being written."""
     return [json.loads(path.read_text()) for path in (folder / SERVED_FOLDER).rglob("draft.json")]
 
@@ -103,7 +103,7 @@ class Client:
 
 
 @contextmanager
-def controlling(link: Link) -> Iterator[Client]:
+def open_controlling_client(link: Link) -> Iterator[Client]:
     place, token = link.split("/?token=")
     address = f"{place.replace('http', 'ws', 1)}/socket?token={token}"
     with connect(address, proxy=None, max_size=None) as line:
@@ -115,17 +115,17 @@ def controlling(link: Link) -> Iterator[Client]:
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_a_killed_served_editor_loses_at_most_about_a_second(tmp_path: Path, number: int) -> None:
     words = ("edit", "m.json", "--folder", str(tmp_path))
-    with served(*words, cwd=tmp_path) as link, controlling(link) as client:
+    with serve_window(*words, cwd=tmp_path) as link, open_controlling_client(link) as client:
         client.press("c")  # the tool for circles
         client.drag((300, 300), (330, 300), (350, 300))
         # a second, and as long as it takes until the circle is there
-        wait_for(lambda: drafts_in(tmp_path) and drafts_in(tmp_path)[0].get("sketch"))
+        wait_for(lambda: read_drafts(tmp_path) and read_drafts(tmp_path)[0].get("sketch"))
         client.press("q", held=2)  # which asks whether to save
         link.process.send_signal(number)
         link.process.wait(PATIENCE_S)
-    (draft,) = drafts_in(tmp_path)
+    (draft,) = read_drafts(tmp_path)
     assert len(draft["sketch"]["obstacles"]) == 1
-    with served(*words, cwd=tmp_path) as link, controlling(link) as client:
+    with serve_window(*words, cwd=tmp_path) as link, open_controlling_client(link) as client:
         client.press("Enter")  # Recover
         client.press("s", held=2)  # the map has a name already
         wait_for((tmp_path / "m.json").exists)
@@ -138,13 +138,13 @@ def test_a_killed_served_editor_loses_at_most_about_a_second(tmp_path: Path, num
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_a_killed_served_viewer_loses_at_most_about_a_second(tmp_path: Path, number: int) -> None:
     words = ("demo", "square", "--robots", "3", "--lattice", "8", "--paused", "--folder", str(tmp_path))
-    with served(*words, cwd=tmp_path) as link, controlling(link) as client:
+    with serve_window(*words, cwd=tmp_path) as link, open_controlling_client(link) as client:
         client.press("Tab")  # selects robot 1
         client.press("Delete")
-        wait_for(lambda: drafts_in(tmp_path) and drafts_in(tmp_path)[0].get("session"))
+        wait_for(lambda: read_drafts(tmp_path) and read_drafts(tmp_path)[0].get("session"))
         link.process.send_signal(number)
         link.process.wait(PATIENCE_S)
-    with served(*words, cwd=tmp_path) as link, controlling(link) as client:
+    with serve_window(*words, cwd=tmp_path) as link, open_controlling_client(link) as client:
         client.press("Enter")  # Recover
         client.press("s", held=2)
         wait_for(lambda: list(tmp_path.glob("*.robocov")))

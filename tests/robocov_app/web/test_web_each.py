@@ -13,7 +13,7 @@ from http.cookiejar import CookieJar
 from pathlib import Path
 
 import pytest
-from served_window import served
+from served_window import serve_window
 
 from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 
@@ -52,7 +52,7 @@ class Visitor:
             yield line
 
 
-def first_frame(line):
+def read_first_frame(line):
     line.send('{"kind": "page", "width": 1000, "height": 700, "ratio": 1.0, "dark": false}')
     while not isinstance(frame := line.recv(PATIENCE_S), bytes):
         pass
@@ -80,7 +80,7 @@ def wait_until(condition):
         time.sleep(0.02)
 
 
-def children(process):
+def list_children(process):
     """Return the processes of windows."""
     found = subprocess.run(
         ["pgrep", "-P", str(process.pid), "-f", "spawn_main"], capture_output=True, text=True
@@ -88,7 +88,7 @@ def children(process):
     return [int(each) for each in found.stdout.split()]
 
 
-def alive(pid):
+def is_alive(pid):
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
@@ -96,7 +96,7 @@ def alive(pid):
 
 def test_each_visitor_has_a_window_of_their_own(tmp_path):
     options = ("--paused", "--each", "--max-sessions", "2", "--folder", str(tmp_path))
-    with served("demo", "rooms", *options) as link:
+    with serve_window("demo", "rooms", *options) as link:
         ada = Visitor()
         ben = Visitor()
         cleo = Visitor()
@@ -109,9 +109,9 @@ def test_each_visitor_has_a_window_of_their_own(tmp_path):
         strange = (link[:-3], link.partition("?")[0], link.replace("/?", "//[?") + "x", own[:-1])
         assert [cleo.get(address)[0] for address in strange] == [403] * 4
         with ada.page(link) as hers, ben.page(link) as his:
-            first_frame(hers), first_frame(his)
+            read_first_frame(hers), read_first_frame(his)
             with ada.page(link) as second:  # another tab
-                first_frame(second)
+                read_first_frame(second)
             with cleo.page(link) as refused:
                 assert close_of(refused) == (1013, "All 2 windows are in use. Trying again …")
             (tmp_path / "session-1/mine.json").write_text("{}")
@@ -125,17 +125,17 @@ def test_each_visitor_has_a_window_of_their_own(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_who_only_fetches_the_page_takes_no_window(tmp_path):
     options = ("--each", "--max-sessions", "2", "--folder", str(tmp_path))
-    with served("demo", "rooms", "--paused", *options) as link:
-        (spare,) = children(link.process)
+    with serve_window("demo", "rooms", "--paused", *options) as link:
+        (spare,) = list_children(link.process)
         for _ in range(10):
             status, address, page = Visitor().get(link)
             assert status == 200
             assert b"<canvas" in page
             assert Visitor().get(address, "HEAD") == (200, address, b"")
-        assert children(link.process) == [spare]
+        assert list_children(link.process) == [spare]
         with Visitor().page(link) as ada, Visitor().page(link) as ben:
-            first_frame(ada), first_frame(ben)
-            assert len(children(link.process)) == 2
+            read_first_frame(ada), read_first_frame(ben)
+            assert len(list_children(link.process)) == 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
@@ -144,23 +144,23 @@ def test_a_window_that_nobody_looks_at_is_ended_and_its_work_is_offered(tmp_path
     options = ("--each", "--max-sessions", "1", "--idle-minutes", "0.05", "--folder", str(tmp_path))
     ada = Visitor()
     ben = Visitor()
-    with served("edit", *options, cwd=tmp_path) as link:
+    with serve_window("edit", *options, cwd=tmp_path) as link:
         with ada.page(link) as line:
-            first_frame(line)
+            read_first_frame(line)
             press(line, "c")  # the tool for circles
             line.send(json.dumps({"kind": "button", "button": 1, "down": True, "x": 300, "y": 300}))
             line.send(json.dumps({"kind": "move", "button": 1, "x": 350, "y": 300}))
             line.send(json.dumps({"kind": "button", "button": 1, "down": False, "x": 350, "y": 300}))
-            (window,) = children(link.process)
+            (window,) = list_children(link.process)
             time.sleep(5.0)
-            assert alive(window)  # somebody looks
-        wait_until(lambda: not children(link.process))
+            assert is_alive(window)  # somebody looks
+        wait_until(lambda: not list_children(link.process))
         assert len(list((tmp_path / "session-1" / SERVED_FOLDER).rglob("draft.json"))) == 1
         with ben.page(link) as line:  # the place was given back
-            first_frame(line)
-        wait_until(lambda: not children(link.process))
+            read_first_frame(line)
+        wait_until(lambda: not list_children(link.process))
         with ada.page(link) as line:
-            first_frame(line)
+            read_first_frame(line)
             press(line, "Enter")  # Recover
             press(line, "s", held=2)
             press(line, "Enter")
@@ -168,24 +168,24 @@ def test_a_window_that_nobody_looks_at_is_ended_and_its_work_is_offered(tmp_path
     (saved,) = (tmp_path / "session-1").glob("*.json")
     assert [each["kind"] for each in json.loads(saved.read_text())["obstacles"]] == ["circle"]
     # also the next server knows her
-    with served("edit", *options, cwd=tmp_path) as link:
+    with serve_window("edit", *options, cwd=tmp_path) as link:
         assert ada.get(link.partition("?")[0])[0] == 403  # but not without its link
         with ada.page(link) as line:
-            first_frame(line)
+            read_first_frame(line)
             (tmp_path / "session-1/new.json").write_text("{}")
             wait_until(lambda: "new.json" in line.recv(PATIENCE_S).__str__())
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_a_window_that_dies_is_opened_again_by_its_page(tmp_path):
-    with served("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path)) as link:
+    with serve_window("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path)) as link:
         ada = Visitor()
         with ada.page(link) as line:
-            first_frame(line)
-            os.kill(children(link.process)[0], signal.SIGKILL)
+            read_first_frame(line)
+            os.kill(list_children(link.process)[0], signal.SIGKILL)
             assert close_of(line)[0] == 1012
         with ada.page(link) as line:
-            first_frame(line)
+            read_first_frame(line)
             press(line, "q", held=2)
             press(line, "Enter")
         assert sorted(each.name for each in tmp_path.iterdir() if each.is_dir()) == ["session-1"]
@@ -196,15 +196,15 @@ def test_a_window_that_dies_is_opened_again_by_its_page(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_all_windows_without_a_traceback(tmp_path, starting, number):
     how = {"stderr": subprocess.PIPE, "start_new_session": True}
-    with served("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path), **how) as link:
+    with serve_window("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path), **how) as link:
         with Visitor().page(link) as line:
-            first_frame(line)
+            read_first_frame(line)
             with Visitor().page(link) as second:
                 if starting:
                     wait_until((tmp_path / "session-2").exists)
                 else:
-                    first_frame(second)
-                pids = children(link.process)
+                    read_first_frame(second)
+                pids = list_children(link.process)
                 assert pids
                 if number == signal.SIGINT:
                     os.killpg(link.process.pid, number)  # as a terminal does
@@ -213,18 +213,21 @@ def test_a_signal_ends_all_windows_without_a_traceback(tmp_path, starting, numbe
                 assert link.process.wait(10) == 130
         assert link.process.stderr.read() == "robocov: stopped\n"
         link.process.stderr.close()
-        wait_until(lambda: not any(map(alive, pids)))
+        wait_until(lambda: not any(map(is_alive, pids)))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_windows_do_not_outlive_a_server_that_is_killed(tmp_path):
     options = ("--paused", "--each", "--folder", str(tmp_path))
-    with served("demo", "rooms", *options, start_new_session=True) as link, Visitor().page(link) as line:
-        first_frame(line)
-        pids = children(link.process)
+    with (
+        serve_window("demo", "rooms", *options, start_new_session=True) as link,
+        Visitor().page(link) as line,
+    ):
+        read_first_frame(line)
+        pids = list_children(link.process)
         link.process.kill()
         assert close_of(line) is None
-        wait_until(lambda: not any(map(alive, pids)))
+        wait_until(lambda: not any(map(is_alive, pids)))
 
 
 def test_what_is_wrong_is_told_before_anybody_comes(tmp_path):

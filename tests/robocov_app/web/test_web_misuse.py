@@ -37,23 +37,23 @@ def check_health(display):
     """Open the page and its socket, as a teacher who reloads, and see a frame."""
     with urllib.request.urlopen(display.link, timeout=PATIENCE_S) as answer:
         assert b"<canvas" in answer.read()
-    with connect(socket_address(display), proxy=None, open_timeout=PATIENCE_S) as line:
+    with connect(build_socket_address(display), proxy=None, open_timeout=PATIENCE_S) as line:
         while not isinstance(line.recv(PATIENCE_S), bytes):
             pass
 
 
-def socket_address(display, token=None):
+def build_socket_address(display, token=None):
     return f"ws://127.0.0.1:{display.port}/socket?token={token or display.token}"
 
 
-def raw(display):
+def open_raw_connection(display):
     return socket.create_connection(("127.0.0.1", display.port), timeout=PATIENCE_S)
 
 
 def answer_to(display, request):
     """Send bytes, and return all that comes back until the server ends the connection."""
     received = b""
-    with raw(display) as line, suppress(OSError):
+    with open_raw_connection(display) as line, suppress(OSError):
         with suppress(OSError):
             line.sendall(request)
         while piece := line.recv(1 << 16):
@@ -171,7 +171,7 @@ FRAMES = {
 
 @pytest.mark.parametrize("name", FRAMES)
 def test_frames_of_no_browser_end_their_connection_alone(display, name):
-    with raw(display) as line:
+    with open_raw_connection(display) as line:
         line.sendall(upgrade(f"/socket?token={display.token}"))
         assert line.recv(1 << 16).startswith(b"HTTP/1.1 101")
         with suppress(OSError):
@@ -183,7 +183,7 @@ def test_many_silent_connections_keep_nobody_out(display, monkeypatch):
     monkeypatch.setattr("robocov_app.web.connections.MAX_UNANSWERED", 40)
     with ExitStack() as stack:
         for number in range(300):
-            line = stack.enter_context(raw(display))
+            line = stack.enter_context(open_raw_connection(display))
             with suppress(OSError):
                 line.sendall(b"GET / HT" * (number % 3))
         check_health(display)
@@ -191,7 +191,7 @@ def test_many_silent_connections_keep_nobody_out(display, monkeypatch):
 
 def test_a_request_that_comes_byte_by_byte_is_given_up(display, monkeypatch):
     monkeypatch.setattr("robocov_app.web.connections.REQUEST_TIMEOUT_S", 0.3)
-    with raw(display) as line:
+    with open_raw_connection(display) as line:
         begun = time.monotonic()
         with suppress(OSError):
             while time.monotonic() - begun < PATIENCE_S:
@@ -202,7 +202,7 @@ def test_a_request_that_comes_byte_by_byte_is_given_up(display, monkeypatch):
 
 def test_sockets_that_open_and_close_fast(display):
     for number in range(60):
-        line = raw(display)
+        line = open_raw_connection(display)
         if number % 3:
             line.sendall(upgrade(f"/socket?token={display.watch_token}"))
         if number % 2:  # without a goodbye
@@ -235,7 +235,7 @@ def test_a_page_that_never_reads_is_ended_and_holds_up_nobody(display, monkeypat
 
 
 def test_a_page_that_says_what_it_never_got(display):
-    with connect(socket_address(display), proxy=None) as line:
+    with connect(build_socket_address(display), proxy=None) as line:
         for number in (0, 1, 7, 2**32 - 1):
             for _ in range(20):
                 line.send(json.dumps({"kind": "shown", "number": number}))
@@ -244,14 +244,14 @@ def test_a_page_that_says_what_it_never_got(display):
 
 def test_watchers_who_send_much_wait_and_hold_up_nobody(display):
     move = json.dumps({"kind": "move", "x": 1, "y": 1})
-    with connect(socket_address(display, display.watch_token), proxy=None) as watcher:
+    with connect(build_socket_address(display, display.watch_token), proxy=None) as watcher:
         for _ in range(3000):
             watcher.send(move)
         check_health(display)
 
 
 def test_a_name_in_turns_as_fast_as_possible(display):
-    with connect(socket_address(display, display.watch_token), proxy=None) as watcher:
+    with connect(build_socket_address(display, display.watch_token), proxy=None) as watcher:
         for number in range(1000):
             with suppress(ConnectionClosed):
                 watcher.send(json.dumps({"kind": "name", "name": f"Ada {number}"}))
@@ -274,7 +274,7 @@ def test_files_that_nobody_takes_are_bounded(display, tmp_path, monkeypatch):
     (tmp_path / "film.mp4").write_bytes(bytes(8 << 20))
     display.saved_files = ("film.mp4",)
     request = f"GET /saved/film.mp4?token={display.token} HTTP/1.1\r\n\r\n".encode()
-    with raw(display) as first, raw(display) as second:
+    with open_raw_connection(display) as first, open_raw_connection(display) as second:
         for line in (first, second):
             line.sendall(request)
             assert line.recv(1000).startswith(b"HTTP/1.1 200")

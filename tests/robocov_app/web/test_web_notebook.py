@@ -65,10 +65,10 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
 
 
 def test_a_simulation_goes_on_in_the_window(monkeypatch):
-    def opened(call, height):
+    def open_called_session(call, height):
         return Session.open(load_session(Path(call[1]))).timeline.panes[0].simulation
 
-    monkeypatch.setattr("robocov_app.notebook.LiveWindow", opened)
+    monkeypatch.setattr("robocov_app.notebook.LiveWindow", open_called_session)
     rooms = robocov.load_map("rooms")
     simulation = robocov.Simulation(rooms, robocov.Rapf(k_rep=0.4), rooms.start().sample(3, seed=1))
     simulation.run(1.0)
