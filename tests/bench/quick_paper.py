@@ -1,9 +1,10 @@
-"""The claims of the paper in its quick study, as users run it.
-
-It takes minutes and is therefore not among the tests. Close claims need the maps of the full study. The part
-beyond the paper is left out: tests/robocov_app/replication/test_whole_study.py covers it on a tiny study.
+"""Check which claims of the paper the quick study confirms, as users run it.
 
     python -m pytest -n 0 tests/bench/quick_paper.py
+
+This takes minutes and is therefore no part of the test suite. Close claims require the maps of the full
+study. The studies beyond the paper are left out: tests/robocov_app/replication/test_whole_study.py covers
+them with a tiny plan.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def test_the_quick_study_confirms_the_clear_claims(tmp_path):
     claims = {claim["key"]: claim for claim in documents if claim["question"] < GOALS}
     assert len(claims) == 15
     for key in ("nonconvex-final-shared", "nonconvex-motion-shared"):
-        # Twelve maps hardly show that RAPF is ahead in nine of ten runs, even if it always is.
+        # Twelve maps are too few to show that RAPF is ahead in nine of ten runs, even if it always is.
         assert claims[key]["verdict"] != "does not hold" and claims[key]["criteria"][0]["met"]
     assert claims["gap-rpf"]["verdict"] == "holds"
     assert claims["convex-spreading"]["verdict"] == "does not hold"

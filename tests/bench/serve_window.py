@@ -1,10 +1,13 @@
-"""First picture, pictures a second, and the time from a drag to its picture, of a window in a real browser.
+"""Measure how fast a served window is in a browser.
 
-    python tests/bench/serve_window.py [--robots 50] [--size 1280x720] [--ratio 1] [--shots FOLDER]
+    python tests/bench/serve_window.py --robots 50 --size 1280x720
 
-All but the first is measured in the page. A drag pans the map, which draws all of it anew: the time is from
-when the pointer event is made to when the picture with the map at its new place is on the canvas.
+The script prints the time until the first frame, the frame rate, and the response time of drags. A drag pans
+the map, so that all of it is redrawn. Its response time is from the pointer event until the canvas shows the
+map at its new position. All but the first time is measured in the page.
 """
+
+from __future__ import annotations
 
 import argparse
 import os
@@ -19,89 +22,136 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "robocov_app"))
 from driven_browser import Browser
 from served_window import serve_window
 
-WATCH = """
-window.drawn = 0; window.came = 0;
-const put = CanvasRenderingContext2D.prototype.putImageData;
-CanvasRenderingContext2D.prototype.putImageData = function (...all) { put.apply(this, all); window.drawn++; };
-socket.addEventListener('message', () => window.came++);
+MAX_SCRIPT_S = 120.0
+WARM_UP_S = 2.0
+FRAME_RATE_S = 6.0
+"""Time over which frames are counted."""
+PAUSE_S = 2.5
+"""Time after a pause until the window is quiet."""
+IDLE_S = 2.0
+"""Time over which messages of a paused window are counted."""
+
+COUNT_FRAMES_AND_MESSAGES = """
+window.frames = 0;
+window.messages = 0;
+const putImageData = CanvasRenderingContext2D.prototype.putImageData;
+CanvasRenderingContext2D.prototype.putImageData = function (...all) {
+  putImageData.apply(this, all);
+  window.frames++;
+};
+socket.addEventListener('message', () => window.messages++);
 """
-DRAG = """
-const done = arguments[0], waits = [], pause = (time) => new Promise((then) => setTimeout(then, time));
-const pointer = (kind, x, buttons) => canvas.dispatchEvent(new PointerEvent(kind, {
-  clientX: x, clientY: 300, buttons, button: kind === 'pointermove' ? -1 : 0, pointerId: 1, bubbles: true}));
+"""JavaScript that counts the frames that are drawn and the messages that arrive."""
+
+MEASURE_DRAGS = """
+const drags = arguments[0];
+const done = arguments[1];
+const timeout = 2000;
+const y = 300;
+const times = [];
+const pause = (duration) => new Promise((then) => setTimeout(then, duration));
+const post = (type, x, buttons) => canvas.dispatchEvent(new PointerEvent(type, {
+  clientX: x, clientY: y, buttons, button: type === 'pointermove' ? -1 : 0, pointerId: 1, bubbles: true}));
 canvas.setPointerCapture = () => {};
-const wall = () => {  // the map's left wall in the row where the drag is
-  const row = context.getImageData(0, Math.round(300 * devicePixelRatio), canvas.width, 1).data;
+const findWall = () => {  // left wall of the map in the row of the drag
+  const row = context.getImageData(0, Math.round(y * devicePixelRatio), canvas.width, 1).data;
   for (let x = 0; x < canvas.width; x++) if (row[4 * x] < 110) return x;
 };
 (async () => {
-  pointer('pointerdown', 10, 1);
-  for (let k = 1; k <= 60; k++) {
+  post('pointerdown', 10, 1);
+  for (let k = 1; k <= drags; k++) {
     await pause(150 + 20 * Math.random());
-    const at = wall(), began = performance.now();
-    pointer('pointermove', 10 + (k % 2 ? 6 : 0), 1);
-    while (wall() === at && performance.now() - began < 2000) {
-      const seen = window.drawn;
-      while (window.drawn === seen && performance.now() - began < 2000) await pause(1);
+    const wall = findWall();
+    const start = performance.now();
+    post('pointermove', 10 + (k % 2 ? 6 : 0), 1);
+    while (findWall() === wall && performance.now() - start < timeout) {
+      const frames = window.frames;
+      while (window.frames === frames && performance.now() - start < timeout) await pause(1);
     }
-    waits.push(performance.now() - began);
+    times.push(performance.now() - start);
   }
-  pointer('pointerup', 10, 0);
-  done(waits);
+  post('pointerup', 10, 0);
+  done(times);
 })();
 """
+"""JavaScript that drags the map to and fro, and returns the response times, ms."""
+
+
+def measure_first_frame(browser: Browser, link: str, canvas_width: int, start_time: float) -> None:
+    """Open a window in the browser, and print when it shows its first frame."""
+    browser.driver.get(link)
+    browser.wait_until(lambda: browser.run_script("return canvas.width") == canvas_width)
+    print(f"{time.monotonic() - start_time:.1f} s from the command to the first frame")
+
+
+def measure_frame_rate(browser: Browser) -> None:
+    """Print how many frames per second the page draws."""
+    time.sleep(WARM_UP_S)
+    start_ms = browser.run_script("window.frames = 0; return performance.now()")
+    time.sleep(FRAME_RATE_S)
+    frames, end_ms = browser.run_script("return [window.frames, performance.now()]")
+    print(f"{1000.0 * frames / (end_ms - start_ms):.1f} frames per second")
+
+
+def measure_idle_messages(browser: Browser) -> None:
+    """Pause the window, and print how many messages it sends while nothing changes."""
+    browser.press_keys(" ")
+    time.sleep(PAUSE_S)
+    browser.run_script("window.messages = 0")
+    time.sleep(IDLE_S)
+    print(f"{browser.run_script('return window.messages')} messages in {IDLE_S:g} s while paused")
+
+
+def measure_drags(browser: Browser, drags: int, state: str) -> None:
+    """Print the response times of drags."""
+    times_ms = sorted(browser.driver.execute_async_script(MEASURE_DRAGS, drags))
+    print(
+        f"response to a drag while {state}: median {median(times_ms):.0f} ms, "
+        f"95 % within {times_ms[int(0.95 * len(times_ms))]:.0f} ms, {len(times_ms)} drags"
+    )
+
+
+def parse_arguments() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--robots", type=int, default=50, help="number of robots (default: %(default)s)")
+    parser.add_argument("--size", default="1280x720", help="size of the page, CSS px (default: %(default)s)")
+    parser.add_argument(
+        "--ratio", type=float, default=1.0, help="device pixels per CSS pixel (default: %(default)s)"
+    )
+    parser.add_argument("--drags", type=int, default=60, help="number of drags (default: %(default)s)")
+    parser.add_argument("--screenshots", type=Path, metavar="FOLDER", help="also save a screenshot here")
+    return parser.parse_args()
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--robots", default="50")
-    parser.add_argument("--size", default="1280x720")
-    parser.add_argument("--ratio", type=float, default=1.0)
-    parser.add_argument("--shots")
-    options = parser.parse_args()
-    width, height = map(int, options.size.split("x"))
+    """Serve a window, open it in a browser, and print the measurements."""
+    arguments = parse_arguments()
+    width, height = map(int, arguments.size.split("x"))
     with TemporaryDirectory() as folder:
         browser = Browser(Path(folder) / "profile")
         try:
-            size = {"width": width, "height": height, "deviceScaleFactor": options.ratio}
-            size["mobile"] = width < 500
-            browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-            browser.driver.set_script_timeout(120)
-            begun = time.monotonic()
-            more = "--robots", options.robots, "--start", "uniform", "--folder", folder
-            with serve_window("demo", "rooms", *more) as link:
-                browser.driver.get(link)
-                browser.until(lambda: browser.js("return canvas.width") == round(width * options.ratio))
-                print(f"{time.monotonic() - begun:.1f} s from the command to its first picture")
-                measure(browser, options.shots and Path(options.shots) / f"serve-{width}.png")
-            print("load", *(f"{each:.1f}" for each in os.getloadavg()))
+            browser.resize(width, height, arguments.ratio)
+            browser.driver.set_script_timeout(MAX_SCRIPT_S)
+            start_time = time.monotonic()
+            options = ["--robots", str(arguments.robots), "--start", "uniform", "--folder", folder]
+            with serve_window("demo", "rooms", *options) as link:
+                measure_first_frame(browser, link, round(width * arguments.ratio), start_time)
+                browser.run_script(COUNT_FRAMES_AND_MESSAGES)
+                measure_frame_rate(browser)
+                if arguments.screenshots is not None:
+                    browser.driver.save_screenshot(str(arguments.screenshots / f"serve-{width}.png"))
+                measure_drags(browser, arguments.drags, "running")
+                measure_idle_messages(browser)
+                measure_drags(browser, arguments.drags, "paused")
+                for message in browser.read_console():
+                    print(message)
+            loads = ", ".join(f"{load:.1f}" for load in os.getloadavg())
+            print(f"system load in the last 1, 5 and 15 minutes: {loads}")
         finally:
             browser.driver.quit()
-
-
-def measure(browser: Browser, shot: Path | None) -> None:
-    browser.js(WATCH)
-    time.sleep(2.0)
-    begun = browser.js("window.drawn = 0; return performance.now()")
-    time.sleep(6.0)
-    drawn, ended = browser.js("return [window.drawn, performance.now()]")
-    print(f"{drawn / (ended - begun) * 1e3:.1f} pictures a second")
-    if shot:
-        browser.driver.save_screenshot(str(shot))
-    for state in ("moving", "paused"):
-        if state == "paused":
-            browser.keys(" ")
-            time.sleep(2.5)
-            browser.js("window.came = 0")
-            time.sleep(2.0)
-            print(f"{browser.js('return window.came')} messages in 2 s while nothing changes")
-        waits = sorted(browser.driver.execute_async_script(DRAG))
-        print(
-            f"from a drag to its picture, {state}: median {median(waits):.0f} ms, "
-            f"95 % within {waits[int(0.95 * len(waits))]:.0f} ms, {len(waits)} drags"
-        )
-    for line in browser.complaints():
-        print(line)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,15 @@
-"""Memory of the window during an hour: ``python tests/bench/soak_window.py [minutes] [robots]``.
+"""Measure how the memory of a window grows during an hour of use.
 
-Frames follow each other as fast as they can, each as if a sixtieth of a second had passed; now and then
-something is touched, as people do. Prints the resident memory every few minutes of that time.
+    python tests/bench/soak_window.py --minutes 60 --robots 6
+
+Frames follow each other as fast as possible, but each advances the window by its usual time. Now and then the
+script edits the session as a user would. It prints the resident memory every five minutes of window time.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+import os
 import tempfile
 from pathlib import Path
 
@@ -24,59 +27,96 @@ from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window.window import ViewerWindow
 
-WARM = 10
-"""Minutes until all that is kept is there."""
+MAP_NAME = "rooms"
+LATTICE = 16
+WINDOW_SIZE_PX = (1280, 720)
+WARM_UP_MINUTES = 10
+"""Time until all buffers and caches have their final size."""
+REPORT_INTERVAL_MINUTES = 5
+FRAMES_PER_MINUTE = 60 * FPS
+MEAN_EDIT_INTERVAL_S = 20.0
+EDITS = ("drag", "release", "fail", "revive", "set parameter")
+MIN_WORKING_ROBOTS = 3
+DRAG_AREA_M = ((1.0, 1.0), (11.0, 8.0))
+"""Lower left and upper right corner of the positions to which robots are dragged."""
+BYTES_PER_MB = 1e6
 
 
-def read_memory_mb() -> float:
-    """Return the memory in use, MB."""
+def read_resident_memory() -> float:
+    """Return the resident memory of this process, MB. Works on Linux only."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
+    return pages * os.sysconf("SC_PAGE_SIZE") / BYTES_PER_MB
 
 
-def main(minutes: int, robots: int) -> None:
-    """Use the window for so long, and tell how its memory grows."""
-    rng = np.random.default_rng(0)
-    session = Session(SessionScenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
+def build_presenter(robots: int, folder: Path) -> Presenter:
+    """Build the presenter of a session on the map, with the layers that are shown by default."""
+    scenario = SessionScenario(load_map(MAP_NAME), (ControllerChoice("rapf"),), robots, "uniform")
     layers = {layer.name for layer in build_standard_layers() if layer.is_default}
-    with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
-        # the cost beside it takes no memory here; one a frame would take all of the time
-        viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
-        window = ViewerWindow(viewer, (1280, 720), 1.0)
-        warm = read_memory_mb()
-        for minute in range(1, minutes + 1):
-            for _ in range(60 * FPS):
-                if rng.random() < 1 / (20 * FPS):
-                    touch(viewer, rng)
-                window.run_frame(1.0 / FPS)
-            if minute == WARM:
-                warm = read_memory_mb()
-            if minute % 5 == 0:
-                past = f"{len(session.timeline.history)} moments, {session.timeline.history.thinned} thinned"
-                print(f"{minute:3d} min  {read_memory_mb():7.1f} MB  {past}", flush=True)
-        print(f"grown by {read_memory_mb() - warm:.1f} MB since minute {WARM}")
+    # Costs are computed in this process. Their usual process would have memory of its own.
+    costs = Costs(LATTICE, direct=True)
+    return Presenter(Session(scenario), costs, layers, folder, MAP_NAME)
 
 
-def touch(viewer: Presenter, rng: np.random.Generator) -> None:
-    """Do something that people do, and which leaves the run as long as it is."""
-    numbers = viewer.session.displayed.numbers
+def edit_session(presenter: Presenter, rng: np.random.Generator) -> None:
+    """Edit the session at random, by edits that do not shorten its history."""
+    session = presenter.session
+    numbers = session.displayed.numbers
     number = int(rng.choice(numbers))
+    edit = EDITS[rng.integers(len(EDITS))]
     try:
-        match int(rng.integers(5)):
-            case 0:
-                viewer.session.drag_robot(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
-            case 1:
-                viewer.session.release()
-            case 2 if len(numbers) > 3:
-                viewer.session.fail_robot(number)
-            case 3:
-                for failed in list(viewer.session.timeline.panes[0].setup.failed):
-                    viewer.session.revive_robot(failed)
-            case _:
-                viewer.comparison.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
+        if edit == "drag":
+            x, y = rng.uniform(*DRAG_AREA_M)
+            session.drag_robot(number, (float(x), float(y)))
+        elif edit == "release":
+            session.release()
+        elif edit == "fail" and len(numbers) > MIN_WORKING_ROBOTS:
+            session.fail_robot(number)
+        elif edit == "revive":
+            for failed_number in list(session.timeline.panes[0].setup.failed):
+                session.revive_robot(failed_number)
+        else:
+            presenter.comparison.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
     except RobocovError as error:
-        print(f"refused: {error}")
+        print(f"rejected: {error}")
+
+
+def run_minute(window: ViewerWindow, presenter: Presenter, rng: np.random.Generator) -> None:
+    """Run the frames of a minute, with some edits between them."""
+    edit_probability = 1.0 / (MEAN_EDIT_INTERVAL_S * FPS)
+    for _ in range(FRAMES_PER_MINUTE):
+        if rng.random() < edit_probability:
+            edit_session(presenter, rng)
+        window.run_frame(1.0 / FPS)
+
+
+def main() -> None:
+    """Use a window, and print how its memory grows."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--minutes", type=int, default=60, help="window time, min (default: %(default)s)")
+    parser.add_argument("--robots", type=int, default=6, help="number of robots (default: %(default)s)")
+    arguments = parser.parse_args()
+    rng = np.random.default_rng(0)
+    with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
+        presenter = build_presenter(arguments.robots, Path(folder))
+        window = ViewerWindow(presenter, WINDOW_SIZE_PX, 1.0)
+        initial_memory = read_resident_memory()
+        for minute in range(1, arguments.minutes + 1):
+            run_minute(window, presenter, rng)
+            if minute == WARM_UP_MINUTES:
+                initial_memory = read_resident_memory()
+            if minute % REPORT_INTERVAL_MINUTES == 0:
+                history = presenter.session.timeline.history
+                print(
+                    f"{minute:3d} min  {read_resident_memory():7.1f} MB  "
+                    f"{len(history)} steps, {history.thinned} thinned",
+                    flush=True,
+                )
+        growth = read_resident_memory() - initial_memory
+        since = "after the warm-up" if arguments.minutes > WARM_UP_MINUTES else "since the start"
+        print(f"memory grew by {growth:.1f} MB {since}")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 60, int(sys.argv[2]) if len(sys.argv) > 2 else 6)
+    main()

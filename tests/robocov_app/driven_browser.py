@@ -1,4 +1,4 @@
-"""A real browser without a display, and hands for it."""
+"""A headless browser, and a driver that uses its page."""
 
 import json
 import shutil
@@ -9,11 +9,24 @@ from typing import Any
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
-PATIENCE = 20.0
+MAX_WAIT_S = 20.0
+POLL_INTERVAL_S = 0.03
+MAX_PHONE_WIDTH_PX = 500
+ARGUMENTS = (
+    "headless=new",
+    "no-sandbox",
+    "disable-gpu",
+    "disable-quic",
+    "no-first-run",
+    "hide-scrollbars",
+    "disable-background-networking",
+    "disable-component-update",
+    "disable-sync",
+)
 
 
 class Browser:
-    """A browser on one page, without network."""
+    """A browser with one page and without network access."""
 
     def __init__(self, profile: Path) -> None:
         from selenium import webdriver
@@ -21,85 +34,102 @@ class Browser:
         from selenium.webdriver.chrome.service import Service
 
         options = Options()
-        for word in (
-            *("headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "hide-scrollbars"),
-            *("disable-background-networking", "disable-component-update", "disable-sync"),
-            f"user-data-dir={profile}",
-        ):
-            options.add_argument(f"--{word}")
+        for argument in (*ARGUMENTS, f"user-data-dir={profile}"):
+            options.add_argument(f"--{argument}")
         options.binary_location = CHROMIUM or ""
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=Service(executable_path=DRIVER), options=options)
 
-    def open(self, path: Path, width: int = 1280, height: int = 900, **media: str) -> None:
-        phone = width < 500
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone}
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        self.prefer(**media)
-        self.driver.get(path.as_uri())
-        # what is to be clicked must not move meanwhile
-        self.js("document.documentElement.style.scrollBehavior = 'auto'")
+    def resize(self, width: int, height: int, pixel_ratio: float = 1.0) -> None:
+        """Set the size of the page, CSS px. Narrow pages are those of a phone."""
+        metrics = {
+            "width": width,
+            "height": height,
+            "deviceScaleFactor": pixel_ratio,
+            "mobile": width < MAX_PHONE_WIDTH_PX,
+        }
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
 
-    def prefer(self, medium: str = "", **media: str) -> None:
-        """Say what the reader prefers, as in color_scheme="dark"."""
-        features = [
-            {"name": f"prefers-{name.replace('_', '-')}", "value": value} for name, value in media.items()
-        ]
+    def open_file(self, path: Path, width: int = 1280, height: int = 900, **preferences: str) -> None:
+        """Open a page from a file, with preferences as in `set_preferences`."""
+        self.resize(width, height)
+        self.set_preferences(**preferences)
+        self.driver.get(path.as_uri())
+        # Elements must not move while they are clicked.
+        self.run_script("document.documentElement.style.scrollBehavior = 'auto'")
+
+    def set_preferences(self, medium: str = "", **preferences: str) -> None:
+        """Set the medium and the user's preferences, as in ``color_scheme="dark"``."""
+        features = []
+        for name, value in preferences.items():
+            features.append({"name": f"prefers-{name.replace('_', '-')}", "value": value})
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": medium, "features": features})
 
-    def js(self, script: str, *values: object) -> Any:
+    def run_script(self, script: str, *values: object) -> Any:
+        """Run JavaScript in the page, and return its result."""
         return self.driver.execute_script(script, *values)
 
     def find(self, selector: str) -> Any:
+        """Return the first element that matches a CSS selector."""
         return self.driver.find_element("css selector", selector)
 
-    def all(self, selector: str) -> list[Any]:
+    def find_all(self, selector: str) -> list[Any]:
+        """Return all elements that match a CSS selector."""
         return self.driver.find_elements("css selector", selector)
 
-    def keys(self, *keys: str) -> None:
+    def press_keys(self, *keys: str) -> None:
+        """Press keys one after the other."""
         from selenium.webdriver import ActionChains
 
         ActionChains(self.driver).send_keys(*keys).perform()
 
-    def until(self, condition: Callable[[], object]) -> None:
-        end = time.monotonic() + PATIENCE
+    def wait_until(self, condition: Callable[[], object]) -> None:
+        """Wait until a condition is true."""
+        deadline = time.monotonic() + MAX_WAIT_S
         while not condition():
-            assert time.monotonic() < end, "nothing came of it"
-            time.sleep(0.03)
+            assert time.monotonic() < deadline, f"the condition was not met within {MAX_WAIT_S:g} s"
+            time.sleep(POLL_INTERVAL_S)
 
-    def complaints(self) -> list[str]:
-        return [each["message"] for each in self.driver.get_log("browser")]
+    def read_console(self) -> list[str]:
+        """Return the new messages in the console, such as errors."""
+        return [entry["message"] for entry in self.driver.get_log("browser")]
 
-    def drawn(self) -> list[str]:
-        """Return what is on every canvas of the replay: panes, then curves."""
+    # Replays
+
+    def read_canvases(self) -> list[str]:
+        """Return the image of each canvas of a replay: first panes, then charts."""
         script = (
             "return [...document.querySelectorAll('.robocov-replay .pane > canvas, .robocov-replay .chart')]"
             ".map((canvas) => canvas.toDataURL())"
         )
-        return self.js(script)
+        return self.run_script(script)
 
-    def pixel(self, pane: int, x: float, y: float) -> tuple[int, int, int]:
+    def read_pixel(self, pane: int, x: float, y: float) -> tuple[int, int, int]:
+        """Return the color of a pixel of a pane."""
         script = (
             "const canvas = document.querySelectorAll('.pane > canvas')[arguments[0]];"
             "return [...canvas.getContext('2d').getImageData(arguments[1], arguments[2], 1, 1).data]"
         )
-        red, green, blue, _ = self.js(script, pane, round(x), round(y))
+        red, green, blue, _ = self.run_script(script, pane, round(x), round(y))
         return red, green, blue
 
     @property
     def time(self) -> float:
+        """Displayed time of a replay, s."""
         return float(self.find(".transport input").get_property("value"))
 
     @property
-    def playing(self) -> bool:
+    def is_playing(self) -> bool:
         return self.find(".main").text == "Pause"
 
     def seek(self, seconds: float) -> None:
-        self.js(
+        """Move the slider of a replay to a time."""
+        self.run_script(
             "const slider = document.querySelector('.transport input'); slider.value = arguments[0];"
             "slider.dispatchEvent(new Event('input', {bubbles: true}))",
             seconds,
         )
 
-    def focus_is_in(self, selector: str) -> bool:
-        return bool(self.js(f"return document.activeElement.matches({json.dumps(selector)})"))
+    def has_focus(self, selector: str) -> bool:
+        """Return whether the focused element matches a CSS selector."""
+        return bool(self.run_script(f"return document.activeElement.matches({json.dumps(selector)})"))

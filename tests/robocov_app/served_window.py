@@ -1,4 +1,4 @@
-"""A window that is served by a process of its own."""
+"""A window that a process of its own serves to browsers."""
 
 import os
 import re
@@ -6,6 +6,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+MAX_SHUTDOWN_S = 20.0
 
 
 class Link(str):
@@ -15,13 +17,20 @@ class Link(str):
 
 
 @contextmanager
-def serve_window(command: str, *arguments: str, port: int = 0, **how: object) -> Iterator[Link]:
-    """Serve a window, by default at any free port, and give its link; `how`: more for the process."""
-    call = [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", str(port)]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""}
-    process = subprocess.Popen(call, stdout=subprocess.PIPE, env=environment, text=True, **how)
+def serve_window(command: str, *arguments: str, port: int = 0, **process_options: object) -> Iterator[Link]:
+    """Serve a window until the context ends, and yield its link.
+
+    Port 0 stands for any free port. Further options are passed to `subprocess.Popen`.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", str(port)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""},
+        text=True,
+        **process_options,
+    )
+    assert process.stdout is not None
     try:
-        assert process.stdout is not None
         for line in process.stdout:
             if found := re.search(r"http://\S+", line):
                 link = Link(found[0])
@@ -31,5 +40,5 @@ def serve_window(command: str, *arguments: str, port: int = 0, **how: object) ->
         raise AssertionError("no link was printed")
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(MAX_SHUTDOWN_S)
         process.stdout.close()

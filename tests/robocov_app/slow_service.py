@@ -1,33 +1,39 @@
-"""A service for tests of the worker: doubles numbers, and more."""
+"""A service for tests of workers: it doubles numbers, and can be slow, print, or fail."""
 
 import os
 import time
 
 from robocov.errors import InputError
 
+SLOW_STEPS = 1000
+SLOW_STEP_S = 0.01
+SLEEP_S = 60.0
+
 
 class Doubling:
+    """Doubles numbers. Some words make it misbehave."""
+
     failure_message = "it could not be doubled"
 
     def __init__(self) -> None:
-        self.heard = []
+        self.received = []
 
     def __call__(self, questions, channel):
-        self.heard += questions
+        self.received += questions
         match questions[-1]:
             case "slow":
-                for k in range(1, 1000):
-                    channel.report_progress(k)
-                    time.sleep(0.01)
+                for step in range(1, SLOW_STEPS):
+                    channel.report_progress(step)
+                    time.sleep(SLOW_STEP_S)
                     if channel.get_newer_questions():
                         raise InputError("there is a newer one")
             case "sleep":
-                time.sleep(60)
+                time.sleep(SLEEP_S)
             case "print":
                 print("among the messages")
                 return os.getpid()
-            case "heard":
-                return self.heard
+            case "list received":
+                return self.received
             case "bad":
                 raise InputError("bad: it is")
             case number:

@@ -1,36 +1,53 @@
-"""A reverse proxy that shows a server below a path, as jupyter-server-proxy does; slow, or cut, if wanted."""
+"""A reverse proxy that shows a server below a path, like jupyter-server-proxy. It can be slow or fail."""
 
 import socket
 import time
 from contextlib import suppress
 from socketserver import BaseRequestHandler, ThreadingTCPServer
 from threading import Thread
-from typing import Any
 
 PREFIX = "/user/ada/proxy/8765"
+HEAD_END = b"\r\n\r\n"
+HEAD_BLOCK_BYTES = 1 << 14
+BLOCK_BYTES = 1 << 13
 
 
 class SubPathProxy(ThreadingTCPServer):
+    """A proxy for a server on this machine.
+
+    Parameters
+    ----------
+    port : int
+        Port of the server.
+
+    Attributes
+    ----------
+    bytes_per_s : float
+        Maximum rate of the data from the server; 0 stands for no limit.
+    connections : list of socket
+    """
+
     daemon_threads = True
 
     def __init__(self, port: int) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.behind = port
-        self.rate = 0.0
-        self.lines = list[Any]()
+        self.server_port = port
+        self.bytes_per_s = 0.0
+        self.connections: list[socket.socket] = []
         Thread(target=self.serve_forever, daemon=True).start()
 
-    def link(self, link: str) -> str:
-        """Return where this shows a link of the server behind."""
+    def build_link(self, link: str) -> str:
+        """Return the link at which the proxy shows a link of the server."""
         return f"http://127.0.0.1:{self.server_address[1]}{PREFIX}/?{link.partition('?')[2]}"
 
-    def cut(self) -> None:
-        while self.lines:
+    def close_connections(self) -> None:
+        """Close all connections, as if the network failed."""
+        while self.connections:
             with suppress(OSError):
-                self.lines.pop().shutdown(socket.SHUT_RDWR)
+                self.connections.pop().shutdown(socket.SHUT_RDWR)
 
     def __exit__(self, *_: object) -> None:
-        self.cut()
+        self.close_connections()
         self.shutdown()
         self.server_close()
 
@@ -40,24 +57,26 @@ class _Handler(BaseRequestHandler):
 
     def handle(self) -> None:
         head = b""
-        while b"\r\n\r\n" not in head:
-            if not (more := self.request.recv(1 << 14)):
+        while HEAD_END not in head:
+            block = self.request.recv(HEAD_BLOCK_BYTES)
+            if not block:
                 return
-            head += more
-        kind, path, rest = head.split(b" ", 2)
+            head += block
+        method, path, rest = head.split(b" ", 2)
         if not path.startswith(PREFIX.encode()):
             return
-        with socket.create_connection(("127.0.0.1", self.server.behind)) as behind:
-            self.server.lines += self.request, behind
-            behind.sendall(b" ".join((kind, path.removeprefix(PREFIX.encode()), rest)))
-            Thread(target=self._carry, args=(self.request, behind, False), daemon=True).start()
-            self._carry(behind, self.request, True)
+        with socket.create_connection(("127.0.0.1", self.server.server_port)) as upstream:
+            self.server.connections += [self.request, upstream]
+            upstream.sendall(b" ".join((method, path.removeprefix(PREFIX.encode()), rest)))
+            Thread(target=self._forward, args=(self.request, upstream), daemon=True).start()
+            self._forward(upstream, self.request, is_limited=True)
 
-    def _carry(self, source: socket.socket, to: socket.socket, down: bool) -> None:
+    def _forward(self, source: socket.socket, target: socket.socket, *, is_limited: bool = False) -> None:
+        """Forward data until the source closes its connection."""
         with suppress(OSError):
-            while data := source.recv(1 << 13):
-                if down and self.server.rate:
-                    time.sleep(len(data) / self.server.rate)  # bytes a second
-                to.sendall(data)
+            while data := source.recv(BLOCK_BYTES):
+                if is_limited and self.server.bytes_per_s:
+                    time.sleep(len(data) / self.server.bytes_per_s)
+                target.sendall(data)
         with suppress(OSError):
-            to.shutdown(socket.SHUT_RDWR)
+            target.shutdown(socket.SHUT_RDWR)

@@ -457,17 +457,17 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path, monkeypatch: py
     page = tmp_path / "page.html"
     page.write_text(build_page(results, "A <test> of names"), encoding="utf-8")
     for width in (1280, 390):
-        browser.open(page, width)
-        assert browser.complaints() == []
-        assert browser.js("return performance.getEntriesByType('resource').length") == 0
-        assert browser.js("return document.documentElement.scrollWidth") <= width
-        assert len(browser.all("svg.plot")) == 3
+        browser.open_file(page, width)
+        assert browser.read_console() == []
+        assert browser.run_script("return performance.getEntriesByType('resource').length") == 0
+        assert browser.run_script("return document.documentElement.scrollWidth") <= width
+        assert len(browser.find_all("svg.plot")) == 3
     assert browser.find("h1").text == "A <test> of names"
-    labels = [cell.text for cell in browser.all("#ideal tbody th")][:3]
+    labels = [cell.text for cell in browser.find_all("#ideal tbody th")][:3]
     assert labels == ["RAPF", "LLOYD", "ATLAS"]
-    assert [cell.text for cell in browser.all("#overview tbody th")] == labels
+    assert [cell.text for cell in browser.find_all("#overview tbody th")] == labels
     gaps = [
         float(cell.text.split()[0])
-        for cell in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(5)")
+        for cell in browser.find_all("#ideal .scroll:first-of-type tbody td:nth-child(5)")
     ]
     assert gaps == np.sort(gaps).tolist()

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from clear_pages import assert_all_clear, overlaps
 from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, record_walk
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from page_layout import assert_layout_is_clear, boxes_overlap
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
@@ -44,8 +44,8 @@ def build_curves(*finals):
 )
 def test_no_element_covers_or_cuts_another(environment, size):
     record = record_walk(environment, 6)
-    assert_all_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
-    assert_all_clear(plot_environment(environment, size=size))
+    assert_layout_is_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
+    assert_layout_is_clear(plot_environment(environment, size=size))
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
     records = [record_walk(environment, 4, seed=k) for k in range(count)]
     figure = plot_comparison(records, size=size, mean_distances=[1.0 + k for k in range(count)])
     assert len(figure.axes) == count
-    assert_all_clear(figure)
+    assert_layout_is_clear(figure)
     assert len({(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}) == 1
     sizes = np.array([axes.get_window_extent().size for axes in figure.axes])
     assert np.ptp(sizes, axis=0).max() < 1e-6
@@ -315,7 +315,7 @@ class TestCost:
         arena = axes.get_window_extent()
         for k, box in enumerate(words):
             assert box.x0 > arena.x1 and box.x1 <= size[0] and box.y0 >= 0 and box.y1 <= size[1]
-            assert not any(overlaps(box, other) for other in words[k + 1 :])
+            assert not any(boxes_overlap(box, other) for other in words[k + 1 :])
         heights = [box.y0 for box in words]
         assert np.argsort(heights, kind="stable").tolist() == np.argsort(finals, kind="stable").tolist()
         for text in [*axes.get_xticklabels(), *axes.get_yticklabels(), axes.xaxis.label, axes.yaxis.label]:
@@ -345,7 +345,7 @@ import robocov_app.figures.files, robocov_app.look.curve_styles, robocov_app.rep
 assert "matplotlib" not in sys.modules
 import robocov_app.figures.runs
 sys.path.insert(0, sys.argv[1])
-from clear_pages import assert_all_clear, list_boxes, overlaps
+from page_layout import assert_layout_is_clear, boxes_overlap, measure_extents
 from drawn_run import ROOMS, record_walk
 robocov_app.figures.runs.plot_trajectories(record_walk(ROOMS, 3))
 assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clear_pages import overlaps
 from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, record_walk
+from page_layout import boxes_overlap
 from PIL import Image
 
 from robocov.cost import CoverageCost
@@ -71,7 +71,7 @@ def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
     for k, box in enumerate(extents):
         assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= page.x1 + 1 and box.y1 <= page.y1 + 1
         for other in extents[:k]:
-            assert not overlaps(box, other)
+            assert not boxes_overlap(box, other)
     maps = [axes for axes in figure.axes if not axes.axison]
     assert len(maps) == count
     for axes in maps:
@@ -97,7 +97,7 @@ def test_mean_times_are_next_to_or_below_the_mean_distances(size, count):
     for k, box in enumerate(extents):
         assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1
         for other in extents[:k]:
-            assert not overlaps(box, other)
+            assert not boxes_overlap(box, other)
 
 
 @pytest.mark.parametrize(

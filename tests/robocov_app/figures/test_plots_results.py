@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from clear_pages import assert_all_clear
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from page_layout import assert_layout_is_clear
 
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.final_costs import Sample, plot_final_costs
@@ -90,7 +90,7 @@ def test_labels_have_the_final_median() -> None:
 @pytest.mark.parametrize("size", [(420, 290), (860, 360)])
 def test_bands_and_labels_fit_on_the_page(size) -> None:
     figure = plot_bands(BANDS, size)
-    assert_all_clear(figure)
+    assert_layout_is_clear(figure)
     renderer = figure.canvas.get_renderer()
     for text in figure.axes[0].texts:
         assert text.get_window_extent(renderer).x1 <= figure.bbox.x1 + 0.5

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from clear_pages import assert_all_clear
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import PathPatch
+from page_layout import assert_layout_is_clear
 from PIL import Image
 from shapely import MultiPolygon, Polygon, box
 
@@ -58,7 +58,7 @@ def test_lost_areas_are_on_the_left_and_opened_ones_on_the_right(theme: Any) -> 
     assert not find_marks(after, theme.trajectory)
     said = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"left out: 4 m² were free", "opened: 0.01 m² were solid", "narrowest passage, 0.6 m"} <= said
-    assert_all_clear(figure)
+    assert_layout_is_clear(figure)
 
 
 def test_the_preview_has_title_and_report() -> None:
@@ -106,7 +106,7 @@ def test_all_lines_of_a_long_note_but_the_first_are_indented() -> None:
 def test_texts_and_maps_do_not_overlap(free: Any, lines: int) -> None:
     notes = tuple(f"note {k}: " + "what was taken as something else " * 9 for k in range(lines))
     figure = plot_converted_map(free, notes=notes)
-    assert_all_clear(figure)
+    assert_layout_is_clear(figure)
     words = [text.get_text() for text in figure.texts]
     assert any(word.startswith("and ") and word.endswith(" more lines") for word in words) == (lines > 9)
 

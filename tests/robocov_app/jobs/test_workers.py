@@ -61,8 +61,8 @@ def test_questions_are_answered_by_one_process(worker):
         worker.put(number)
     wait_for(lambda: worker.poll() == 3998)
     assert (worker.is_busy, worker.problem) == (False, "")
-    heard = ask(worker, "heard")
-    assert len(heard) < 1000
+    received = ask(worker, "list received")
+    assert len(received) < 1000
     assert ask(worker, "print") == pid
 
 

@@ -14,7 +14,7 @@ from drawn_pixels import (
 from drawn_run import build_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from written_words import check_glyph, draw_glyphs
+from rendered_text import check_legend_symbol, render_legend_symbols
 
 from robocov.team import Team
 from robocov_app.look.theme import DARK, LIGHT
@@ -99,8 +99,8 @@ def test_viscosity_has_its_own_color_and_legend(theme):
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
     assert measure_least_error(frame, start, theme.forces["viscosity"]) < 25
     assert list_legend_texts(painter, scene) == ["viscosity"]
-    (picture,) = draw_glyphs(find_layer("force_viscosity"), scene, theme)
-    check_glyph(picture, theme, theme.forces["viscosity"])
+    (picture,) = render_legend_symbols(find_layer("force_viscosity"), scene, theme)
+    check_legend_symbol(picture, theme, theme.forces["viscosity"])
 
 
 def test_viscosity_of_robots_out_of_sight_is_left_out():

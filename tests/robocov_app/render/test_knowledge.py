@@ -17,7 +17,7 @@ from drawn_pixels import (
     sample_inside,
 )
 from drawn_run import HALL, ROOMS, SQUARE, build_row_scene, build_scene, record_walk
-from written_words import check_glyph, draw_glyphs, find_words
+from rendered_text import check_legend_symbol, find_text, render_legend_symbols
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
 from robocov_app.look.colors import compute_contrast, mix
@@ -295,7 +295,7 @@ def build_path_scene(*corners, positions=TWO):
 
 
 def find_tags(frame, painter, words, theme=LIGHT):
-    return find_words(frame, words, round(theme.text * painter.scale), theme, theme.final)
+    return find_text(frame, words, round(theme.text * painter.scale), theme, theme.final)
 
 
 class TestCursorPath:
@@ -402,6 +402,6 @@ def test_glyphs_of_the_legend(theme):
         ("sensed", build_sensed_scene(), theme.forces["repulsion_obstacle"]),
         ("path", build_path_scene(), theme.final),
     ):
-        pictures = draw_glyphs(find_layer(layer), scene, theme)
+        pictures = render_legend_symbols(find_layer(layer), scene, theme)
         assert len(pictures) == 1
-        check_glyph(pictures[0], theme, color)
+        check_legend_symbol(pictures[0], theme, color)

@@ -14,7 +14,7 @@ from drawn_pixels import (
     render_layers,
 )
 from drawn_run import SQUARE, build_scene
-from written_words import check_glyph, draw_glyphs, find_words
+from rendered_text import check_legend_symbol, find_text, render_legend_symbols
 
 from robocov.team import Team
 from robocov_app.look.colors import compute_contrast, mix
@@ -29,7 +29,7 @@ def build_failed_scene(failed, positions=TWO, **more):
 
 
 def find_numbers(frame, painter, text, theme=LIGHT):
-    return find_words(frame, text, round(theme.small_text * painter.scale), theme, theme.ink)
+    return find_text(frame, text, round(theme.small_text * painter.scale), theme, theme.ink)
 
 
 def extract_pixels_around(frame, painter, place, radius):
@@ -140,9 +140,9 @@ class TestFailed:
 
     @THEMES
     def test_its_glyph_in_the_legend(self, theme):
-        (picture,) = draw_glyphs(find_layer("failed"), build_failed_scene({3: (4.0, 5.0)}), theme)
-        check_glyph(picture, theme, theme.ink)
-        check_glyph(picture, theme, mix(theme.background, theme.ink, 0.3))
+        (picture,) = render_legend_symbols(find_layer("failed"), build_failed_scene({3: (4.0, 5.0)}), theme)
+        check_legend_symbol(picture, theme, theme.ink)
+        check_legend_symbol(picture, theme, mix(theme.background, theme.ink, 0.3))
 
 
 class TestSelection:

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clear_pages import assert_all_clear
 from drawn_run import HALL, ROOMS, SQUARE, record_walk
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
+from page_layout import assert_layout_is_clear
 
 from robocov.metrics import CostHistory
 from robocov.voronoi import partition
@@ -41,7 +41,7 @@ PARTITION = record_walk(SQUARE, 6)
 def test_no_text_is_covered_or_cut_off(number, theme):
     figure = draw_figure(number, RUNS, PARTITION, theme)
     if number not in (3, 5, 7):
-        assert_all_clear(figure)
+        assert_layout_is_clear(figure)
     assert to_rgb(figure.get_facecolor()) == to_plot_color((LIGHT if theme == "light" else DARK).background)
 
 

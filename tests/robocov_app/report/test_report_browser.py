@@ -98,47 +98,47 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def opened(browser: Browser, page: Path) -> Browser:
-    browser.open(page)
-    browser.complaints()
+    browser.open_file(page)
+    browser.read_console()
     return browser
 
 
 def test_a_page_opens_without_errors_or_requests(browser, page, tmp_path) -> None:
-    browser.open(page)
-    browser.until(lambda: browser.all(".pane"))
-    assert browser.complaints() == []
-    assert browser.js("return performance.getEntriesByType('resource').length") == 0
-    assert [box.text for box in browser.all(".facts strong")] == ["1.500 m", "3.000 m"]
+    browser.open_file(page)
+    browser.wait_until(lambda: browser.find_all(".pane"))
+    assert browser.read_console() == []
+    assert browser.run_script("return performance.getEntriesByType('resource').length") == 0
+    assert [box.text for box in browser.find_all(".facts strong")] == ["1.500 m", "3.000 m"]
     names = "return Object.getOwnPropertyNames(window)"
-    before = browser.js(names)
+    before = browser.run_script(names)
     empty = tmp_path / "empty.html"
     empty.write_text("<!doctype html><p>nothing")
-    browser.open(empty)
-    ours = {name for name in set(before) - set(browser.js(names)) if not name.startswith("se_")}
+    browser.open_file(empty)
+    ours = {name for name in set(before) - set(browser.run_script(names)) if not name.startswith("se_")}
     assert not ours  # no global name but the driver's
 
 
 def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
     opened.seek(0.0)
-    before = opened.drawn()
+    before = opened.read_canvases()
     opened.find(".main").click()
-    assert opened.playing
-    opened.until(lambda: opened.time > 1.0)
+    assert opened.is_playing
+    opened.wait_until(lambda: opened.time > 1.0)
     opened.find(".main").click()
-    opened.until(lambda: not opened.playing)
-    after = opened.drawn()
+    opened.wait_until(lambda: not opened.is_playing)
+    after = opened.read_canvases()
     at = opened.time
     assert len(after) == 3 and all(old != new for old, new in zip(before, after, strict=True))
     time.sleep(0.2)
-    assert opened.time == at and opened.drawn() == after
+    assert opened.time == at and opened.read_canvases() == after
 
 
 def test_it_ends_and_begins_again(opened) -> None:
     assert opened.time == SECONDS  # it shows the end first
     opened.find(".main").click()
-    opened.until(lambda: 0.0 < opened.time < SECONDS)
-    opened.js("const list = document.querySelector('.speed select'); list.value = '16'")
-    opened.until(lambda: not opened.playing)
+    opened.wait_until(lambda: 0.0 < opened.time < SECONDS)
+    opened.run_script("const list = document.querySelector('.speed select'); list.value = '16'")
+    opened.wait_until(lambda: not opened.is_playing)
     assert opened.time == SECONDS
     assert opened.find(".clock").text == "6.0 / 6.0 s"
 
@@ -146,14 +146,14 @@ def test_it_ends_and_begins_again(opened) -> None:
 @pytest.mark.parametrize("seconds", [0.0, 2.4, 6.0])
 def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
     opened.seek(seconds)
-    places = opened.js(
+    places = opened.run_script(
         "return [...document.querySelectorAll('.pane > canvas')].map((c) => [c.width, c.height])"
     )
     for pane, (name, final) in enumerate((("rapf", 1.5), ("rpf", 3.0))):
         record = build_record(controller=name, seed=0, seconds=SECONDS)
         history = build_history(record, final)
         cost = np.interp(seconds, history.time, history.mean_distance)
-        assert float(opened.all(".facts strong")[pane].text.split()[0]) == pytest.approx(cost, abs=2e-3)
+        assert float(opened.find_all(".facts strong")[pane].text.split()[0]) == pytest.approx(cost, abs=2e-3)
         moment = round(seconds * 10)
         width, height = places[pane]
         zoom = min((width - 4) / 16, (height - 4) / 10)
@@ -162,7 +162,7 @@ def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
             row = (height - zoom * 10) / 2 + (10 - y) * zoom
             others = np.hypot(*(record.positions[moment] - (x, y)).T)
             if np.sort(others)[1] * zoom > 24:  # left of its number, where nobody hides it
-                assert opened.pixel(pane, column - 7, row) == LIGHT.final
+                assert opened.read_pixel(pane, column - 7, row) == LIGHT.final
 
 
 def test_a_click_on_the_curves_seeks_to_that_time(opened) -> None:
@@ -180,39 +180,39 @@ def test_a_click_on_the_curves_seeks_to_that_time(opened) -> None:
 def test_everything_can_be_done_with_the_keyboard(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
-    opened.js("document.querySelector('.stage').focus()")
-    scrolled = opened.js("return scrollY")
-    opened.keys(Keys.HOME)
+    opened.run_script("document.querySelector('.stage').focus()")
+    scrolled = opened.run_script("return scrollY")
+    opened.press_keys(Keys.HOME)
     assert opened.time == 0.0
-    opened.keys(Keys.ARROW_RIGHT)
+    opened.press_keys(Keys.ARROW_RIGHT)
     assert opened.time == pytest.approx(0.2)
-    opened.keys(".", ".")
+    opened.press_keys(".", ".")
     assert opened.time == pytest.approx(0.6)
-    opened.keys(Keys.ARROW_LEFT, ",")
+    opened.press_keys(Keys.ARROW_LEFT, ",")
     assert opened.time == pytest.approx(0.2)
-    opened.keys(" ")
-    assert opened.playing
-    opened.until(lambda: opened.time > 0.5)
-    opened.keys(" ")
-    assert not opened.playing
-    opened.keys(Keys.END)
+    opened.press_keys(" ")
+    assert opened.is_playing
+    opened.wait_until(lambda: opened.time > 0.5)
+    opened.press_keys(" ")
+    assert not opened.is_playing
+    opened.press_keys(Keys.END)
     assert opened.time == SECONDS
-    assert opened.js("return scrollY") == scrolled  # the page has stayed where it was
+    assert opened.run_script("return scrollY") == scrolled  # the page has stayed where it was
     # what a list of runs does with keys is its own business
-    opened.js("document.querySelector('.pane select').focus()")
-    opened.keys(".")
+    opened.run_script("document.querySelector('.pane select').focus()")
+    opened.press_keys(".")
     assert opened.time == SECONDS
 
 
 def test_the_focus_is_visible(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
-    opened.keys(Keys.TAB)
-    assert opened.focus_is_in(".skip")
+    opened.press_keys(Keys.TAB)
+    assert opened.has_focus(".skip")
     seen = set()
     for _ in range(45):
-        opened.keys(Keys.TAB)
-        name, outline = opened.js(
+        opened.press_keys(Keys.TAB)
+        name, outline = opened.run_script(
             "const e = document.activeElement; const s = getComputedStyle(e);"
             "return [e.className || e.tagName, s.outlineStyle + ' ' + s.outlineWidth]"
         )
@@ -237,19 +237,21 @@ def test_controls_have_names(opened) -> None:
 def test_the_time_is_announced_only_when_paused(opened) -> None:
     said = "return document.querySelector('.said').textContent"
     opened.seek(3.0)
-    opened.until(lambda: opened.js(said).startswith("At 3.0 s: RAPF: mean distance to the nearest robot"))
-    opened.js(
+    opened.wait_until(
+        lambda: opened.run_script(said).startswith("At 3.0 s: RAPF: mean distance to the nearest robot")
+    )
+    opened.run_script(
         "window.told = 0; new MutationObserver(() => { window.told += 1; })"
         ".observe(document.querySelector('.said'), {childList: true, characterData: true, subtree: true})"
     )
     # by the page itself: on a slow machine it would have ended before a second click came from here
-    opened.js(
+    opened.run_script(
         "const main = document.querySelector('.main'), at = document.querySelector('.transport input');"
         "const stop = () => { if (Number(at.value) < 3.1) { requestAnimationFrame(stop); return; }"
         "window.running = window.told; main.click(); }; main.click(); stop()"
     )
-    opened.until(lambda: opened.js("return window.told") == 1)
-    assert opened.js("return window.running") == 0
+    opened.wait_until(lambda: opened.run_script("return window.told") == 1)
+    assert opened.run_script("return window.running") == 0
     label = opened.find(".pane > canvas").get_attribute("aria-label")
     assert "RAPF" in label and "4 robots" in label and f"{opened.time:.1f} s" in label
 
@@ -258,107 +260,109 @@ def test_panes_are_added_changed_and_removed(opened) -> None:
     add = opened.find(".add")
     add.click()
     add.click()
-    assert len(opened.all(".pane")) == 4 and not add.is_displayed()
-    shown = opened.js("return [...document.querySelectorAll('.pane select')].map((list) => list.value)")
+    assert len(opened.find_all(".pane")) == 4 and not add.is_displayed()
+    shown = opened.run_script(
+        "return [...document.querySelectorAll('.pane select')].map((list) => list.value)"
+    )
     assert sorted(shown) == ["0", "1", "2", "3"]
     opened.seek(3.0)
-    opened.js(
+    opened.run_script(
         "const list = document.querySelector('.pane select'); list.value = '1';"
         "list.dispatchEvent(new Event('change'))"
     )
-    assert opened.time == 3.0 and opened.focus_is_in(".pane select")
+    assert opened.time == 3.0 and opened.has_focus(".pane select")
     for _ in range(3):
         opened.find(".remove").click()
-    assert len(opened.all(".pane")) == 1 and not opened.all(".pane .remove")
-    assert opened.complaints() == []
+    assert len(opened.find_all(".pane")) == 1 and not opened.find_all(".pane .remove")
+    assert opened.read_console() == []
 
 
 def test_a_picture_opens_large_and_the_focus_comes_back(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
-    opened.js("document.querySelectorAll('.thumbnails button')[2].focus()")
-    opened.keys(Keys.ENTER)
+    opened.run_script("document.querySelectorAll('.thumbnails button')[2].focus()")
+    opened.press_keys(Keys.ENTER)
     dialog = opened.find("dialog")
-    opened.until(dialog.is_displayed)
-    assert opened.focus_is_in("dialog .remove")
+    opened.wait_until(dialog.is_displayed)
+    assert opened.has_focus("dialog .remove")
     title = opened.find("dialog h2").text
     drawn = "return document.querySelector('dialog canvas').toDataURL()"
-    before = opened.js(drawn)
+    before = opened.run_script(drawn)
     assert opened.find("dialog canvas").size["width"] > 600
-    opened.keys(Keys.ARROW_LEFT)
-    assert opened.find("dialog h2").text != title and opened.js(drawn) != before
+    opened.press_keys(Keys.ARROW_LEFT)
+    assert opened.find("dialog h2").text != title and opened.run_script(drawn) != before
     assert "Mean distance 3.000 m after 6.0 s." in opened.find("dialog .facts").text
-    opened.keys(Keys.ESCAPE)
-    opened.until(lambda: not dialog.is_displayed())
-    assert opened.js("return document.activeElement.dataset.run") == "2"
+    opened.press_keys(Keys.ESCAPE)
+    opened.wait_until(lambda: not dialog.is_displayed())
+    assert opened.run_script("return document.activeElement.dataset.run") == "2"
 
 
 def test_a_large_picture_can_be_watched(opened) -> None:
-    opened.js("document.querySelectorAll('.thumbnails button')[3].click()")
+    opened.run_script("document.querySelectorAll('.thumbnails button')[3].click()")
     opened.find(".watch-run").click()
-    opened.until(lambda: len(opened.all(".pane")) == 3)
-    assert opened.focus_is_in(".stage") and not opened.find("dialog").is_displayed()
-    assert opened.all(".pane select")[2].get_property("value") == "3"
+    opened.wait_until(lambda: len(opened.find_all(".pane")) == 3)
+    assert opened.has_focus(".stage") and not opened.find("dialog").is_displayed()
+    assert opened.find_all(".pane select")[2].get_property("value") == "3"
 
 
 @pytest.mark.parametrize(("scheme", "theme"), [("light", LIGHT), ("dark", DARK)])
 def test_light_and_dark_follow_the_reader_and_can_be_read(browser, page, scheme, theme) -> None:
-    browser.open(page, color_scheme=scheme)
-    ground = browser.js("return getComputedStyle(document.documentElement).backgroundColor")
+    browser.open_file(page, color_scheme=scheme)
+    ground = browser.run_script("return getComputedStyle(document.documentElement).backgroundColor")
     assert ground == f"rgb({', '.join(map(str, theme.background))})"
-    looked, bad = browser.js(READABLE)
+    looked, bad = browser.run_script(READABLE)
     assert looked > 150 and bad == []
     # a reader who changes the preference sees it at once, in what is drawn as well
     other = {"light": "dark", "dark": "light"}[scheme]
-    before = browser.drawn()
-    browser.prefer(color_scheme=other)
-    browser.until(lambda: browser.drawn() != before)
+    before = browser.read_canvases()
+    browser.set_preferences(color_scheme=other)
+    browser.wait_until(lambda: browser.read_canvases() != before)
 
 
 def test_it_prints_without_controls(browser, page) -> None:
-    browser.open(page, color_scheme="dark")
+    browser.open_file(page, color_scheme="dark")
     pdf = browser.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     content = base64.b64decode(pdf["data"])
     assert (
         content.startswith(b"%PDF")
         and 1 <= content.count(b"/Type /Page\n") + content.count(b"/Type /Page ") <= 12
     )
-    browser.prefer("print", color_scheme="dark")
-    shown = browser.js(
+    browser.set_preferences("print", color_scheme="dark")
+    shown = browser.run_script(
         "return ['.live', '.stills', 'nav', '.keys']"
         ".map((name) => document.querySelector(name).checkVisibility())"
     )
     assert shown == [False, True, False, False]
-    looked, bad = browser.js(READABLE)
+    looked, bad = browser.run_script(READABLE)
     assert looked > 100 and bad == []
-    browser.prefer()
+    browser.set_preferences()
 
 
 @pytest.mark.parametrize("width", [360, 390, 768, 1920])
 def test_no_element_overflows_at_any_width(browser, page, width) -> None:
-    browser.open(page, width, 844)
-    browser.until(lambda: browser.all(".pane"))
-    assert browser.js("return document.documentElement.scrollWidth") <= width
-    browser.js("document.querySelector('.thumbnails button').click()")
-    inside = browser.js(
+    browser.open_file(page, width, 844)
+    browser.wait_until(lambda: browser.find_all(".pane"))
+    assert browser.run_script("return document.documentElement.scrollWidth") <= width
+    browser.run_script("document.querySelector('.thumbnails button').click()")
+    inside = browser.run_script(
         "const box = document.querySelector('dialog').getBoundingClientRect();"
         "const canvas = document.querySelector('dialog canvas').getBoundingClientRect();"
         "return [box.left, box.right, canvas.left - box.left, box.right - canvas.right]"
     )
     assert inside[0] >= 0 and inside[1] <= width and inside[2] >= 0 and inside[3] >= 0
-    assert browser.complaints() == []
+    assert browser.read_console() == []
 
 
 def test_reduced_motion_is_respected(browser, page) -> None:
-    browser.open(page, reduced_motion="reduce")
-    browser.js(
+    browser.open_file(page, reduced_motion="reduce")
+    browser.run_script(
         "window.seen = new Set(); const slider = document.querySelector('.transport input');"
         "const look = () => { window.seen.add(slider.value); requestAnimationFrame(look); }; look()"
     )
     browser.seek(0.0)
     browser.find(".main").click()
-    browser.until(lambda: browser.time == SECONDS)
-    assert 3 <= browser.js("return window.seen.size") <= 8
+    browser.wait_until(lambda: browser.time == SECONDS)
+    assert 3 <= browser.run_script("return window.seen.size") <= 8
 
 
 def test_hostile_names_have_no_effect(browser, tmp_path) -> None:
@@ -368,10 +372,10 @@ def test_hostile_names_have_no_effect(browser, tmp_path) -> None:
         build_report([build_recorded_result(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html,
         encoding="utf-8",
     )
-    browser.open(path)
+    browser.open_file(path)
     browser.find(".add").click()
-    browser.js("document.querySelector('.thumbnails button').click()")
-    assert browser.complaints() == [] and not browser.all("img")
+    browser.run_script("document.querySelector('.thumbnails button').click()")
+    assert browser.read_console() == [] and not browser.find_all("img")
     assert browser.find("dialog h2").text.startswith("</script>")
 
 
@@ -382,16 +386,18 @@ def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
     path.write_text(
         f'<!doctype html><meta charset="utf-8"><body data-jp-theme-light="false">{cells}', "utf-8"
     )
-    browser.open(path)
-    assert browser.complaints() == []
-    assert [each.text for each in browser.all(".head strong")] == ["run 0", "run 1"]
-    ground = browser.js("return getComputedStyle(document.querySelector('.robocov-replay')).backgroundColor")
+    browser.open_file(path)
+    assert browser.read_console() == []
+    assert [each.text for each in browser.find_all(".head strong")] == ["run 0", "run 1"]
+    ground = browser.run_script(
+        "return getComputedStyle(document.querySelector('.robocov-replay')).backgroundColor"
+    )
     assert ground == f"rgb({', '.join(map(str, DARK.background))})"
-    before = browser.drawn()
+    before = browser.read_canvases()
     browser.seek(0.0)
-    after = browser.drawn()
+    after = browser.read_canvases()
     assert before[0] != after[0] and before[2:] == after[2:]  # only the first one went back
-    assert not browser.all(".chart")[0].is_displayed()  # without a cost there are no curves
+    assert not browser.find_all(".chart")[0].is_displayed()  # without a cost there are no curves
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5, 40])
@@ -404,7 +410,7 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
         "const [region, places] = arguments;"
         "return Array.from({length: places.length / 2}, (_, i) => cellOf(region, places, i))"
     )
-    cells = browser.js(script, ROOMS.region.vertices.ravel().tolist(), places.ravel().tolist())
+    cells = browser.run_script(script, ROOMS.region.vertices.ravel().tolist(), places.ravel().tolist())
     wanted = partition(places, ROOMS.region)
     for cell, mass in zip(cells, wanted.mass, strict=True):
         x, y = np.array(cell).reshape(-1, 2).T
@@ -419,7 +425,7 @@ def test_obstacles_have_their_positions_in_the_run(browser, repeat) -> None:
     (mover,) = embed_map(replace(ROOMS, obstacles=(cart,)))["movingObstacles"]
     mover["line"] = [0.001 * value for value in mover["line"]]
     for seconds in (0.0, 1.0, 4.5, 7.3, 20.0, 1234.5):
-        shift = browser.js(read_asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
+        shift = browser.run_script(read_asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
         assert shift == pytest.approx(path.compute_displacement(seconds).tolist(), abs=1e-6)
 
 
@@ -428,8 +434,8 @@ def test_robots_that_fail_are_crossed_out_and_late_robots_appear(browser, tmp_pa
     page = tmp_path / "replay.html"
     run = ReplayRun(record, build_history(record, 2.0), "a run")
     page.write_text(f"<!doctype html><main>{build_replay_html([run])}</main>", encoding="utf-8")
-    browser.open(page)
-    browser.until(lambda: browser.all(".chart"))
+    browser.open_file(page)
+    browser.wait_until(lambda: browser.find_all(".chart"))
     notes = []
     for seconds in (1.0, 3.0, 5.0):
         browser.seek(seconds)
@@ -441,10 +447,10 @@ def test_robots_that_fail_are_crossed_out_and_late_robots_appear(browser, tmp_pa
         + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
     )
     data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, include_goals=True)
-    states, said = browser.js(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
+    states, said = browser.run_script(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
     assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
     assert said == ["robot 2 fails", "robot 3 joins"]
-    assert browser.complaints() == []
+    assert browser.read_console() == []
 
 
 def test_labels_of_curves_have_the_positions_of_figures(browser) -> None:
@@ -452,7 +458,9 @@ def test_labels_of_curves_have_the_positions_of_figures(browser) -> None:
     rng = np.random.default_rng(2)
     for count in (1, 2, 4, 7, 12):
         heights = rng.uniform(0.0, 120.0, count).tolist()
-        assert browser.js(script, heights, 15, 0, 150) == pytest.approx(spread_labels(heights, 15, 0, 150))
+        assert browser.run_script(script, heights, 15, 0, 150) == pytest.approx(
+            spread_labels(heights, 15, 0, 150)
+        )
 
 
 @pytest.mark.parametrize(
@@ -460,7 +468,9 @@ def test_labels_of_curves_have_the_positions_of_figures(browser) -> None:
 )
 def test_axes_of_curves_are_those_of_figures(browser, low, high) -> None:
     script = read_asset("arena.js") + read_asset("chart.js") + "return limitsOf(...arguments)"
-    limits = browser.js(script, [{"end": 4.0, "range": {"low": low, "high": high}}], embed_axis_rules())
+    limits = browser.run_script(
+        script, [{"end": 4.0, "range": {"low": low, "high": high}}], embed_axis_rules()
+    )
     assert (limits["low"], limits["high"]) == pytest.approx(choose_value_limits(low, high))
     assert limits["end"] == 4.0
 
@@ -477,7 +487,7 @@ def test_the_page_has_the_hues_of_the_data(browser, robots) -> None:
     )
     moments = [0, 1, data["count"] // 2, data["count"] - 1]
     times = [min(moment * data["step"], data["end"]) for moment in moments]
-    shown = browser.js(script, {**data, "plan": embed_map(record.environment)}, times)
+    shown = browser.run_script(script, {**data, "plan": embed_map(record.environment)}, times)
     assert shown == list_hues(data["hues"], moments)
 
 
@@ -496,7 +506,7 @@ ULP = float(np.spacing(2.0))
 )
 def test_ticks_are_few_whatever_they_span(browser, low, high, wanted) -> None:
     script = read_asset("arena.js") + read_asset("chart.js") + "return roundTicks(...arguments)"
-    assert browser.js(script, low, high, 5, TICK_FACTORS) == pytest.approx(wanted)
+    assert browser.run_script(script, low, high, 5, TICK_FACTORS) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("values", [(2.0, 2.0 + ULP), (2.0, 2.0), (-0.0, 0.0), (1e-3, 1e300), (np.nan, 2.0)])
@@ -508,10 +518,10 @@ def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
         result.loaded[folder] = saved._replace(history=replace(saved.history, mean_distance=distance))
     path = tmp_path / "page.html"
     path.write_text(build_report([result]).html, encoding="utf-8")
-    browser.open(path)
-    browser.until(lambda: browser.all(".pane"))
+    browser.open_file(path)
+    browser.wait_until(lambda: browser.find_all(".pane"))
     browser.seek(1.0)
-    assert browser.complaints() == [] and len(browser.drawn()) == 3
+    assert browser.read_console() == [] and len(browser.read_canvases()) == 3
 
 
 @pytest.mark.parametrize("width", [390, 1280])
@@ -535,17 +545,17 @@ def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
     result = replace(result, runs=(*result.runs, failed), damaged_runs=(DamagedRun(name, name),))
     path = tmp_path / "names.html"
     path.write_text(build_report([result], title=name).html, encoding="utf-8")
-    browser.open(path, width, 844)
-    browser.until(lambda: browser.all(".pane"))
-    browser.js("for (const details of document.querySelectorAll('details')) details.open = true")
-    outside = browser.js(
+    browser.open_file(path, width, 844)
+    browser.wait_until(lambda: browser.find_all(".pane"))
+    browser.run_script("for (const details of document.querySelectorAll('details')) details.open = true")
+    outside = browser.run_script(
         "return [...document.body.querySelectorAll('*')].filter((e) => e.checkVisibility()"
         " && !e.closest('.scroll, .skip') && !e.matches('option'))"
         ".filter((e) => { const { left, right } = e.getBoundingClientRect();"
         " return left < -1 || right > innerWidth + 1; }).map((e) => e.outerHTML.slice(0, 80))"
     )
-    assert outside == [] and browser.js("return document.documentElement.scrollWidth") <= width
+    assert outside == [] and browser.run_script("return document.documentElement.scrollWidth") <= width
     assert browser.find("h1 .cut").get_attribute("title") == name
     assert browser.find("h1").text == f"{name[:27]}…{name[:12]}"
-    browser.js("document.querySelector('.thumbnails button').click()")
-    assert browser.js("return document.querySelector('dialog').scrollWidth") <= width
+    browser.run_script("document.querySelector('.thumbnails button').click()")
+    assert browser.run_script("return document.querySelector('dialog').scrollWidth") <= width

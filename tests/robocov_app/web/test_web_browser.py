@@ -32,7 +32,7 @@ def browser(tmp_path_factory):
 def blank(browser):
     """Leave the page of a test before, which would look for its window."""
     browser.driver.get("about:blank")
-    browser.complaints()
+    browser.read_console()
 
 
 def set_size(browser, width, height, ratio=1.0):
@@ -41,11 +41,11 @@ def set_size(browser, width, height, ratio=1.0):
 
 
 def get_canvas_size(browser):
-    return browser.js("const it = document.querySelector('canvas'); return [it.width, it.height]")
+    return browser.run_script("const it = document.querySelector('canvas'); return [it.width, it.height]")
 
 
 def read_picture(browser):
-    return browser.js("return document.querySelector('canvas').toDataURL()")
+    return browser.run_script("return document.querySelector('canvas').toDataURL()")
 
 
 def wait_for_rest(browser):
@@ -55,41 +55,41 @@ def wait_for_rest(browser):
     def is_same():
         before = seen[0]
         seen[0] = read_picture(browser)
-        return before == seen[0] and browser.js("return work.then(() => true)")
+        return before == seen[0] and browser.run_script("return work.then(() => true)")
 
-    browser.until(is_same)
+    browser.wait_until(is_same)
     return seen[0]
 
 
 def test_the_demo_follows_hands_page_and_colors(browser, tmp_path):
     set_size(browser, 1280, 720)
-    browser.prefer(color_scheme="light")
+    browser.set_preferences(color_scheme="light")
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
-        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         assert "token" not in browser.driver.current_url
         begun = wait_for_rest(browser)
         mouse = {"button": "left", "buttons": 1, "clickCount": 1}
         for kind, x in (("mousePressed", 60), ("mouseMoved", 160), ("mouseReleased", 160)):
             event = {"type": kind, "x": x, "y": 240, **mouse}
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
-        browser.until(lambda: read_picture(browser) != begun)
+        browser.wait_until(lambda: read_picture(browser) != begun)
         panned = wait_for_rest(browser)
-        browser.keys("f")
-        browser.until(lambda: read_picture(browser) != panned)
-        browser.keys("/")  # the palette, without the letter
-        browser.keys("seed 7")
+        browser.press_keys("f")
+        browser.wait_until(lambda: read_picture(browser) != panned)
+        browser.press_keys("/")  # the palette, without the letter
+        browser.press_keys("seed 7")
         typed = wait_for_rest(browser)
-        browser.keys("\ue007")
-        browser.until(lambda: read_picture(browser) != typed)
+        browser.press_keys("\ue007")
+        browser.wait_until(lambda: read_picture(browser) != typed)
         set_size(browser, 390, 844, 3.0)
-        browser.until(lambda: get_canvas_size(browser) == [1170, 2532])
+        browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
         light = wait_for_rest(browser)
-        browser.prefer(color_scheme="dark")
-        browser.until(lambda: read_picture(browser) != light)
+        browser.set_preferences(color_scheme="dark")
+        browser.wait_until(lambda: read_picture(browser) != light)
         browser.driver.refresh()  # the cookie is enough
-        browser.until(lambda: get_canvas_size(browser) == [1170, 2532])
-        assert not browser.complaints()
+        browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
+        assert not browser.read_console()
 
 
 def press_with_control(browser, key, command=""):
@@ -107,76 +107,82 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
     (tmp_path / "files").mkdir()
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
         browser.driver.get(link)
-        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         begun = wait_for_rest(browser)
         upload = (
             "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
             "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
         )
-        browser.js(upload, (MAPS / "trap.json").read_text())
-        browser.until(lambda: read_picture(browser) != begun)
-        assert not browser.all("#saved a"), "what was dropped has not been saved"
+        browser.run_script(upload, (MAPS / "trap.json").read_text())
+        browser.wait_until(lambda: read_picture(browser) != begun)
+        assert not browser.find_all("#saved a"), "what was dropped has not been saved"
         wait_for_rest(browser)
         press_with_control(browser, "s")
-        browser.until(lambda: browser.all("#saved a"))
+        browser.wait_until(lambda: browser.find_all("#saved a"))
         assert browser.find("#saved").get_property("open")
         browser.find("#saved a").click()
-        browser.until(lambda: list((tmp_path / "down").glob("*.robocov")))
+        browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))
         teacher = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
         browser.driver.get(link)
-        browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
-        assert browser.js("return document.body.className") == "watching"
-        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(
+            lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
+        )
+        assert browser.run_script("return document.body.className") == "watching"
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         browser.find("summary").click()
-        browser.js("prompt = () => 'Ada'")
-        browser.all("#here button")[1].click()
-        browser.until(lambda: "Ada (you)" in browser.find("#here ul").text)
+        browser.run_script("prompt = () => 'Ada'")
+        browser.find_all("#here button")[1].click()
+        browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
         browser.find("#here button").click()  # a second window of the teacher's takes control
-        browser.until(lambda: browser.js("return document.body.className") == "")
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
-        browser.until(lambda: browser.js("return document.body.className") == "")
-        assert not browser.complaints()
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
+        assert not browser.read_console()
 
 
 def record_messages(browser):
     """Let the page keep what it tells; the result returns that, and forgets it."""
-    browser.js("window.kept = []; const tells = tell; tell = (one) => { kept.push(one); tells(one); }")
-    return lambda: [each for each in browser.js("return kept.splice(0)") if each["kind"] != "shown"]
+    browser.run_script(
+        "window.kept = []; const tells = tell; tell = (one) => { kept.push(one); tells(one); }"
+    )
+    return lambda: [each for each in browser.run_script("return kept.splice(0)") if each["kind"] != "shown"]
 
 
 def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_path):
     set_size(browser, 1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
-        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         assert not browser.find("#toast").is_displayed()
         projector = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
         set_size(browser, 390, 844, 2.0)
         browser.driver.get(link)
-        browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
-        browser.js("tell({kind: 'control', to: 0})")
+        browser.wait_until(
+            lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
+        )
+        browser.run_script("tell({kind: 'control', to: 0})")
         phone = browser.driver.current_window_handle
         browser.driver.switch_to.window(projector)
-        browser.until(lambda: browser.find("#toast").is_displayed())
+        browser.wait_until(lambda: browser.find("#toast").is_displayed())
         assert "asks for control" in browser.find("#toast").text
-        later = browser.all("#toast button")[1]
-        hand_over = browser.all("#toast button")[0]
+        later = browser.find_all("#toast button")[1]
+        hand_over = browser.find_all("#toast button")[0]
         assert (hand_over.text, later.text) == ("Hand over", "Later")
         hand_over.click()
-        browser.until(lambda: browser.js("return document.body.className") == "watching")
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "watching")
         assert not browser.find("#toast").is_displayed()
         browser.driver.switch_to.window(phone)
-        browser.until(lambda: browser.js("return document.body.className") == "")
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
         assert get_canvas_size(browser) == [1280, 720], "the projector keeps its size"
-        assert browser.js("return canvas.getBoundingClientRect().width") <= 390
-        browser.keys("w")
-        browser.until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
+        assert browser.run_script("return canvas.getBoundingClientRect().width") <= 390
+        browser.press_keys("w")
+        browser.wait_until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
         browser.driver.close()
         browser.driver.switch_to.window(projector)
-        assert not browser.complaints()
+        assert not browser.read_console()
 
 
 def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(browser, tmp_path):
@@ -185,28 +191,28 @@ def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(b
         serve_window("demo", "rooms", "--folder", str(tmp_path)) as link,
         SubPathProxy(urlsplit(link).port) as proxy,
     ):
-        browser.driver.get(proxy.link(link))
-        browser.until(lambda: get_canvas_size(browser) == [900, 600])
+        browser.driver.get(proxy.build_link(link))
+        browser.wait_until(lambda: get_canvas_size(browser) == [900, 600])
         assert urlsplit(browser.driver.current_url).path == PREFIX + "/"
-        proxy.cut()
-        browser.until(lambda: "Connection lost" in browser.find("#note").text)
-        browser.until(lambda: browser.find("#note").text == "")
-        assert browser.js("return controls")
+        proxy.close_connections()
+        browser.wait_until(lambda: "Connection lost" in browser.find("#note").text)
+        browser.wait_until(lambda: browser.find("#note").text == "")
+        assert browser.run_script("return controls")
         browser.driver.refresh()
-        browser.until(lambda: get_canvas_size(browser) == [900, 600])
+        browser.wait_until(lambda: get_canvas_size(browser) == [900, 600])
         # a slow line misses pictures, and nothing that is done
-        browser.js("window.seen = 0; const shows = show; show = (...all) => (seen++, shows(...all))")
-        proxy.rate = 20_000.0
+        browser.run_script("window.seen = 0; const shows = show; show = (...all) => (seen++, shows(...all))")
+        proxy.bytes_per_s = 20_000.0
         time.sleep(1.0)
-        before = browser.js("return seen")
+        before = browser.run_script("return seen")
         time.sleep(2.0)
-        assert browser.js("return seen") - before < 30
-        browser.keys(" " * 9)  # which pauses in the end
+        assert browser.run_script("return seen") - before < 30
+        browser.press_keys(" " * 9)  # which pauses in the end
         time.sleep(1.0)
-        proxy.rate = 0.0
+        proxy.bytes_per_s = 0.0
         still = wait_for_rest(browser)
-        browser.keys(" ")
-        browser.until(lambda: read_picture(browser) != still)
+        browser.press_keys(" ")
+        browser.wait_until(lambda: read_picture(browser) != still)
 
 
 def test_text_is_pasted_once_and_copied(browser, tmp_path):
@@ -216,7 +222,7 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         origin = link.partition("/?")[0]
         browser.driver.execute_cdp_cmd("Browser.grantPermissions", {"origin": origin, **allowed})
         browser.driver.get(link)
-        browser.until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         wait_for_rest(browser)
 
         put = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
@@ -227,19 +233,19 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         press_with_control(browser, "a")
         press_with_control(browser, "v", "paste")
         wait_for_rest(browser)
-        browser.keys("!")
+        browser.press_keys("!")
         press_with_control(browser, "a")
         press_with_control(browser, "c", "copy")
         copied = "navigator.clipboard.readText().then(arguments[0])"
-        browser.until(lambda: browser.driver.execute_async_script(copied) == "Große Halle!")
+        browser.wait_until(lambda: browser.driver.execute_async_script(copied) == "Große Halle!")
         for press in (
-            lambda: browser.keys("\ue007"),
+            lambda: browser.press_keys("\ue007"),
             lambda: press_with_control(browser, "s"),
-            lambda: browser.keys("\ue007"),
+            lambda: browser.press_keys("\ue007"),
         ):
             press()
             wait_for_rest(browser)
-        browser.until(lambda: list(tmp_path.glob("*.json")))
+        browser.wait_until(lambda: list(tmp_path.glob("*.json")))
         assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle!"
         press_with_control(browser, "z")  # what is not saved does not keep a process that is to stop
         wait_for_rest(browser)
@@ -252,13 +258,21 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
         set_size(browser, 390, 844, 3.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
-            browser.until(lambda: get_canvas_size(browser) == [1170, 2400])
+            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2400])
             narrow = wait_for_rest(browser)
             box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
-            assert browser.js(f"{box} return [box.left, box.top, box.width, box.height]") == [0, 0, 390, 800]
-            assert browser.js("return document.getElementById('touch').getBoundingClientRect().top") == 800
+            assert browser.run_script(f"{box} return [box.left, box.top, box.width, box.height]") == [
+                0,
+                0,
+                390,
+                800,
+            ]
+            assert (
+                browser.run_script("return document.getElementById('touch').getBoundingClientRect().top")
+                == 800
+            )
             browser.find("[data-key=h]").click()
-            browser.until(lambda: read_picture(browser) != narrow)
+            browser.wait_until(lambda: read_picture(browser) != narrow)
             told = record_messages(browser)
 
             def touch(*moments):
@@ -281,6 +295,6 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
             pinch = touch(*([(50 - 4 * k, 300), (70 + 4 * k, 300)] for k in range(8)))
             assert pinch[0] == pinch[-1] == ("button", 3, 60)
             assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
-            assert browser.complaints() == []
+            assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})

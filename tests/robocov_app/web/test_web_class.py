@@ -94,7 +94,7 @@ def note(browser):
 
 
 def is_shown(browser):
-    return browser.js("return canvas.width > 500 && note.textContent === ''")
+    return browser.run_script("return canvas.width > 500 && note.textContent === ''")
 
 
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and its driver")
@@ -114,7 +114,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
             browser.driver.switch_to.new_window("tab")
             browser.driver.get(watch_link)
             pupil = browser.driver.current_window_handle
-            wait_until(lambda: is_shown(browser) and not browser.js("return controls"))
+            wait_until(lambda: is_shown(browser) and not browser.run_script("return controls"))
             with Watchers(watch_link, 59, (0.0, 0.05, 0.3)) as others:
                 wait_until(lambda: all(others.n_frames))
                 with Watchers(watch_link, 40, (0.0,)) as crowd:
@@ -130,10 +130,10 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
                     browser.driver.switch_to.window(teacher)
                     for _ in range(3):
                         browser.driver.refresh()
-                        wait_until(lambda: is_shown(browser) and browser.js("return controls"))
+                        wait_until(lambda: is_shown(browser) and browser.run_script("return controls"))
                 assert others.n_lost == 0
                 before = list(others.n_frames)
-                browser.keys(TAB, DELETE)  # selects robot 1, and removes it
+                browser.press_keys(TAB, DELETE)  # selects robot 1, and removes it
                 wait_until(lambda: all(b > a for a, b in zip(before, others.n_frames, strict=True)))
                 wait_until(
                     lambda: any(
@@ -153,10 +153,10 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
             wait_until(lambda: is_shown(browser))
             with Watchers(watch_link_of(link), 60, (0.0, 0.05, 0.3)) as others:
                 wait_until(lambda: all(others.n_frames))
-                browser.keys(ENTER)  # Recover
+                browser.press_keys(ENTER)  # Recover
                 time.sleep(1.0)
                 script = "for (const down of [true, false]) tell({kind: 'key', key: 's', down, held: 2})"
-                browser.js(script)
+                browser.run_script(script)
                 wait_until(lambda: list(folder.glob("*.robocov")))
                 assert others.n_lost == 0
     finally:

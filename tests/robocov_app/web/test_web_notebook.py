@@ -53,10 +53,10 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
     try:
         browser.driver.get(f"http://localhost:{site.server_address[1]}/cell.html")
         browser.driver.switch_to.frame(0)
-        browser.until(lambda: browser.js("return canvas.width") > 500)
+        browser.wait_until(lambda: browser.run_script("return canvas.width") > 500)
         pictures = "const seen = canvas.toDataURL(); return seen"
-        before = browser.js(pictures)
-        browser.until(lambda: browser.js(pictures) != before)
+        before = browser.run_script(pictures)
+        browser.wait_until(lambda: browser.run_script(pictures) != before)
     finally:
         browser.driver.quit()
         site.shutdown()
