@@ -15,10 +15,9 @@ shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
-The oracle, whose robots decide together, and `atlas-shared`, whose robots read the maps of others directly,
-receive the observations of all robots. This checks that they know no more than the robots have measured, but
-not the limits of communication. Otherwise the rows of all other robots contain placeholders: positions drawn
-by the verifier, no velocity, no obstacle, an empty scan.
+The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
+an empty scan. Only the oracle, whose robots decide together, receives the observations of all robots. This
+checks that it knows no more than the robots have measured and the map, but not the limits of communication.
 """
 
 from __future__ import annotations

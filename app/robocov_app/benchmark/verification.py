@@ -47,8 +47,6 @@ NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
 """The probability of missing changed rows is reported for one row, and for this fraction of all rows."""
-_READING_SHARED_MAPS = ("atlas-shared",)
-"""Controllers whose robots read the maps of others directly, without messages."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run and are not compared."""
 _DESCRIBED = ("label", "information", "gains")
@@ -205,8 +203,7 @@ class Verification:
             teams = format_count(self.teams, "team")
             yield (
                 f"Decisions of {teams} repeated in processes that receive the observations of all robots, "
-                "because the robots read the maps of others, or decide together: limits of communication are "
-                "not checked."
+                "because the robots decide together: limits of communication are not checked."
             )
 
     def _describe_new_maps(self, comparison: NewMapComparison) -> str:
@@ -281,7 +278,7 @@ def verify_result(
     new_tasks = _index_new_tasks(rated, new_maps)
     checker = _RunChecker(
         information=description["information"],
-        is_joint=rated.controller == ORACLE or reads_shared_maps(rated.controller),
+        is_joint=rated.controller == ORACLE,
         robots=options.robots,
         seed=seed,
     )
@@ -302,22 +299,6 @@ def verify_result(
         verification.differences += _describe_comparison(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
     return verification
-
-
-def reads_shared_maps(controller: str) -> bool:
-    """Return whether a controller reads the maps of other robots directly, without messages.
-
-    Parameters
-    ----------
-    controller : str
-        Name of the controller.
-
-    Returns
-    -------
-    bool
-        False for controllers of users, whose robots have to send messages.
-    """
-    return controller in _READING_SHARED_MAPS
 
 
 def _create_generator(seed: int, *stream: int) -> np.random.Generator:

@@ -55,8 +55,6 @@ COARSE = {
     "adaptive": {"basis": 3.0},
     **{name: {"nodes": 100.0, "period": 0.4} for name in SHARING},
 }
-READING_MAPS = ("atlas-shared",)
-"""Controllers whose robots read the maps of others without messages."""
 MAX_ROBOTS = {"atlas": 12, "atlas-shared": 12, **dict.fromkeys(SHARING, 3)}
 """Teams of controllers that plan are small here, because these are slow."""
 ALL_CONTROLLERS = [
@@ -122,48 +120,29 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
     for step in range(3):
         seen = sample_observations(positions, reach, seed + step)
         seen = replace(seen, time=step * 0.2, scans=sample_scans(controller, n, rng))
-        is_source = np.arange(n) == i
-        if controller.name in READING_MAPS:
-            is_source = find_connected(seen.neighbors, i)
-        changed = change_others(seen, i, is_source, reach, rng)
+        changed = change_others(seen, i, reach, rng)
         decision = controller.decide(seen, memory)
         changed_decision = controller.decide(changed, changed_memory)
         for expected, actual in zip(extract_row(decision, i), extract_row(changed_decision, i), strict=True):
             assert expected.tobytes() == actual.tobytes()
         memory = decision.memory
         changed_memory = changed_decision.memory
-        # A robot that comes into range could pass on what only it has heard before.
-        if controller.name not in READING_MAPS:
-            positions = positions + rng.uniform(-0.05, 0.05, size=(n, 2))
+        positions = positions + rng.uniform(-0.05, 0.05, size=(n, 2))
 
 
-def find_connected(neighbors: Neighbors, i: int) -> np.ndarray:
-    """Return from which robots information may have reached robot i, directly or through others."""
-    is_connected = np.zeros(neighbors.robot_count, dtype=bool)
-    pending = [i]
-    while pending:
-        k = pending.pop()
-        if not is_connected[k]:
-            is_connected[k] = True
-            pending += neighbors.list_neighbors(k).tolist()
-    return is_connected
-
-
-def change_others(
-    seen: Observations, i: int, is_source: np.ndarray, reach: float, rng: np.random.Generator
-) -> Observations:
-    """Return observations in which everything is changed that neither robot i nor its sources know."""
+def change_others(seen: Observations, i: int, reach: float, rng: np.random.Generator) -> Observations:
+    """Return observations in which everything is changed that robot i does not know."""
     n = len(seen.positions)
     positions = seen.positions
-    is_neighbor = is_source.copy()
+    is_neighbor = np.arange(n) == i
     is_neighbor[seen.neighbors.list_neighbors(i)] = True
     moved = positions.copy()
-    strangers = np.flatnonzero(~is_source & ~is_neighbor)
+    strangers = np.flatnonzero(~is_neighbor)
     for k in strangers:
         position = rng.uniform((0, -1), (12, 10))
-        if REGION.contains(position) and np.hypot(*(position - positions[is_source]).T).min() > reach:
+        if REGION.contains(position) and np.hypot(*(position - positions[i])) > reach:
             moved[k] = position
-    is_other = ~is_source[:, None]
+    is_other = np.arange(n)[:, None] != i
     neighbors = Neighbors.from_ranges(moved, np.full(n, reach))
     assert np.array_equal(neighbors.list_neighbors(i), seen.neighbors.list_neighbors(i))
     changed = replace(

@@ -32,7 +32,6 @@ from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import (
     Verification,
     VerificationOptions,
-    reads_shared_maps,
     verify_result,
 )
 from robocov_app.sweep.tasks import Task, generate_tasks
@@ -189,11 +188,7 @@ def test_robots_of_built_in_controllers_decide_by_their_own_observations(control
     assert isolate(controller, track, robot=2) is None
 
 
-SHARING = [
-    name
-    for name, kind in CONTROLLERS.items()
-    if kind.information == "shared map" and not reads_shared_maps(name)
-]
+SHARING = [name for name, kind in CONTROLLERS.items() if kind.information == "shared map"]
 
 
 @pytest.mark.slow
@@ -212,9 +207,8 @@ def test_robots_that_share_maps_decide_by_their_own_observations(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", ["atlas-shared", ORACLE])
-def test_teams_that_decide_together_use_only_the_observations_of_the_team(controller: str) -> None:
-    assert isolate(controller, "short-range", robot=None) is None
+def test_robots_of_the_oracle_decide_by_the_observations_of_the_team() -> None:
+    assert isolate(ORACLE, "short-range", robot=None) is None
 
 
 def test_a_robot_does_not_receive_what_others_know() -> None:
