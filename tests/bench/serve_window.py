@@ -47,30 +47,33 @@ MEASURE_DRAGS = """
 const drags = arguments[0];
 const done = arguments[1];
 const timeout = 2000;
+const x = 80;  // right of the tools, and left of the map
 const y = 300;
 const times = [];
 const pause = (duration) => new Promise((then) => setTimeout(then, duration));
-const post = (type, x, buttons) => canvas.dispatchEvent(new PointerEvent(type, {
-  clientX: x, clientY: y, buttons, button: type === 'pointermove' ? -1 : 0, pointerId: 1, bubbles: true}));
+const post = (type, dx, buttons) => canvas.dispatchEvent(new PointerEvent(type, {
+  clientX: x + dx, clientY: y, pointerId: 1, bubbles: true,
+  buttons, button: type === 'pointermove' ? -1 : 0}));
 canvas.setPointerCapture = () => {};
 const findWall = () => {  // left wall of the map in the row of the drag
   const row = context.getImageData(0, Math.round(y * devicePixelRatio), canvas.width, 1).data;
-  for (let x = 0; x < canvas.width; x++) if (row[4 * x] < 110) return x;
+  const first = Math.round(x * devicePixelRatio);
+  for (let column = first; column < canvas.width; column++) if (row[4 * column] < 110) return column;
 };
 (async () => {
-  post('pointerdown', 10, 1);
+  post('pointerdown', 0, 1);
   for (let k = 1; k <= drags; k++) {
     await pause(150 + 20 * Math.random());
     const wall = findWall();
     const start = performance.now();
-    post('pointermove', 10 + (k % 2 ? 6 : 0), 1);
+    post('pointermove', k % 2 ? 6 : 0, 1);
     while (findWall() === wall && performance.now() - start < timeout) {
       const frames = window.frames;
       while (window.frames === frames && performance.now() - start < timeout) await pause(1);
     }
     times.push(performance.now() - start);
   }
-  post('pointerup', 10, 0);
+  post('pointerup', 0, 0);
   done(times);
 })();
 """

@@ -50,8 +50,9 @@ class Cost:
     @property
     def share(self) -> float:
         """Return how much of its budget it took, 1 is all of it."""
-        seconds, megabytes = READ if self.read else REFUSED
-        return max(self.seconds / seconds, self.megabytes / megabytes)
+        limits = READ if self.read else REFUSED
+        max_seconds, max_megabytes = limits
+        return max(self.seconds / max_seconds, self.megabytes / max_megabytes)
 
 
 def build_star(

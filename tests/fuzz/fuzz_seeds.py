@@ -433,10 +433,10 @@ def _build_indoor_feature(kind: str, geometry: Any, number: str = "1", **propert
     }
 
 
-def _build_indoor_area(*sides: float) -> dict[str, Any]:
-    x, y, right, top = (side * 1e-5 for side in sides)
-    ring = [(x, y), (right, y), (right, top), (x, top), (x, y)]
-    return {"type": "Polygon", "coordinates": [[[8.4 + a, 49.0 + b] for a, b in ring]]}
+def _build_indoor_area(left: float, bottom: float, right: float, top: float) -> dict[str, Any]:
+    """Return a rectangle in degrees, given its sides in 1e-5 degrees from a corner of the building."""
+    ring = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
+    return {"type": "Polygon", "coordinates": [[[8.4 + x * 1e-5, 49.0 + y * 1e-5] for x, y in ring]]}
 
 
 _OPENING = {"type": "LineString", "coordinates": [[8.40001, 49.0001], [8.40003, 49.0001]]}

@@ -110,8 +110,8 @@ class BruteForce:
                 self._link_if_visible(p, v)
 
     def _build_node(self, p: tuple[float, ...]) -> Node:
-        x, y = (Fraction(c) * self.scale for c in p)
-        return int(x), int(y)
+        x, y = p
+        return int(Fraction(x) * self.scale), int(Fraction(y) * self.scale)
 
     def _is_clear(self, v: Node, w: Node) -> bool:
         """Return whether the open segment vw meets no vertex and crosses no wall."""

@@ -65,8 +65,8 @@ def list_texts(report: RobotReport) -> list[str]:
 
 
 def get_line(report: RobotReport, kind: str) -> ReportLine:
-    (found,) = (line for line in report.lines if line.kind == kind)
-    return found
+    (line,) = [line for line in report.lines if line.kind == kind]
+    return line
 
 
 def assert_forces_sum_up(report: RobotReport) -> None:

@@ -166,7 +166,8 @@ class TestDistances:
 
     @pytest.mark.slow
     def test_a_coarse_lattice_is_replaced_by_one_that_can_be_drawn(self):
-        coarse, fine = (CoverageCost(ROOMS, n)(RUN.positions[-1]) for n in (16, 256))
+        coarse = CoverageCost(ROOMS, 16)(RUN.positions[-1])
+        fine = CoverageCost(ROOMS, 256)(RUN.positions[-1])
         words = [text.get_text() for text in coarse.plot().figure.texts]
         # the picture is the finer one's, the figure the result's own
         assert f"5 robots, mean distance {coarse.mean_distance:.3f} m" in words

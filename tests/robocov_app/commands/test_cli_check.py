@@ -149,7 +149,8 @@ def read_until(stream: int, expected: bytes, seconds: float = 30.0) -> bytes:
 @pytest.mark.parametrize("terminal", [False, True])
 @pytest.mark.slow
 def test_watching_from_outside(file: Path, terminal: bool) -> None:
-    reader, writer = pty.openpty() if terminal else os.pipe()
+    open_pair = pty.openpty if terminal else os.pipe
+    reader, writer = open_pair()
     process = subprocess.Popen(
         [*COMMAND, "check", "--watch", str(file)], stdout=writer, stderr=subprocess.PIPE, text=True
     )

@@ -28,7 +28,9 @@ def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: 
     ):
         options = (*SHORT, "--frames", "--fps", "2", "--film-speed", "1", "--out", str(tmp_path / name))
         assert main([*words, *options, *more]) == 0
-    plain, bare, warm = (read_frames(tmp_path / name) for name in ("plain", "bare", "warm"))
+    plain = read_frames(tmp_path / "plain")
+    bare = read_frames(tmp_path / "bare")
+    warm = read_frames(tmp_path / "warm")
     assert len(plain) == len(bare) == len(warm) >= 3
     # tints of cells are many colors; without them the page is mostly white, with distances mostly blue
     assert (bare[0] == 255).all(axis=2).mean() > (plain[0] == 255).all(axis=2).mean() + 0.2

@@ -291,7 +291,9 @@ def test_records_of_large_teams_are_thinned(
     assert "the record has one step in 3" in capsys.readouterr().out
     monkeypatch.setattr(options, "MAX_DEFAULT_RECORD_ROWS", 30.0)
     assert main([*words, "--out", str(tmp_path / "few")]) == 0
-    whole, some, few = (Record.load(tmp_path / name) for name in ("all", "some", "few"))
+    whole = Record.load(tmp_path / "all")
+    some = Record.load(tmp_path / "some")
+    few = Record.load(tmp_path / "few")
     assert [len(each.time) for each in (whole, some, few)] == [31, 11, 11]
     for thin in (some, few):
         np.testing.assert_array_equal(thin.positions, whole.positions[::3])

@@ -22,7 +22,8 @@ def count_pixels(
     picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, int], distance: int
 ) -> int:
     """Return the number of pixels of a color around a pixel."""
-    x, y = (round(value) for value in at)
+    x = round(at[0])
+    y = round(at[1])
     part = picture[y - distance : y + distance + 1, x - distance : x + distance + 1]
     return int((np.abs(part - np.array(color)).max(axis=2) < 40).sum())
 
@@ -119,7 +120,9 @@ def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) 
         before = driver.copy_frame()
         driver.type("3")
         after = driver.copy_frame()
-        x, y = (round(value) for value in driver.find_pixel((6, 5)))
+        pixel_x, pixel_y = driver.find_pixel((6, 5))
+        x = round(pixel_x)
+        y = round(pixel_y)
         assert np.abs(after - before)[y + 10 : y + 45, x + 10 : x + 100].max() > 60
         # guides: an angle of 90° from the last corner
         assert any(guide.kind == "angle" for guide in driver.editor.tool.guides)

@@ -153,15 +153,17 @@ def get_dialog(driver: EditorDriver) -> tuple[ImportDialog, Any]:
 
 
 def get_pixel(driver: EditorDriver, point: Any) -> tuple[int, ...]:
-    x, y = (round(value) for value in point)
-    return tuple(driver.window.screen.get_at((x, y)))[:3]
+    x, y = point
+    return tuple(driver.window.screen.get_at((round(x), round(y))))[:3]
 
 
 def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDriver) -> None:
     import_dialog, widgets = get_dialog(driver)
     driver.click(*widgets["button:clicks:color"].rect.center)
     import_dialog, widgets = get_dialog(driver)
-    before, after = (camera.to_pixels(np.array(RUG)) for camera in import_dialog.preview.cameras)
+    camera_before, camera_after = import_dialog.preview.cameras
+    before = camera_before.to_pixels(np.array(RUG))
+    after = camera_after.to_pixels(np.array(RUG))
     assert get_pixel(driver, before) == (224, 224, 255)
     solid = get_pixel(driver, after)
     driver.click(*before.tolist())

@@ -28,8 +28,9 @@ def driver(tmp_path: Path) -> Iterator[EditorDriver]:
 
 def find_handle_pixel(driver: EditorDriver, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
     """Return the pixel of a handle."""
-    (found,) = (each for each in driver.editor.handles if each.kind == kind and each.side == side)
-    return driver.find_pixel(found.position)
+    handles = driver.editor.handles
+    (position,) = [handle.position for handle in handles if handle.kind == kind and handle.side == side]
+    return driver.find_pixel(position)
 
 
 def test_a_click_selects_shift_toggles_and_the_floor_clears(driver: EditorDriver) -> None:

@@ -120,7 +120,7 @@ def test_only_changes_are_redrawn() -> None:
 def test_lifted_obstacles_are_not_on_the_page() -> None:
     sketch = build_sheet(*SHAPES)
     at = build_view()
-    x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
+    x, y = np.rint(at.camera.to_pixels(np.array([7.0, 6.5]))).astype(int).tolist()
     page = Sheet()
     assert page.draw(at, sketch).get_at((x, y))[:3] == LIGHT.obstacle
     assert page.draw(at, sketch, frozenset({1})).get_at((x, y))[:3] != LIGHT.obstacle

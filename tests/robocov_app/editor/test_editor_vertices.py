@@ -265,7 +265,7 @@ def test_a_wall_is_extended_split_and_joined(sketch):
     assert before.sketch.get_item(2).shape.points[0] == (6.0, 0.0)
     assert before.selection == select_vertices(Vertex(2, 0, 0))
     halves = vertices.split_wall(longer.sketch, Vertex(2, 0, 1))
-    first, second = (halves.sketch.get_item(key).shape for key in sorted(halves.selection.items))
+    first, second = [halves.sketch.get_item(key).shape for key in sorted(halves.selection.items)]
     assert first.points == ((6.0, 1.0), (9.0, 1.0))
     assert second.points == ((9.0, 1.0), (9.0, 3.0), (11.0, 3.0))
     assert first.name == second.name == "west"

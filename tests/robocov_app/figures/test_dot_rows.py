@@ -38,7 +38,8 @@ def test_rows_and_headings_do_not_overlap(groups: list[tuple[str, int]]) -> None
 
 
 def test_a_page_is_as_high_as_its_rows() -> None:
-    low, high = (create_axes(rows).figure.bbox.height for rows in (2.0, 7.0))
+    low = create_axes(2.0).figure.bbox.height
+    high = create_axes(7.0).figure.bbox.height
     assert high - low == pytest.approx(5 * 30, abs=1.5)
 
 

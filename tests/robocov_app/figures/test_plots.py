@@ -127,7 +127,8 @@ class TestTrajectories:
         last = partition(record.positions[-1], ROOMS.region).centroid
         for _ in range(60):
             last = partition(last, ROOMS.region).centroid
-        positions, goals = (np.concatenate([past, last[None]]) for past in (record.positions, record.goals))
+        positions = np.concatenate([record.positions, last[None]])
+        goals = np.concatenate([record.goals, last[None]])
         arrived = replace(record, positions=positions, goals=goals)
         axes = plot_trajectories(arrived).axes[0]
         marks = next(line for line in axes.lines if line.get_marker() == "+")
@@ -234,7 +235,8 @@ class TestText:
         "draw", [plot_trajectories, lambda record, size: plot_comparison([record] * 3, size=size)]
     )
     def test_it_grows_with_the_page(self, draw):
-        small, large = (draw(record_walk(ROOMS, 3), size=size) for size in ((960, 640), (2880, 1920)))
+        small = draw(record_walk(ROOMS, 3), size=(960, 640))
+        large = draw(record_walk(ROOMS, 3), size=(2880, 1920))
         assert min(self.heights(large)) == pytest.approx(3 * min(self.heights(small)), rel=0.35)
 
     def test_a_comparison_is_read_when_it_is_shown_at_half_its_size(self):

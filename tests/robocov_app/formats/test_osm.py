@@ -53,8 +53,10 @@ class Extract:
     def text(self, half: tuple[float, float] | None = (40.0, 30.0)) -> str:
         bounds = ""
         if half is not None:
-            (west, _), (east, _) = (PLANE(x, 0, inverse=True) for x in (-half[0], half[0]))
-            (_, south), (_, north) = (PLANE(0, y, inverse=True) for y in (-half[1], half[1]))
+            west, _ = PLANE(-half[0], 0, inverse=True)
+            east, _ = PLANE(half[0], 0, inverse=True)
+            _, south = PLANE(0, -half[1], inverse=True)
+            _, north = PLANE(0, half[1], inverse=True)
             sides = {"minlat": south, "minlon": west, "maxlat": north, "maxlon": east}
             given = " ".join(f"{key}='{value:.9f}'" for key, value in sides.items())
             bounds = f"<bounds {given}/>\n"

@@ -204,7 +204,8 @@ def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
     text = TILES.format("").replace('firstgid="1" ', "")
     (tmp_path / "far.tsx").write_text(text)
     (folder / "near.tsx").write_text(text)
-    near, far = (f'<tileset firstgid="1" source="{name}"/>' for name in ("near.tsx", "../far.tsx"))
+    near = '<tileset firstgid="1" source="near.tsx"/>'
+    far = '<tileset firstgid="1" source="../far.tsx"/>'
     assert are_equal(compute_obstacles(read(folder, near, build_tiles("a"))), WALLS)
     with pytest.raises(
         MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected a"

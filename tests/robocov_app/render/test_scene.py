@@ -36,7 +36,9 @@ def record() -> Record:
 
 
 def test_a_scene_has_working_and_failed_robots_and_obstacles(record: Record) -> None:
-    first, later, last = (build_record_scene(record, row) for row in (0, 12, 30))
+    first = build_record_scene(record, 0)
+    later = build_record_scene(record, 12)
+    last = build_record_scene(record, 30)
     assert first.numbers == (1, 2, 4)
     assert first.failed == {}
     assert later.numbers == (1, 4)

@@ -77,13 +77,11 @@ def test_all_goals_are_met():
     }
     for name, goal in found.items():
         # that none of twelve maps shows a contact, or all of them rest, is no proof of either
-        words, verdict = ("met", "holds") if name not in ("contacts", "rest") else (UNSURE, "undecided")
-        assert (is_goal_met(goal), describe_goal(goal), goal.verdict, goal.question) == (
-            True,
-            words,
-            verdict,
-            GOALS,
-        )
+        is_sure = name not in ("contacts", "rest")
+        assert is_goal_met(goal)
+        assert describe_goal(goal) == ("met" if is_sure else UNSURE)
+        assert goal.verdict == ("holds" if is_sure else "undecided")
+        assert goal.question == GOALS
 
 
 @pytest.mark.parametrize(
@@ -219,10 +217,9 @@ def test_knowing_the_density_helps_or_does_not():
 def test_cells_by_time_help_or_do_not(controller):
     keys = [law.key for law in TEAMS if law.controller == controller]
     assert keys == [f"{controller}-distance", f"{controller}-time"]
-    better, worse = (
-        judge_teams(build_level_outcomes(dict(zip(keys, times, strict=True)), "time"), controller)
-        for times in ((2.0, 1.5), (1.5, 2.0))
-    )
+    by_distance, by_time = keys
+    better = judge_teams(build_level_outcomes({by_distance: 2.0, by_time: 1.5}, "time"), controller)
+    worse = judge_teams(build_level_outcomes({by_distance: 1.5, by_time: 2.0}, "time"), controller)
     assert better.verdict == "holds" and "2 s with cells by distance, 1.5 s by time" in better.explanation
     assert worse.verdict == "does not hold"
 

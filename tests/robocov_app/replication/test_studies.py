@@ -120,11 +120,11 @@ class TestMaps:
     def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):
         assert not set(plan.tuning) & set(plan.generated)
         assert plan.tuning_seed not in plan.seeds
-        tuned, tested = (
-            {each.environment.obstacles for each in among}
-            for among in (study_maps.build_generated_maps(plan.tuning), study_maps.build_claim_maps(plan))
-        )
-        assert not tuned & tested
+        tuning_maps = study_maps.build_generated_maps(plan.tuning)
+        tuning_obstacles = {study_map.environment.obstacles for study_map in tuning_maps}
+        claim_maps = study_maps.build_claim_maps(plan)
+        claim_obstacles = {study_map.environment.obstacles for study_map in claim_maps}
+        assert not tuning_obstacles & claim_obstacles
         # a claim on gains is judged on these maps; regrets need two starts
         assert len(plan.tuning) >= MIN_MAPS and len(plan.tuning_starts) >= 2
 
@@ -264,16 +264,16 @@ class TestBeyond:
 
     def test_who_knows_the_density_begins_where_the_other_does(self):
         contests = studies.build_beyond_contests(QUICK, {}, UNTUNED)
-        known, ignored = (generate_tasks(contests[name].study) for name in ("density", "density-ignored"))
+        known = generate_tasks(contests["density"].study)
+        ignored = generate_tasks(contests["density-ignored"].study)
         for with_, without in zip(known, ignored, strict=True):
             assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
             assert with_.document != without.document
 
     def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
         tasks = list(generate_tasks(studies.build_beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
-        by_distance, by_time = (
-            [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
-        )
+        by_distance = [task for task in tasks if task.gains["cells"] == "distance"]
+        by_time = [task for task in tasks if task.gains["cells"] == "time"]
         assert len(by_distance) == len(by_time) > 0
         for one, other in zip(by_distance, by_time, strict=True):
             assert {**one.gains, "cells": "time"} == other.gains

@@ -142,10 +142,11 @@ class TestRuns:
         alone = parts.run_beyond(folder, TINY, build_options(), None)
         assert [path.stat().st_mtime_ns for path in rows] == before
         assert again.contenders == paper.contenders and again.references == paper.references
-        first, second = (judge_paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
-        assert format_claims(first) == format_claims(second)
-        first, second = (judge_beyond_claims(of) for of in (beyond, alone))
-        assert format_claims(first) == format_claims(second)
+        paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.gains)
+        assert format_claims(judge_paper_claims(again.convex, again.claims, again.gains)) == format_claims(
+            paper_claims
+        )
+        assert format_claims(judge_beyond_claims(alone)) == format_claims(judge_beyond_claims(beyond))
 
     def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
         out = tmp_path / "out"
@@ -258,7 +259,8 @@ class TestBeyond:
 
     def test_mixed_teams_are_judged_by_time(self, beyond):
         for law in TEAMS:
-            seconds, meters = (beyond.teams.get_values(law.key, measure) for measure in ("time", "final"))
+            seconds = beyond.teams.get_values(law.key, "time")
+            meters = beyond.teams.get_values(law.key, "final")
             assert (seconds > meters).all() and (seconds < 4.0 * meters + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
@@ -648,7 +650,8 @@ class TestCommand:
         found = json.loads((out / "claims.json").read_text())
         assert answer["claims"] == found and answer["runs"] == study[2].runs + 8
         assert [claim["key"] for claim in found] == [claim.key for claim in judge_beyond_claims(study[2])]
-        page, front = ((out / name).read_text(encoding="utf-8") for name in ("beyond.html", "index.html"))
+        page = (out / "beyond.html").read_text(encoding="utf-8")
+        front = (out / "index.html").read_text(encoding="utf-8")
         assert 'href="index.html"' in page and 'href="beyond.html"' in front
         assert "Without --beyond-only, the claims are tested, too" in front
         for claim in found:

@@ -101,7 +101,6 @@ def test_many_dots_become_one_path() -> None:
 
 def test_the_same_figure_gives_the_same_bytes() -> None:
     band = Band("RAPF", STYLES["rapf"], TIME, np.outer([1, 2, 3], TIME))
-    once, again = (
-        inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x") for _ in range(2)
-    )
+    once = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
+    again = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
     assert once == again

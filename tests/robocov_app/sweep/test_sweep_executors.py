@@ -153,7 +153,7 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
         "crashes.py": f"controller {names['crashes.py']!r}: its process ended "
         "(killed by signal 11 (SIGSEGV))",
     }
-    (crashed,) = (task.name for task in generate_tasks(study) if "crashes.py" in task.controller)
+    (crashed,) = [task.name for task in generate_tasks(study) if "crashes.py" in task.controller]
     assert b"crashes.py" in outcomes[crashed].files["error.json"], "the last output names the file"
 
 

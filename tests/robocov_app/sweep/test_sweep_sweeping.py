@@ -154,7 +154,9 @@ def test_damaged_and_removed_runs_are_repeated_and_reported(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     sweep(study, tmp_path, quiet=True)
-    first, second, *_ = (tmp_path / "runs" / task.name for task in generate_tasks(study))
+    folders = [tmp_path / "runs" / task.name for task in generate_tasks(study)]
+    first = folders[0]
+    second = folders[1]
     (first / "cost.csv").write_bytes((first / "cost.csv").read_bytes().replace(b"1", b"2", 1))
     for path in second.iterdir():
         path.unlink()

@@ -102,7 +102,8 @@ def test_every_key_exists_in_pygame(commands: list[Command]) -> None:
     for key in (key for command in commands for key in command.keys):
         # The key "+" is written behind the plus signs that join the modifiers.
         is_plus = key == "+" or key.endswith("++")
-        *modifiers, name = [*key[:-1].split("+"), "+"] if is_plus else key.split("+")
+        parts = [*key[:-1].split("+"), "+"] if is_plus else key.split("+")
+        *modifiers, name = parts
         assert {modifier for modifier in modifiers if modifier} <= {"ctrl", "alt", "shift"}
         code = KEYS.get(name) or pygame.key.key_code(name)
         assert pygame.key.name(code) == name

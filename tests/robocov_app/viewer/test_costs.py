@@ -216,7 +216,7 @@ def test_travel_time_of_robots_with_speeds():
     costs.set_environment(HALL)
     costs.request(0, 1.0, POSITIONS)
     costs.request(1, 1.0, POSITIONS, speeds=speeds)
-    without, timed = (known for _, known in costs.poll())
+    (_, without), (_, timed) = costs.poll()
     assert without.travel_time is None
     assert timed.travel_time == CoverageCost(HALL, 32)(POSITIONS, speeds).mean_time
     # The distance is still that to the nearest robot.

@@ -26,7 +26,7 @@ from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 def test_a_robot_stuck_in_the_trap(controller, reason):
     trap = load_map("trap")
     reports = explain_run(Simulation(trap, controller, trap.start("inside").sample(3, seed=0)), 40.0)
-    (stuck,) = (report for report in reports if "stuck" in report.verdict)
+    (stuck,) = [report for report in reports if "stuck" in report.verdict]
     assert stuck.title == "Robot 3"
     assert re.fullmatch(r"at rest, stuck: its centroid is 1\.\d m away, behind an obstacle", stuck.verdict)
     assert reason in list_texts(stuck)

@@ -118,13 +118,11 @@ def test_each_of_four_panes_shows_its_cost(
             assert any(value in text for text in drawn_texts), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
-        low, high = (
-            driver.window.canvas.to_pixel((0.0, y), 0)[1]
-            for y in driver.session.displayed.environment.region.bounds[1::2]
-        )
+        bounds = driver.session.displayed.environment.region.bounds
+        _, low = driver.window.canvas.to_pixel((0.0, bounds[1]), 0)
+        _, high = driver.window.canvas.to_pixel((0.0, bounds[3]), 0)
         origin = driver.window.canvas.to_pixel((0.0, 0.0), 0)
         pixels_per_m = driver.window.canvas.to_pixel((1.0, 0.0), 0)[0] - origin[0]
-        bounds = driver.session.displayed.environment.region.bounds
         map_width = pixels_per_m * (bounds[2] - bounds[0])
         assert low - high > 0.65 * boxes[0][3] or map_width > 0.85 * boxes[0][2]
         left, _, width, _ = driver.window.layout.chart

@@ -613,7 +613,8 @@ def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, m
     monkeypatch.setattr("robocov_app.web.pages.MAX_CONTROL_PAGES", 2)
     cookie = read_cookie(display)
     with ExitStack() as stack:
-        first, second = (stack.enter_context(open_socket(display, Cookie=cookie)) for _ in range(2))
+        first = stack.enter_context(open_socket(display, Cookie=cookie))
+        second = stack.enter_context(open_socket(display, Cookie=cookie))
         read_message(first)
         third = stack.enter_context(open_socket(display, Cookie=cookie))
         assert close_reason(second)[0] == 4001  # the first one controls

@@ -58,7 +58,9 @@ class FakeServer(VisitorServer):
         self._windows[visitor].idle_since -= seconds
 
 
-ADA, BEN, CLEO = (letter * 24 for letter in "abc")
+ADA = 24 * "a"
+BEN = 24 * "b"
+CLEO = 24 * "c"
 
 
 def test_a_visitor_comes_back_to_their_window(tmp_path):
