@@ -1,8 +1,9 @@
-"""Measure what files that are hard to import cost: each in a process of its own.
+"""Measure the time and the memory of importing files that are hard to import.
 
     python tests/fuzz/budgets.py [NAME ...]
 
-prints a table of CPU seconds, of MB beside what the process has before, and of what came of each file.
+The table contains the processor time, the additional memory and the outcome of each file. Each file is
+imported in a process of its own.
 """
 
 import argparse
@@ -20,37 +21,41 @@ from typing import Any
 import numpy as np
 
 REFUSED = (1.0, 200.0)
-"""Limits of a rejected file: CPU seconds, MB."""
+"""Limits of a rejected file: processor time in s, memory in MB."""
 
 READ = (10.0, 500.0)
-"""And one that is read."""
+"""Limits of a file that is read."""
+
+MAX_CPU_S = 300.0
+"""Processor time after which an import is ended."""
+MAX_ERROR_CHARS = 300
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What an import cost.
+    """Cost of an import.
 
     Attributes
     ----------
     seconds : float, s
-        Of a processor.
+        Processor time.
     megabytes : float, MB
-        By which the peak of the memory grew.
-    said : str
-        Why it was refused, or how many vertices the map has.
-    read : bool
-        Whether the file could be read. (That no robot fits into what it shows is known only then.)
+        Increase of the peak memory.
+    outcome : str
+        Reason of a refusal, or number of vertices of the map.
+    is_read : bool
+        Whether the file was read. Maps without space for a robot are refused only after that.
     """
 
     seconds: float
     megabytes: float
-    said: str
-    read: bool
+    outcome: str
+    is_read: bool
 
     @property
     def share(self) -> float:
-        """Return how much of its budget it took, 1 is all of it."""
-        limits = READ if self.read else REFUSED
+        """Fraction of the budget that was used."""
+        limits = READ if self.is_read else REFUSED
         max_seconds, max_megabytes = limits
         return max(self.seconds / max_seconds, self.megabytes / max_megabytes)
 
@@ -58,7 +63,7 @@ class Cost:
 def build_star(
     points: int, x: float = 0.0, y: float = 0.0, radius: float = 20.0
 ) -> list[tuple[float, float]]:
-    """Return a star whose every side crosses almost every other one."""
+    """Return a star in which almost all sides cross each other."""
     angle = np.arange(points) * (points // 2) * math.tau / points
     return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)]).round(3).tolist()
 
@@ -85,7 +90,7 @@ def build_wkt(ring: Any) -> bytes:
 
 
 def build_comb(teeth: int) -> list[tuple[float, float]]:
-    """Return a hall with as many niches."""
+    """Return a hall with a number of niches."""
     x = np.arange(teeth) * 0.02
     tooth = [(0.0, 0.0), (0.0, 5.0), (0.01, 5.0), (0.01, 0.0)]
     points = np.stack([np.column_stack([x + dx, np.full(teeth, y)]) for dx, y in tooth], axis=1)
@@ -93,24 +98,24 @@ def build_comb(teeth: int) -> list[tuple[float, float]]:
 
 
 def build_pgm(cells: np.ndarray) -> bytes:
-    """Return a picture, raw."""
+    """Return a binary PGM image."""
     return b"P5 %d %d 255\n" % cells.shape[::-1] + cells.astype(np.uint8).tobytes()
 
 
 def build_pillars(size: int) -> np.ndarray:
-    """Return cells with a pillar in every third of every third row."""
+    """Return cells with pillars in every third column of every third row."""
     cells = np.full((size, size), 255)
     cells[1::3, 1::3] = 0
     return cells
 
 
 def build_noise(size: int, share: float) -> np.ndarray:
-    """Return cells of which a share is blocked, by chance."""
+    """Return cells, a random fraction of which is blocked."""
     return np.where(np.random.default_rng(0).random((size, size)) < share, 0, 255)
 
 
 def build_white_png(size: int) -> bytes:
-    """Return a picture with nothing on it."""
+    """Return a white PNG image."""
     import io
 
     from PIL import Image
@@ -131,14 +136,14 @@ def build_squares(size: int) -> list[list[tuple[float, float]]]:
 
 
 def build_wavy_room(count: int) -> np.ndarray:
-    """Return a round room with a wall of as many vertices."""
+    """Return a round room with a wavy wall of a number of vertices."""
     angle = np.arange(count) * math.tau / count
     radius = 300 + 0.5 * np.sin(angle * count / 40)
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
 
 def build_rooms(size: int) -> bytes:
-    """Return cells with walls every 16 and a door in each."""
+    """Return cells with walls in every 16th row and column, and a door in each wall."""
     cells = np.full((size, size), 255)
     cells[::16] = cells[:, ::16] = 0
     cells[::16, 7::16] = cells[::16, 8::16] = cells[7::16, ::16] = cells[8::16, ::16] = 255
@@ -147,7 +152,7 @@ def build_rooms(size: int) -> bytes:
 
 
 def build_rectangles(count: int) -> bytes:
-    """Return a drawing of as many desks."""
+    """Return an SVG drawing with a number of desks."""
     side = math.isqrt(count) + 1
     desks = (f'<rect x="{2 * (k % side)}" y="{2 * (k // side)}" width="1" height="1"/>' for k in range(count))
     return build_svg(
@@ -156,7 +161,7 @@ def build_rectangles(count: int) -> bytes:
 
 
 def build_lines(count: int) -> bytes:
-    """Return a DXF of as many walls that stand alone."""
+    """Return a DXF drawing with a number of separate walls."""
     side = math.isqrt(count) + 1
     text = ["0", "SECTION", "2", "ENTITIES"]
     for k in range(count):
@@ -195,91 +200,93 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "49,000 lines, DXF": ("many.dxf", lambda: build_lines(49_000)),
     "100,000 lines, DXF": ("more.dxf", lambda: build_lines(100_000)),
 }
-"""Name of a case, and its file."""
+"""File name and content of each case."""
 
 
-def measure_cases(names: list[str], seconds: float = 300.0) -> Iterator[tuple[str, Cost]]:
-    """Yield what each case costs; one that takes longer than so many seconds of a processor is ended."""
+def measure_cases(names: list[str], seconds: float = MAX_CPU_S) -> Iterator[tuple[str, Cost]]:
+    """Yield the cost of each case. Imports that take more than some seconds of processor time are ended."""
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
-            file, content = CASES[name]
-            place = Path(folder) / file
-            place.write_bytes(content())
-            done = subprocess.run(
-                [sys.executable, __file__, "--read", str(place), "--seconds", str(seconds)],
-                capture_output=True, text=True, check=False,
-            )  # fmt: skip
-            place.unlink()
-            if done.returncode:
-                yield (
-                    name,
-                    Cost(math.inf, math.inf, (done.stderr or f"status {done.returncode}")[-300:], True),
-                )
+            file_name, build_content = CASES[name]
+            path = Path(folder) / file_name
+            path.write_bytes(build_content())
+            process = subprocess.run(
+                [sys.executable, __file__, "--read", str(path), "--seconds", str(seconds)],
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            path.unlink()
+            if process.returncode == 0:
+                yield name, Cost(**json.loads(process.stdout))
             else:
-                yield name, Cost(**json.loads(done.stdout))
+                errors = process.stderr or f"status {process.returncode}"
+                yield name, Cost(math.inf, math.inf, errors[-MAX_ERROR_CHARS:], True)
 
 
-def read(place: Path, seconds: float) -> Cost:
-    """Import a file in this process, and return what it cost."""
+def read(path: Path, seconds: float) -> Cost:
+    """Import a file in this process, and return its cost."""
     import resource
 
     from robocov.errors import RobocovError
     from robocov_app.formats import ReadOptions, Shaping, build_environment, detect_format, import_map
 
-    # what imports need is the fault of no file
-    options = {"wkt": ReadOptions(), "pgm": ReadOptions(cell=1.0), "dxf": ReadOptions(scale=1.0)}
-    small = (
-        ("wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0))"),
-        ("pgm", "P2 3 1 1 1 1 1"),
-        ("dxf", build_lines(2).decode()),
+    # Small files load the modules of the importers, whose cost is not that of the file.
+    small_files = (
+        ("small.wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0))", ReadOptions()),
+        ("small.pgm", "P2 3 1 1 1 1 1", ReadOptions(cell=1.0)),
+        ("small.dxf", build_lines(2).decode(), ReadOptions(scale=1.0)),
     )
-    for suffix, text in small:
-        warm = place.with_name(f"warm.{suffix}")
-        warm.write_text(text)
-        import_map(warm, options=options[suffix])
-    kind = detect_format(place)
-    given = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in kind.options})
-    if kind.name == "picture":
-        given = ReadOptions(cell=0.1)
-    before = read_peak_mb()
+    for name, text, small_options in small_files:
+        small_path = path.with_name(name)
+        small_path.write_text(text)
+        import_map(small_path, options=small_options)
+    importer = detect_format(path)
+    options = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in importer.options})
+    if importer.name == "picture":
+        options = ReadOptions(cell=0.1)
+    initial_mb = read_peak_mb()
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
-    began = time.process_time()
-    good = False
+    start_time = time.process_time()
+    is_read = False
     try:
-        foreign = kind.read(place, given)
-        good = True
-        said = f"{build_environment(foreign, Shaping(), place.name)[1].vertices_kept} vertices"
+        foreign = importer.read(path, options)
+        is_read = True
+        _, report = build_environment(foreign, Shaping(), path.name)
+        outcome = f"{report.vertices_kept} vertices"
     except RobocovError as error:
-        said = f"refused: {str(error).partition(': ')[2]}"
-        good = good or (kind.name == "dxf" and " shapes" in said)  # layers are known once ezdxf read it
-    spent = time.process_time() - began
-    return Cost(spent, read_peak_mb() - before, said, good)
+        outcome = f"refused: {str(error).partition(': ')[2]}"
+        if importer.name == "dxf" and " shapes" in outcome:
+            # The shapes are counted after ezdxf has read the file.
+            is_read = True
+    elapsed = time.process_time() - start_time
+    return Cost(elapsed, read_peak_mb() - initial_mb, outcome, is_read)
 
 
 def read_peak_mb() -> float:
-    """Return the most memory that this process has had, in MB; as Linux tells it."""
+    """Return the peak memory of this process, MB. Works on Linux only."""
     status = Path("/proc/self/status").read_text()
     return int(status.partition("VmHWM:")[2].split()[0]) / 1024
 
 
 def main() -> int:
-    """Print the table, and return 1 where something is beyond its budget."""
+    """Print the table, and return 1 if a file exceeds its budget."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="by default all")
-    parser.add_argument("--seconds", type=float, default=300.0, help="of a processor for each (300)")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="cases to measure (default: all)")
+    parser.add_argument("--seconds", type=float, default=MAX_CPU_S, help="maximum processor time of each, s")
     parser.add_argument("--read", type=Path, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.read is not None:
-        print(json.dumps(vars(read(given.read, given.seconds))))
+    arguments = parser.parse_args()
+    if arguments.read is not None:
+        print(json.dumps(vars(read(arguments.read, arguments.seconds))))
         return 0
     print(f"{'CPU s':>7} {'MB':>6}")
-    worst = 0.0
-    for name, cost in measure_cases(given.names or list(CASES), given.seconds):
-        print(f"{cost.seconds:7.2f} {cost.megabytes:6.0f}  {name}: {cost.said}", flush=True)
-        worst = max(worst, cost.share)
-    return int(worst > 1.0)
+    max_share = 0.0
+    for name, cost in measure_cases(arguments.names or list(CASES), arguments.seconds):
+        print(f"{cost.seconds:7.2f} {cost.megabytes:6.0f}  {name}: {cost.outcome}", flush=True)
+        max_share = max(max_share, cost.share)
+    return int(max_share > 1.0)
 
 
 if __name__ == "__main__":

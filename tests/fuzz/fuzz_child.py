@@ -1,6 +1,6 @@
-"""The process in which inputs are read: it may hang, die or eat its memory, and only it.
+"""Process that reads inputs, so that only this process crashes, hangs or runs out of memory.
 
-A line of JSON on its input says what to read; a line on its output says what came of it.
+It reads jobs from standard input, and writes their outcomes to standard output, as a line of JSON each.
 """
 
 import contextlib
@@ -14,18 +14,22 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-MEMORY = 800_000_000
-"""Bytes of addresses that a case may take beside what the process has before."""
+MAX_MEMORY_BYTES = 800_000_000
+"""Maximum address space of a case, in addition to that of the process before."""
+MAX_MESSAGE_CHARS = 2000
+MAX_WORDS_CHARS = 500
+MAX_TRACEBACK_CHARS = 8000
 
 
 class WrongError(AssertionError):
-    """Something came of an input that may not."""
+    """An input has an effect that it must not have."""
 
 
 def main() -> None:
-    """Answer until there is nothing more to read."""
+    """Answer jobs until standard input ends."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what a library prints goes elsewhere
+    # Libraries may print to standard output, which is redirected to standard error.
+    os.dup2(2, 1)
     _load()
     _limit()
     print(json.dumps({"outcome": "ready"}), file=answers, flush=True)
@@ -34,45 +38,48 @@ def main() -> None:
 
 
 def answer(job: dict[str, Any]) -> dict[str, Any]:
-    """Return what comes of reading a file: a map, a refusal in one line, or what should not be."""
+    """Read a file, and return the outcome: read, refused with a message of one line, or a finding."""
     from robocov.errors import RobocovError
 
-    began = time.process_time()
+    start_time = time.process_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             try:
-                found = {"outcome": "read", "words": _READ[job["kind"]](Path(job["file"]), job)}
+                words = _READERS[job["kind"]](Path(job["file"]), job)
+                outcome = {"outcome": "read", "words": words}
             except RobocovError as error:
                 _require_one_line(str(error))
-                found = {"outcome": "refused", "words": str(error)}
+                outcome = {"outcome": "refused", "words": str(error)}
     except MemoryError as error:
-        found = _build_finding("memory", error)
+        outcome = _build_finding("memory", error)
     except (Exception, SystemExit) as error:
-        found = _build_finding("error", error)
-    return {**found, "seconds": time.process_time() - began}
+        outcome = _build_finding("error", error)
+    return {**outcome, "seconds": time.process_time() - start_time}
 
 
 def _build_finding(kind: str, error: BaseException) -> dict[str, Any]:
-    """Return a finding, with the place in the project's own code that it comes from."""
+    """Return a finding, with the innermost function of the project in its signature."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [frame for frame in frames if "robocov" in frame.filename] or frames
-    place = f"{Path(ours[-1].filename).name}:{ours[-1].name}" if ours else ""
+    own_frames = [frame for frame in frames if "robocov" in frame.filename] or frames
+    place = ""
+    if own_frames:
+        place = f"{Path(own_frames[-1].filename).name}:{own_frames[-1].name}"
     return {
         "outcome": kind,
-        "words": f"{type(error).__name__}: {error}"[:500],
+        "words": f"{type(error).__name__}: {error}"[:MAX_WORDS_CHARS],
         "signature": f"{kind}-{type(error).__name__}-{place}",
-        "traceback": "".join(traceback.format_exception(error))[-8000:],
+        "traceback": "".join(traceback.format_exception(error))[-MAX_TRACEBACK_CHARS:],
     }
 
 
 def _require_one_line(message: str) -> None:
-    if not message.isprintable() or not message or len(message) > 2000:
+    if not message.isprintable() or not message or len(message) > MAX_MESSAGE_CHARS:
         raise WrongError(f"expected a message of one line: {message[:300]!r}")
 
 
 def _require_map(environment: Any) -> str:
-    """Check that a map is one that can be saved and loaded again."""
+    """Check that a map can be saved and loaded, and return its description."""
     from robocov.environment import Environment
     from robocov.mapfile import dump_map, from_json, parse_map, to_json
     from robocov.mapfile.check import check_map
@@ -80,10 +87,10 @@ def _require_map(environment: Any) -> str:
     if not isinstance(environment, Environment):
         raise WrongError(f"expected a map: {type(environment).__name__}")
     if from_json(to_json(environment)) != environment:
-        raise WrongError("the map is another one after it was written and read")
+        raise WrongError("the map changes when it is written and read")
     text = dump_map(environment)
     if dump_map(parse_map(text, "again")) != text:
-        raise WrongError("the text of the map is another one after it was read and written")
+        raise WrongError("the text of the map changes when it is read and written")
     report = check_map(environment)
     json.dumps(report.to_dict(), allow_nan=False)
     counts = f"{report.obstacle_count} obstacles, {report.vertex_count} vertices"
@@ -106,7 +113,7 @@ def _import(path: Path, job: dict[str, Any]) -> str:
 
 
 def _import_folder(path: Path, job: dict[str, Any]) -> str:
-    """Import the folder that a file is in, or an archive."""
+    """Import the folder of a file, or an archive."""
     return _import(path if path.suffix == ".zip" else path.parent, job)
 
 
@@ -143,7 +150,7 @@ def _check(path: Path, job: dict[str, Any]) -> str:
 
 
 def _misbehave(path: Path, job: dict[str, Any]) -> str:
-    """Do what a file says: what the harness must find."""
+    """Cause the finding that a file names, to test the harness."""
     from robocov.errors import MapError
 
     word = path.read_text().strip()
@@ -152,7 +159,7 @@ def _misbehave(path: Path, job: dict[str, Any]) -> str:
     if "crash" in word:
         os.abort()
     if "memory" in word:
-        bytearray(100 * MEMORY)
+        bytearray(100 * MAX_MEMORY_BYTES)
     if "lines" in word:
         raise MapError("one\ntwo")
     if "warning" in word:
@@ -164,7 +171,7 @@ def _misbehave(path: Path, job: dict[str, Any]) -> str:
     return "fine"
 
 
-_READ = {
+_READERS = {
     "import": _import,
     "folder": _import_folder,
     "map": _map,
@@ -175,23 +182,25 @@ _READ = {
 
 
 def _load() -> None:
-    """Load what reading needs, so that neither time nor memory for that counts."""
+    """Import the modules that readers need, so that their time and memory are not counted."""
     import robocov_app.commands.maps.check
     import robocov_app.formats
     import robocov_app.sweep.study_file  # noqa: F401
 
 
 def _limit() -> None:
-    """Bound the memory of this process where the system can."""
+    """Limit the memory of this process if the system supports it."""
     try:
         import resource
     except ImportError:
         return
-    now = 0
+    current_bytes = 0
     with contextlib.suppress(OSError, ValueError, StopIteration):
         status = Path("/proc/self/status").read_text().splitlines()
-        now = 1024 * int(next(line for line in status if line.startswith("VmSize")).split()[1])
-    resource.setrlimit(resource.RLIMIT_AS, (now + MEMORY, now + MEMORY))
+        size_line = next(line for line in status if line.startswith("VmSize"))
+        current_bytes = 1024 * int(size_line.split()[1])
+    max_bytes = current_bytes + MAX_MEMORY_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (max_bytes, max_bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 

@@ -1,4 +1,4 @@
-"""Changes of inputs: bytes flipped, cut, repeated; numbers made extreme; words spliced in; files crossed."""
+"""Mutate inputs: flip, cut and repeat bytes, replace numbers, insert tokens, and combine files."""
 
 import gzip
 import re
@@ -7,8 +7,8 @@ from random import Random
 
 from fuzz_seeds import TOKENS, Case, build_chunk
 
-MOST = 200_000
-"""Longest input in bytes: long ones are slow, and find nothing that short ones do not."""
+MAX_INPUT_BYTES = 200_000
+"""Maximum length of an input: longer ones are slow and find nothing more."""
 
 NUMBERS = [
     *(
@@ -61,32 +61,35 @@ _NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def mutate(case: Case, target: str, corpus: list[Case], random: Random) -> Case:
-    """Return a case with one to a few changes of one of its files."""
+    """Return a case with one or several random changes in one of its files."""
     name = random.choice(list(case.files))
     content = case.files[name]
     if name.endswith(".png") and random.random() < 0.7:
         return case.with_file(name, _change_picture(content, target, random))
     for _ in range(random.choice((1, 1, 1, 2, 3, 6))):
-        content = _change(content, name, target, corpus, random)[:MOST]
+        content = _change(content, name, target, corpus, random)[:MAX_INPUT_BYTES]
     if name.endswith(".svg") and random.random() < 0.03:
         content = gzip.compress(content)
     return case.with_file(name, content)
 
 
 def _change(content: bytes, name: str, target: str, corpus: list[Case], random: Random) -> bytes:
-    way = random.choice(_WAYS)
-    if way is _cross:
+    """Apply a random mutation to the content of a file."""
+    mutation = random.choice(_MUTATIONS)
+    if mutation is _cross:
         other = random.choice(corpus)
-        beside = other.files.get(name, other.files[other.main])
-        return _cross(content, beside, random)
-    if way is _splice:
-        return _splice(content, random.choice(TOKENS[target]).encode("utf-8", "surrogatepass"), random)
-    return way(content, random)
+        other_content = other.files.get(name, other.files[other.main])
+        return _cross(content, other_content, random)
+    if mutation is _splice:
+        token = random.choice(TOKENS[target]).encode("utf-8", "surrogatepass")
+        return _splice(content, token, random)
+    return mutation(content, random)
 
 
-def _choose_span(content: bytes, random: Random, longest: int = 200) -> tuple[int, int]:
-    begin = random.randrange(len(content) + 1)
-    return begin, min(begin + random.randrange(1, longest), len(content))
+def _choose_span(content: bytes, random: Random, max_length: int = 200) -> tuple[int, int]:
+    """Return the start and the end of a random part."""
+    start = random.randrange(len(content) + 1)
+    return start, min(start + random.randrange(1, max_length), len(content))
 
 
 def _flip_bits(content: bytes, random: Random) -> bytes:
@@ -97,13 +100,13 @@ def _flip_bits(content: bytes, random: Random) -> bytes:
 
 
 def _overwrite(content: bytes, random: Random) -> bytes:
-    begin, end = _choose_span(content, random, 6)
-    return content[:begin] + random.randbytes(end - begin) + content[end:]
+    start, end = _choose_span(content, random, 6)
+    return content[:start] + random.randbytes(end - start) + content[end:]
 
 
 def _cut(content: bytes, random: Random) -> bytes:
-    begin, end = _choose_span(content, random)
-    return content[:begin] + content[end:]
+    start, end = _choose_span(content, random)
+    return content[:start] + content[end:]
 
 
 def _truncate(content: bytes, random: Random) -> bytes:
@@ -111,46 +114,46 @@ def _truncate(content: bytes, random: Random) -> bytes:
 
 
 def _repeat(content: bytes, random: Random) -> bytes:
-    begin, end = _choose_span(content, random, 60)
-    return content[:end] + content[begin:end] * random.choice((1, 1, 2, 10, 300)) + content[end:]
+    start, end = _choose_span(content, random, 60)
+    return content[:end] + content[start:end] * random.choice((1, 1, 2, 10, 300)) + content[end:]
 
 
 def _move(content: bytes, random: Random) -> bytes:
-    begin, end = _choose_span(content, random)
-    rest = content[:begin] + content[end:]
-    at = random.randrange(len(rest) + 1)
-    return rest[:at] + content[begin:end] + rest[at:]
+    start, end = _choose_span(content, random)
+    remaining = content[:start] + content[end:]
+    index = random.randrange(len(remaining) + 1)
+    return remaining[:index] + content[start:end] + remaining[index:]
 
 
 def _replace_number(content: bytes, random: Random) -> bytes:
-    found = list(_NUMBER.finditer(content))
-    if not found:
+    numbers = list(_NUMBER.finditer(content))
+    if not numbers:
         return content
-    number = random.choice(found)
-    new = random.choice(NUMBERS)
+    number = random.choice(numbers)
+    replacement = random.choice(NUMBERS)
     if random.random() < 0.3:
-        new = repr(
-            random.choice((random.uniform(-20, 20), random.gauss(0, 1e3), random.uniform(0, 1e-3)))
-        ).encode()
-    return content[: number.start()] + new + content[number.end() :]
+        values = (random.uniform(-20, 20), random.gauss(0, 1e3), random.uniform(0, 1e-3))
+        replacement = repr(random.choice(values)).encode()
+    return content[: number.start()] + replacement + content[number.end() :]
 
 
 def _copy_number(content: bytes, random: Random) -> bytes:
-    """Put one number in the place of another: what coincides is where geometry is hard."""
-    found = list(_NUMBER.finditer(content))
-    if len(found) < 2:
+    """Replace a number by another one of the file: coincident coordinates are hard cases of geometry."""
+    numbers = list(_NUMBER.finditer(content))
+    if len(numbers) < 2:
         return content
-    one, other = random.sample(found, 2)
-    return content[: one.start()] + other[0] + content[one.end() :]
+    replaced, source = random.sample(numbers, 2)
+    return content[: replaced.start()] + source[0] + content[replaced.end() :]
 
 
 def _change_line(content: bytes, random: Random) -> bytes:
+    """Duplicate or remove a line."""
     lines = content.split(b"\n")
-    at = random.randrange(len(lines))
+    index = random.randrange(len(lines))
     if random.random() < 0.5:
-        lines.insert(random.randrange(len(lines) + 1), lines[at])
+        lines.insert(random.randrange(len(lines) + 1), lines[index])
     else:
-        lines.pop(at)
+        lines.pop(index)
     return b"\n".join(lines)
 
 
@@ -171,17 +174,21 @@ def _change_encoding(content: bytes, random: Random) -> bytes:
 
 
 def _cross(content: bytes, other: bytes, random: Random) -> bytes:
-    begin, end = _choose_span(other, random)
-    at, until = _choose_span(content, random)
-    return content[:at] + other[begin:end] + content[until if random.random() < 0.5 else at :]
+    """Insert a part of another file, or replace a part by it."""
+    start, end = _choose_span(other, random)
+    replaced_start, replaced_end = _choose_span(content, random)
+    is_replacing = random.random() < 0.5
+    rest_start = replaced_end if is_replacing else replaced_start
+    return content[:replaced_start] + other[start:end] + content[rest_start:]
 
 
 def _splice(content: bytes, token: bytes, random: Random) -> bytes:
-    at = random.randrange(len(content) + 1)
-    return content[:at] + token * random.choice((1, 1, 1, 1, 2, 1000)) + content[at:]
+    """Insert a token once or repeatedly."""
+    index = random.randrange(len(content) + 1)
+    return content[:index] + token * random.choice((1, 1, 1, 1, 2, 1000)) + content[index:]
 
 
-_WAYS = (
+_MUTATIONS = (
     *(_flip_bits, _overwrite, _cut, _truncate, _repeat, _move, _change_line, _change_encoding),
     *(
         _replace_number,
@@ -197,58 +204,65 @@ _WAYS = (
 )
 
 
+_IMAGE_SIZES = (0, 1, 2, 3, 12, 24, 25, 65_535, 10**6, 2**31 - 1, 2**31, 2**32 - 1)
+_CHUNK_KINDS = (b"PLTE", b"tRNS", b"IDAT", b"iCCP", b"zTXt", b"gAMA", b"acTL", b"fcTL", b"IEND")
+
+
 def _change_picture(content: bytes, target: str, random: Random) -> bytes:
-    """Change a PNG between its check sums, and put them right: else nothing behind them is reached."""
-    found = _split_chunks(content)
-    if not found:
+    """Change a chunk of a PNG, with a valid checksum: readers reject all others at once."""
+    chunks = _split_chunks(content)
+    if not chunks:
         return _flip_bits(content, random)
-    at = random.randrange(len(found))
-    kind, data = found[at]
-    way = random.random()
-    if kind == b"IDAT" and way < 0.7:
+    index = random.randrange(len(chunks))
+    kind, data = chunks[index]
+    choice = random.random()
+    if kind == b"IDAT" and choice < 0.7:
         try:
             data = zlib.compress(_change_plain(zlib.decompress(data), random))
         except zlib.error:
             data = _flip_bits(data, random)
-    elif kind == b"IHDR" and way < 0.9:
-        number = random.choice((0, 1, 2, 3, 12, 24, 25, 65_535, 10**6, 2**31 - 1, 2**31, 2**32 - 1)).to_bytes(
-            4, "big"
-        )
-        place = random.choice((0, 4))
-        data = data[:place] + number + data[place + 4 :]
-        if random.random() < 0.5:
-            data = data[:8] + bytes(
-                [random.choice((1, 2, 4, 8, 16, 3)), random.randrange(8), *random.choices((0, 1), k=3)]
-            )
-    elif way < 0.8:
+    elif kind == b"IHDR" and choice < 0.9:
+        data = _change_header(data, random)
+    elif choice < 0.8:
         data = _change_plain(data, random)
-    elif way < 0.9:
-        kind = random.choice(
-            (b"PLTE", b"tRNS", b"IDAT", b"iCCP", b"zTXt", b"gAMA", b"acTL", b"fcTL", b"IEND")
-        )
-        found.insert(
-            random.randrange(len(found) + 1), (kind, zlib.compress(bytes(random.choice((3, 768, 10**6)))))
-        )
-        return _join_chunks(found)
+    elif choice < 0.9:
+        new_kind = random.choice(_CHUNK_KINDS)
+        new_index = random.randrange(len(chunks) + 1)
+        chunks.insert(new_index, (new_kind, zlib.compress(bytes(random.choice((3, 768, 10**6))))))
+        return _join_chunks(chunks)
     else:
-        found.pop(at)
-        return _join_chunks(found)
-    found[at] = kind, data
-    return _join_chunks(found)
+        chunks.pop(index)
+        return _join_chunks(chunks)
+    chunks[index] = (kind, data)
+    return _join_chunks(chunks)
+
+
+def _change_header(data: bytes, random: Random) -> bytes:
+    """Replace the width or the height of a PNG, and sometimes the depth and the color type as well."""
+    size = random.choice(_IMAGE_SIZES).to_bytes(4, "big")
+    offset = random.choice((0, 4))
+    data = data[:offset] + size + data[offset + 4 :]
+    if random.random() < 0.5:
+        depth = random.choice((1, 2, 4, 8, 16, 3))
+        color_type = random.randrange(8)
+        data = data[:8] + bytes([depth, color_type, *random.choices((0, 1), k=3)])
+    return data
 
 
 def _change_plain(content: bytes, random: Random) -> bytes:
-    return random.choice((_flip_bits, _overwrite, _cut, _truncate, _repeat, _move))(content, random)[:MOST]
+    mutation = random.choice((_flip_bits, _overwrite, _cut, _truncate, _repeat, _move))
+    return mutation(content, random)[:MAX_INPUT_BYTES]
 
 
 def _split_chunks(content: bytes) -> list[tuple[bytes, bytes]]:
-    found = []
-    at = 8
-    while at + 12 <= len(content):
-        length = int.from_bytes(content[at : at + 4], "big")
-        found.append((content[at + 4 : at + 8], content[at + 8 : at + 8 + length]))
-        at += 12 + length
-    return found
+    """Return the kinds and the data of the chunks of a PNG."""
+    chunks = []
+    offset = 8
+    while offset + 12 <= len(content):
+        length = int.from_bytes(content[offset : offset + 4], "big")
+        chunks.append((content[offset + 4 : offset + 8], content[offset + 8 : offset + 8 + length]))
+        offset += 12 + length
+    return chunks
 
 
 def _join_chunks(chunks: list[tuple[bytes, bytes]]) -> bytes:

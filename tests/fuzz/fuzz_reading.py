@@ -1,4 +1,4 @@
-"""Inputs read in a process that may die of them, under a watchdog; and what came of each."""
+"""Read inputs in a process that may crash or hang, and report the outcomes."""
 
 from __future__ import annotations
 
@@ -16,30 +16,35 @@ from typing import Any
 
 from fuzz_seeds import Case
 
-SECONDS = 3.0
-"""What a case may take of a processor."""
+MAX_CPU_S = 3.0
+"""Maximum processor time of a case."""
 
-_PATIENCE = 5.0
-"""Times as long is waited for an answer: other processes want the processor too."""
+_WAIT_FACTOR = 5.0
+"""Maximum time of an answer, relative to the processor time: other processes need the processor as well."""
 
-_START = 60.0
-"""Seconds within which the process must be ready."""
+_MAX_START_S = 60.0
+"""Time within which the process must be ready."""
+
+_MAX_ERROR_BYTES = 4000
+"""Length of the end of the error output that is reported."""
 
 _CHILD = Path(__file__).with_name("fuzz_child.py")
 
 
 @dataclass(frozen=True)
 class Job:
-    """How a case is read.
+    """How to read a case.
 
     Attributes
     ----------
     kind : str
-        ``import``, ``map``, ``study`` or ``check``.
+        ``import``, ``folder``, ``map``, ``study`` or ``check``.
     format : str or None
-        Of what is imported; None looks at the file.
-    options, shaping : dict
-        Of `ReadOptions` and `Shaping`, or of the command.
+        Format of the imported file; None detects it.
+    options : dict
+        Arguments of `ReadOptions`, or of the command.
+    shaping : dict
+        Arguments of `Shaping`.
     """
 
     kind: str
@@ -50,17 +55,20 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case.
+    """Outcome of a case.
 
     Attributes
     ----------
     outcome : str
-        ``read`` or ``refused``; ``error``, ``memory``, ``slow``, ``hang`` and ``crash`` should not be.
+        ``read`` or ``refused``, or one of the findings ``error``, ``memory``, ``slow``, ``hang`` and
+        ``crash``.
     words : str
+        Description of what was read, or the error message.
     signature : str
-        The same for findings that come from the same place.
+        Identical for findings with the same cause; empty if there is no finding.
     traceback : str
-    seconds : float
+    seconds : float, s
+        Processor time; for ``slow``, ``hang`` and ``crash`` the elapsed time.
     """
 
     outcome: str
@@ -71,14 +79,20 @@ class Outcome:
 
     @property
     def good(self) -> bool:
-        """Whether this may be."""
+        """Whether the outcome is not a finding."""
         return self.outcome in ("read", "refused")
 
 
 class Reader:
-    """Reads cases one after the other, in a process that is started again after each that it dies of."""
+    """Reads cases in a process, which is restarted if it ends.
 
-    def __init__(self, seconds: float = SECONDS) -> None:
+    Parameters
+    ----------
+    seconds : float, s
+        Maximum processor time of a case.
+    """
+
+    def __init__(self, seconds: float = MAX_CPU_S) -> None:
         self.seconds = seconds
         self.started = 0
         self._process: subprocess.Popen[bytes] | None = None
@@ -95,36 +109,40 @@ class Reader:
         self._folder.cleanup()
 
     def read(self, case: Case, job: Job) -> Outcome:
-        """Return what comes of a case."""
+        """Read a case, and return its outcome."""
         folder = Path(self._folder.name) / "case"
         folder.mkdir(exist_ok=True)
-        for old in folder.iterdir():
-            old.unlink()
+        for path in folder.iterdir():
+            path.unlink()
         for name, content in case.files.items():
             (folder / name).write_bytes(content)
-        process = self._running()
+        process = self._ensure_process()
         assert process.stdin is not None
-        line = json.dumps({"file": str(folder / case.main), **vars(job)})
-        began = time.monotonic()
+        request = json.dumps({"file": str(folder / case.main), **vars(job)})
+        max_wait = _WAIT_FACTOR * self.seconds
+        start_time = time.monotonic()
         try:
-            process.stdin.write(line.encode() + b"\n")
+            process.stdin.write(request.encode() + b"\n")
             process.stdin.flush()
-            answer = self._answer(_PATIENCE * self.seconds)
+            answer = self._wait_for_answer(max_wait)
         except BrokenPipeError:
             answer = None
-        took = time.monotonic() - began
+        elapsed = time.monotonic() - start_time
         if answer is not None:
-            found = Outcome(**answer)
-            slow = found.good and found.seconds > self.seconds
-            return Outcome("slow", f"{found.seconds:.1f} s", f"slow-{job.kind}", "", took) if slow else found
-        if process.poll() is None and took >= _PATIENCE * self.seconds:
-            self._stop()
-            return Outcome("hang", f"no answer in {took:.1f} s", f"hang-{job.kind}", self._said(), took)
+            outcome = Outcome(**answer)
+            if outcome.good and outcome.seconds > self.seconds:
+                return Outcome("slow", f"{outcome.seconds:.1f} s", f"slow-{job.kind}", "", elapsed)
+            return outcome
+        is_hanging = process.poll() is None and elapsed >= max_wait
         self._stop()
+        errors = self._read_errors()
+        if is_hanging:
+            return Outcome("hang", f"no answer in {elapsed:.1f} s", f"hang-{job.kind}", errors, elapsed)
         status = process.returncode
-        return Outcome("crash", f"status {status}", f"crash-{job.kind}-{status}", self._said(), took)
+        return Outcome("crash", f"status {status}", f"crash-{job.kind}-{status}", errors, elapsed)
 
-    def _running(self) -> subprocess.Popen[bytes]:
+    def _ensure_process(self) -> subprocess.Popen[bytes]:
+        """Return the process, after starting it if there is none."""
         if self._process is None:
             environment = {
                 **os.environ,
@@ -144,26 +162,26 @@ class Reader:
             )
             self.started += 1
             self._pending = b""
-            if self._answer(_START) is None:
+            if self._wait_for_answer(_MAX_START_S) is None:
                 self._stop()
-                raise RuntimeError(f"the process that reads did not start: {self._said()}")
+                raise RuntimeError(f"the reading process did not start: {self._read_errors()}")
         return self._process
 
-    def _answer(self, seconds: float) -> dict[str, Any] | None:
-        """Return the next answer, None where the process ends or takes longer."""
+    def _wait_for_answer(self, seconds: float) -> dict[str, Any] | None:
+        """Return the next answer, or None if the process ends or takes longer."""
         assert self._process is not None and self._process.stdout is not None
         stream = self._process.stdout.fileno()
         deadline = time.monotonic() + seconds
         while b"\n" not in self._pending:
-            left = deadline - time.monotonic()
-            if left <= 0.0 or not select.select([stream], [], [], left)[0]:
+            remaining = deadline - time.monotonic()
+            if remaining <= 0.0 or not select.select([stream], [], [], remaining)[0]:
                 return None
-            fresh = os.read(stream, 1 << 16)
-            if not fresh:
+            block = os.read(stream, 1 << 16)
+            if not block:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     self._process.wait(5.0)
                 return None
-            self._pending += fresh
+            self._pending += block
         line, self._pending = self._pending.split(b"\n", 1)
         answer: dict[str, Any] = json.loads(line)
         return answer
@@ -174,6 +192,6 @@ class Reader:
             self._process.communicate()
             self._process = None
 
-    def _said(self) -> str:
+    def _read_errors(self) -> str:
         self._errors.seek(0)
-        return self._errors.read()[-4000:].decode("utf-8", "replace")
+        return self._errors.read()[-_MAX_ERROR_BYTES:].decode("utf-8", "replace")

@@ -1,5 +1,7 @@
-"""Inputs made smaller while the same goes wrong (A. Zeller and R. Hildebrandt, *Simplifying and isolating
-failure-inducing input*, IEEE Transactions on Software Engineering 28, 2002).
+"""Shrink inputs that fail, by delta debugging.
+
+A. Zeller and R. Hildebrandt, *Simplifying and isolating failure-inducing input*, IEEE Transactions on
+Software Engineering 28, 2002.
 """
 
 import time
@@ -9,15 +11,16 @@ from fuzz_seeds import Case
 
 
 def shrink(case: Case, fails: Callable[[Case], bool], seconds: float) -> Case:
-    """Return a case that still fails, with less in its files: lines, then parts of lines, go.
+    """Return a case that still fails, after removing lines and then bytes from its files.
 
     Parameters
     ----------
     case : Case
-        That fails.
+        Case that fails.
     fails : callable
-    seconds : float
-        After that it is left as it is.
+        Returns whether a case fails in the same way.
+    seconds : float, s
+        Maximum time.
     """
     deadline = time.monotonic() + seconds
     for name in case.files:
@@ -41,21 +44,22 @@ def _shrink_file(
     fails: Callable[[Case], bool],
     deadline: float,
 ) -> Case:
+    """Remove ever shorter runs of parts from a file as long as the case fails."""
     parts = split(case.files[name])
-    size = max(len(parts) // 2, 1)
+    count = max(len(parts) // 2, 1)
     while parts and time.monotonic() < deadline:
-        at = 0
-        gone = False
-        while at < len(parts) and time.monotonic() < deadline:
-            fewer = parts[:at] + parts[at + size :]
-            smaller = case.with_file(name, b"".join(fewer))
+        start = 0
+        is_smaller = False
+        while start < len(parts) and time.monotonic() < deadline:
+            remaining = parts[:start] + parts[start + count :]
+            smaller = case.with_file(name, b"".join(remaining))
             if fails(smaller):
                 case = smaller
-                parts = fewer
-                gone = True
+                parts = remaining
+                is_smaller = True
             else:
-                at += size
-        if size == 1 and not gone:
+                start += count
+        if count == 1 and not is_smaller:
             break
-        size = max(size // 2, 1)
+        count = max(count // 2, 1)
     return case

@@ -1,4 +1,4 @@
-"""Inputs made by rule, not by change: documents of each format whose parts are anything, or nearly right."""
+"""Hypothesis strategies for documents of each format, with parts that are random or nearly valid."""
 
 import copy
 import json
@@ -37,7 +37,7 @@ _JUNK = st.sampled_from(_PLAIN) | st.recursive(
 )
 _POINT = st.tuples(_NUMBER, _NUMBER).map(list)
 _NEAR = st.tuples(_WHOLE, _WHOLE).map(list)
-"""On a small grid: there they coincide, and edges overlap."""
+"""Points on a small grid, so that points coincide and edges overlap."""
 
 _RING = st.lists(_NEAR, min_size=3, max_size=7) | st.lists(_POINT, max_size=6)
 _BOX = st.tuples(_WHOLE, _WHOLE, st.integers(1, 8), st.integers(1, 8)).map(
@@ -51,12 +51,17 @@ _BOX = st.tuples(_WHOLE, _WHOLE, st.integers(1, 8), st.integers(1, 8)).map(
 _AREA = st.lists(_BOX | _RING, min_size=1, max_size=4)
 
 
-def _list_places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    found = [path] if path else []
-    steps = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    for step in steps:
-        found += _list_places(value[step], (*path, step))
-    return found
+def _list_paths(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the paths of all values in a document, as tuples of keys and indices."""
+    paths = [path] if path else []
+    keys: list[Any] = []
+    if isinstance(value, dict):
+        keys = list(value)
+    elif isinstance(value, list):
+        keys = list(range(len(value)))
+    for key in keys:
+        paths += _list_paths(value[key], (*path, key))
+    return paths
 
 
 @st.composite
@@ -64,24 +69,24 @@ def _altered(draw: st.DrawFn, document: Any, values: st.SearchStrategy[Any]) -> 
     """Draw a document with some values replaced, removed or added."""
     document = copy.deepcopy(document)
     for _ in range(draw(st.integers(1, 4))):
-        places = _list_places(document)
-        if not places:
+        paths = _list_paths(document)
+        if not paths:
             break
-        *parent, last = draw(st.sampled_from(places))
-        holder = document
-        for step in parent:
-            holder = holder[step]
-        way = draw(st.integers(0, 3))
-        if way == 0:
-            del holder[last]
-        elif way == 1 and isinstance(holder, dict):
-            holder[draw(st.text(max_size=3) | st.sampled_from(["type", "kind", "name", "holes"]))] = (
-                copy.deepcopy(draw(values))
-            )
-        elif way == 1:
-            holder.insert(last, copy.deepcopy(draw(values)))
+        *parent_path, last_key = draw(st.sampled_from(paths))
+        parent = document
+        for key in parent_path:
+            parent = parent[key]
+        change = draw(st.integers(0, 3))
+        if change == 0:
+            del parent[last_key]
+        elif change == 1 and isinstance(parent, dict):
+            value = copy.deepcopy(draw(values))
+            new_key = draw(st.text(max_size=3) | st.sampled_from(["type", "kind", "name", "holes"]))
+            parent[new_key] = value
+        elif change == 1:
+            parent.insert(last_key, copy.deepcopy(draw(values)))
         else:
-            holder[last] = copy.deepcopy(draw(values))
+            parent[last_key] = copy.deepcopy(draw(values))
     return document
 
 
@@ -230,7 +235,7 @@ _BOXES = st.tuples(_WHOLE, _WHOLE, st.integers(1, 8), st.integers(1, 8), _PAINT,
         f"fill='{box[4]}' stroke='{box[5]}'/>"
     )
 )
-"""Rooms, floors and furniture on a small grid, above each other."""
+"""Rooms, floors and furniture on a small grid, so that they overlap."""
 
 _ELEMENT = st.recursive(
     st.one_of(
@@ -338,7 +343,7 @@ _DOORS: list[dict[str, str]] = [{}, {}, {"door": "yes"}, {"door": "yes", "width"
 
 @st.composite
 def _overpass(draw: st.DrawFn) -> dict[str, Any]:
-    """Draw ways through few nodes, some of them doors: rooms overlap, touch, and have no area."""
+    """Draw ways through few nodes, some of them doors, so that rooms overlap, touch, or have no area."""
     elements: list[Any] = []
     for number, (x, y) in enumerate(draw(st.lists(_NEAR, min_size=1, max_size=9))):
         node = {"type": "node", "id": number, "lat": 48 + y * 1e-5, "lon": 11 + x * 1e-5}
@@ -426,4 +431,4 @@ STRUCTURES: dict[str, st.SearchStrategy[Case]] = {
         "plan.dxf", st.tuples(st.lists(_ENTITY, max_size=2), st.lists(_ENTITY, max_size=6)).map(_format_dxf)
     ),
 }
-"""For each target, where a rule makes more of it than changes do."""
+"""Strategies by target, for targets that mutations explore too slowly."""

@@ -1,11 +1,10 @@
-"""Fuzz whatever reads files of others: every importer, map files, study files, `robocov check`.
+"""Fuzz everything that reads foreign files: all importers, map files, study files, and `robocov check`.
 
     python tests/fuzz/importers.py --minutes 10 svg dxf
 
-reads changed seeds and documents made by rule, ten minutes for each format, in a process of their own.
-(It needs what the tests need: `pip install --editable ".[test]"`.)
-What may come of one is a valid map, or one line that says why not, within seconds and a bounded memory.
-Everything else is a finding: it is made as small as can be, and saved with its traceback.
+The command needs the test dependencies: ``pip install --editable ".[test]"``. It reads mutated seeds and
+generated documents in a process of its own. An input has to give a valid map or an error message of one line,
+within limits of time and memory. Everything else is a finding, which is shrunk and saved with its traceback.
 """
 
 import argparse
@@ -16,25 +15,28 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 from typing import Any
 
 from fuzz_mutations import mutate
-from fuzz_reading import SECONDS, Job, Outcome, Reader
+from fuzz_reading import MAX_CPU_S, Job, Outcome, Reader
 from fuzz_seeds import SEEDS, Case
 from fuzz_shrinking import shrink
 
-MOST_KEPT = 300
-"""Cases that are kept to make others from, of those that were read, and of those that were refused."""
+MAX_CORPUS_CASES = 300
+"""Maximum number of read cases in a corpus, and of refused ones."""
 
-_FROM_READ = 0.6
-"""Part of the cases that are made from one that was read."""
+_READ_FRACTION = 0.6
+"""Fraction of the mutated cases that were read before."""
 
-_BATCH = 100
-"""Cases that are made one way before the other way has its turn."""
+_BATCH_CASES = 100
+"""Number of mutated or generated cases in a batch. Batches of both alternate."""
+
+MAX_SHRINK_S = 30.0
+"""Maximum time to shrink a finding."""
 
 _OPTIONS: dict[str, list[Any]] = {
     "cell": [0.05, 0.5, 1.0, 3.0],
@@ -74,60 +76,64 @@ _SHAPING: dict[str, list[Any]] = {
 }
 
 
-_MOSTLY = {"picture": "cell", "svg": "scale"}
-"""Options without which the seeds would be refused."""
+_REQUIRED_OPTIONS = {"picture": "cell", "svg": "scale"}
+"""Options without which the seeds are refused."""
 
 
 def list_targets() -> list[str]:
-    """Return what can be fuzzed: every importer, and what the project's own formats are read by."""
+    """Return everything that can be fuzzed: the importers, and the readers of formats of this project."""
     from robocov_app.formats import IMPORTERS
 
     return ["map", "study", "check", *IMPORTERS]
 
 
 def build_usual_job(target: str) -> Job:
-    """Return how the seeds of a target are read."""
+    """Return the job by which the seeds of a target are read."""
     if target in ("map", "study", "check"):
         return Job(target)
     if target == "imdf":
         return Job("folder", target)
-    return Job("import", target, {_MOSTLY[target]: 0.5} if target in _MOSTLY else {})
+    options = {_REQUIRED_OPTIONS[target]: 0.5} if target in _REQUIRED_OPTIONS else {}
+    return Job("import", target, options)
 
 
 def draw_job(target: str, random: Random) -> Job:
-    """Return how a case of a target is read; options are the usual ones mostly."""
+    """Draw the job of a case. Most of its options have their default values."""
     if target in ("map", "study"):
         return Job(target)
     if target == "check":
-        return Job(target, options={"words": ["--json"]} if random.random() < 0.3 else {})
+        is_json = random.random() < 0.3
+        return Job(target, options={"words": ["--json"]} if is_json else {})
     from robocov_app.formats import IMPORTERS
 
-    options = {
-        name: random.choice(_OPTIONS[name])
-        for name in sorted(IMPORTERS[target].options)
-        if name in _OPTIONS and random.random() < (0.9 if _MOSTLY.get(target) == name else 0.15)
-    }
+    options = {}
+    for name in sorted(IMPORTERS[target].options):
+        if name not in _OPTIONS:
+            continue
+        probability = 0.9 if _REQUIRED_OPTIONS.get(target) == name else 0.15
+        if random.random() < probability:
+            options[name] = random.choice(_OPTIONS[name])
     shaping = {name: random.choice(values) for name, values in _SHAPING.items() if random.random() < 0.08}
-    return Job(
-        "folder" if target == "imdf" else "import",
-        target if random.random() < 0.9 else None,
-        options,
-        shaping,
-    )
+    kind = "folder" if target == "imdf" else "import"
+    is_format_known = random.random() < 0.9
+    return Job(kind, target if is_format_known else None, options, shaping)
 
 
 @dataclass
 class Tally:
-    """What came of the cases of one target.
+    """Outcomes of the cases of a target.
 
     Attributes
     ----------
     target : str
-    counts : Counter of outcomes
+    counts : Counter
+        Number of cases by outcome.
     kinds : set of str
-        What was said, of refusals without names and numbers: as many ways as there are to end.
-    findings : dict of signature to (Case, Job, Outcome)
+        Distinct outcomes: descriptions, and error messages without names and numbers.
+    findings : dict
+        Case, job and outcome by signature.
     slowest : float, s
+        Maximum time of a case.
     """
 
     target: str
@@ -137,7 +143,7 @@ class Tally:
     slowest: float = 0.0
 
     def note(self, case: Case, job: Job, outcome: Outcome) -> bool:
-        """Count an outcome; return whether it is of a new kind."""
+        """Count an outcome, and return whether it is of a new kind."""
         self.counts[outcome.outcome] += 1
         self.slowest = max(self.slowest, outcome.seconds)
         if not outcome.good:
@@ -145,49 +151,51 @@ class Tally:
         kind = outcome.words
         if outcome.outcome == "refused":
             kind = re.sub(r"'[^']*'|\"[^\"]*\"|[-+\d.]+", "#", kind.partition(": ")[2])[:80]
-        fresh = outcome.good and kind not in self.kinds
+        is_new = outcome.good and kind not in self.kinds
         self.kinds.add(kind)
-        return fresh
+        return is_new
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in sorted(self.counts.items()))
         total = sum(self.counts.values())
-        ways = len(self.kinds)
-        return f"{self.target:<10} {total} cases: {counts}; {ways} ways to end, slowest {self.slowest:.2f} s"
+        return (
+            f"{self.target:<10} {total} cases: {counts}; {len(self.kinds)} distinct outcomes, "
+            f"slowest {self.slowest:.2f} s"
+        )
 
 
 @dataclass
 class Corpus:
-    """Cases that others are made from.
+    """Cases to mutate.
 
     Attributes
     ----------
-    read, refused : list of Case
-        What came of them; the seeds are among the first.
+    read : list of Case
+        Cases that were read, including the seeds.
+    refused : list of Case
     """
 
     read: list[Case]
     refused: list[Case] = field(default_factory=list)
 
     def keep(self, case: Case, outcome: Outcome, random: Random) -> None:
-        """Add a case; where there are many, it takes the place of another."""
-        kept = self.read if outcome.outcome == "read" else self.refused
-        if len(kept) < MOST_KEPT:
-            kept.append(case)
+        """Add a case. It replaces another one if the corpus is full."""
+        cases = self.read if outcome.outcome == "read" else self.refused
+        if len(cases) < MAX_CORPUS_CASES:
+            cases.append(case)
         else:
-            kept[random.randrange(len(kept))] = case
+            cases[random.randrange(len(cases))] = case
 
-    def drawn(self, random: Random) -> Case:
-        """Return one of them."""
-        among = self.read if random.random() < _FROM_READ or not self.refused else self.refused
-        return random.choice(among)
+    def draw(self, random: Random) -> Case:
+        """Draw a case."""
+        is_read = random.random() < _READ_FRACTION or not self.refused
+        return random.choice(self.read if is_read else self.refused)
 
 
 def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]) -> Tally:
-    """Return what comes of cases of a target, made by a seed until it is enough.
+    """Read mutated and generated cases of a target until it is enough, and return their outcomes.
 
-    Changed seeds and documents made by rule take turns. A case that ends in a new way is kept to make
-    others from.
+    Batches of mutated and of generated cases alternate. Cases with new outcomes are mutated in turn.
     """
     tally = Tally(target)
     random = Random(f"{target} {seed}")
@@ -196,11 +204,12 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
         tally.note(case, build_usual_job(target), reader.read(case, build_usual_job(target)))
     number = 0
     while not enough(tally):
-        for case in (
-            _generate_structured(target, seed + number)
-            if number % 2
-            else _generate_mutated(target, corpus, random)
-        ):
+        cases: Iterable[Case]
+        if number % 2:
+            cases = _generate_structured(target, seed + number)
+        else:
+            cases = _generate_mutated(target, corpus, random)
+        for case in cases:
             job = draw_job(target, random)
             outcome = reader.read(case, job)
             if tally.note(case, job, outcome):
@@ -212,19 +221,19 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
 
 
 def _generate_mutated(target: str, corpus: Corpus, random: Random) -> Iterator[Case]:
-    for _ in range(_BATCH):
-        yield mutate(corpus.drawn(random), target, corpus.read, random)
+    for _ in range(_BATCH_CASES):
+        yield mutate(corpus.draw(random), target, corpus.read, random)
 
 
 def _generate_structured(target: str, seed: int) -> list[Case]:
-    """Return cases made by rule, none where there is no rule."""
+    """Generate cases by a hypothesis strategy, or none if the target has no strategy."""
     import hypothesis
     from fuzz_structures import STRUCTURES
 
-    made: list[Case] = []
+    cases: list[Case] = []
     if target in STRUCTURES:
         settings = hypothesis.settings(
-            max_examples=_BATCH,
+            max_examples=_BATCH_CASES,
             database=None,
             deadline=None,
             derandomize=False,
@@ -233,89 +242,102 @@ def _generate_structured(target: str, seed: int) -> list[Case]:
         )
 
         def collect(case: Case) -> None:
-            made.append(case)
+            cases.append(case)
 
         hypothesis.seed(seed)(settings(hypothesis.given(STRUCTURES[target])(collect)))()
-    return made
+    return cases
 
 
 def save(folder: Path, target: str, case: Case, job: Job, outcome: Outcome) -> Path:
-    """Save a finding: its files, how they are read, and what came of it."""
+    """Save the files, the job and the outcome of a finding, and return its folder."""
     key = hashlib.sha256(outcome.signature.encode()).hexdigest()[:8]
-    place = folder / target / f"{outcome.outcome}-{key}"
-    place.mkdir(parents=True, exist_ok=True)
+    finding = folder / target / f"{outcome.outcome}-{key}"
+    finding.mkdir(parents=True, exist_ok=True)
     for name, content in case.files.items():
-        (place / name).write_bytes(content)
-    how = {"files": list(case.files), "job": vars(job), "signature": outcome.signature}
-    (place / "finding.json").write_text(json.dumps(how, indent=1))
-    (place / "finding.txt").write_text(f"{outcome.signature}\n{outcome.words}\n\n{outcome.traceback}")
-    return place
+        (finding / name).write_bytes(content)
+    document = {"files": list(case.files), "job": vars(job), "signature": outcome.signature}
+    (finding / "finding.json").write_text(json.dumps(document, indent=1))
+    (finding / "finding.txt").write_text(f"{outcome.signature}\n{outcome.words}\n\n{outcome.traceback}")
+    return finding
 
 
-def read_saved(place: Path) -> tuple[Case, Job]:
-    """Return a finding that was saved."""
-    how = json.loads((place / "finding.json").read_text())
-    return Case({name: (place / name).read_bytes() for name in how["files"]}), Job(**how["job"])
+def read_saved(folder: Path) -> tuple[Case, Job]:
+    """Read the case and the job of a saved finding."""
+    document = json.loads((folder / "finding.json").read_text())
+    case = Case({name: (folder / name).read_bytes() for name in document["files"]})
+    return case, Job(**document["job"])
 
 
 def main(words: list[str] | None = None) -> int:
-    """Fuzz, save what was found, and return 1 where that is anything."""
+    """Fuzz, save the findings, and return 1 if there are any."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("formats", nargs="*", metavar="FORMAT", help="by default all")
-    parser.add_argument("--minutes", type=float, default=1.0, help="for each format (1)")
-    parser.add_argument("--seed", type=int, default=int(time.time()), help="by default another one each time")
+    parser.add_argument("formats", nargs="*", metavar="FORMAT", help="formats to fuzz (default: all)")
+    parser.add_argument(
+        "--minutes", type=float, default=1.0, help="time for each format, min (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=int(time.time()), help="random seed (default: the time)")
     parser.add_argument("--out", type=Path, default=Path("fuzz-findings"), help="folder for findings")
     parser.add_argument(
         "--again",
         type=Path,
         nargs="+",
         metavar="FINDING",
-        help="read these saved findings again, and no more",
+        help="only read these saved findings again",
     )
     parser.add_argument(
-        "--seconds", type=float, default=SECONDS, help=f"of a processor for a case ({SECONDS:g})"
+        "--seconds",
+        type=float,
+        default=MAX_CPU_S,
+        help="maximum processor time of a case, s (default: %(default)s)",
     )
-    given = parser.parse_args(words)
+    arguments = parser.parse_args(words)
     known = list_targets()
-    for name in given.formats:
+    for name in arguments.formats:
         if name not in known:
             parser.error(f"unknown format {name!r} (known: {', '.join(known)})")
     warnings.simplefilter("ignore")
-    found = 0
-    with Reader(given.seconds) as reader:
-        for place in given.again or ():
-            outcome = reader.read(*read_saved(place))
-            print(f"{outcome.outcome:<8} {place}\n    {outcome.words.partition(chr(10))[0]}", flush=True)
-            found += not outcome.good
-        if given.again:
-            return 1 if found else 0
-        for target in given.formats or known:
-            if target not in SEEDS:
-                print(f"{target:<10} has no seeds", flush=True)
-                found += 1
-                continue
-            tally = _fuzz_for(target, reader, given.seed, 60.0 * given.minutes)
-            print(f"{tally}  (seed {given.seed})", flush=True)
-            for case, job, outcome in tally.findings.values():
-                small = _shrink(case, job, outcome, reader)
-                place = save(given.out, target, small, job, outcome)
-                print(f"  {outcome.outcome}: {outcome.words.partition(chr(10))[0]}\n    {place}", flush=True)
-                found += 1
-    return 1 if found else 0
+    with Reader(arguments.seconds) as reader:
+        if arguments.again:
+            return 1 if _read_findings(arguments.again, reader) else 0
+        count = 0
+        for target in arguments.formats or known:
+            count += _fuzz_target(target, reader, arguments)
+    return 1 if count else 0
+
+
+def _read_findings(folders: list[Path], reader: Reader) -> int:
+    """Read saved findings again, print their outcomes, and return the number of those that remain."""
+    count = 0
+    for folder in folders:
+        outcome = reader.read(*read_saved(folder))
+        print(f"{outcome.outcome:<8} {folder}\n    {outcome.words.partition(chr(10))[0]}", flush=True)
+        if not outcome.good:
+            count += 1
+    return count
+
+
+def _fuzz_target(target: str, reader: Reader, arguments: argparse.Namespace) -> int:
+    """Fuzz a target, save the findings, and return their number."""
+    if target not in SEEDS:
+        print(f"{target:<10} has no seeds", flush=True)
+        return 1
+    deadline = time.monotonic() + 60.0 * arguments.minutes
+    tally = fuzz(target, reader, arguments.seed, lambda _: time.monotonic() > deadline)
+    print(f"{tally}  (seed {arguments.seed})", flush=True)
+    for case, job, outcome in tally.findings.values():
+        small = _shrink(case, job, outcome, reader)
+        folder = save(arguments.out, target, small, job, outcome)
+        print(f"  {outcome.outcome}: {outcome.words.partition(chr(10))[0]}\n    {folder}", flush=True)
+    return len(tally.findings)
 
 
 def _shrink(case: Case, job: Job, outcome: Outcome, reader: Reader) -> Case:
     def fails(smaller: Case) -> bool:
         return reader.read(smaller, job).signature == outcome.signature
 
-    return shrink(case, fails, 30.0)
-
-
-def _fuzz_for(target: str, reader: Reader, seed: int, seconds: float) -> Tally:
-    deadline = time.monotonic() + seconds
-    return fuzz(target, reader, seed, lambda _: time.monotonic() > deadline)
+    return shrink(case, fails, MAX_SHRINK_S)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Bombs are refused in one line, within seconds and a bounded memory, however much they stand for."""
+"""Bombs are refused with a message of one line, within limits of time and memory."""
 
 import os
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Calling the command in tests, in this process or in one of its own."""
+"""Calls of the command, in this process or in one of its own."""
 
 import json
 import sys
@@ -12,18 +12,18 @@ COMMAND = (sys.executable, "-m", "robocov_app")
 
 
 def read_complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
-    """Call the command with something wrong; return the one line that it must say."""
+    """Call the command with an error, and return its error message, which has to be one line."""
     assert main(list(words)) == status
-    said = capsys.readouterr()
-    assert said.out == ""
-    lines = said.err.strip().splitlines()
-    assert len(lines) == 1, said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    lines = output.err.strip().splitlines()
+    assert len(lines) == 1, output.err
     assert lines[0].startswith("robocov: error: ")
     return lines[0].removeprefix("robocov: error: ")
 
 
 def answer(capsys: pytest.CaptureFixture[str], *words: str) -> dict:
     assert main([*words, "--json"]) == 0
-    said = capsys.readouterr()
-    assert said.err == ""
-    return json.loads(said.out)
+    output = capsys.readouterr()
+    assert output.err == ""
+    return json.loads(output.out)

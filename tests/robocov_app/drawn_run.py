@@ -1,4 +1,4 @@
-"""Maps and made-up runs for the tests of all that draws."""
+"""Maps, synthetic runs and scenes for tests of drawings."""
 
 import numpy as np
 
@@ -41,23 +41,23 @@ SHAFT = Environment("shaft", ((0, 0), (4, 0), (4, 40), (0, 40)), (), {"spread": 
 def record_walk(
     environment: Environment, n: int, steps: int = 40, seed: int = 0, controller: str = "rapf"
 ) -> Record:
-    """Return a record in which every robot walks from its start to another free place.
+    """Return a record in which each robot moves from its start to another free position.
 
-    But for RPF its goals are the centroids of the cells.
+    Goals are the centroids of the cells, except for RPF, which has no goals.
     """
-    begin = environment.start("spread").sample(n, seed)
+    start = environment.start("spread").sample(n, seed)
     end = environment.start("spread").sample(n, seed + 1000)
-    part = np.linspace(0.0, 1.0, steps)[:, None, None]
-    side = np.random.default_rng(seed).normal(size=(1, n, 2)) * 0.3
-    positions = begin + (end - begin) * part + side * np.sin(np.pi * part)
+    fraction = np.linspace(0.0, 1.0, steps)[:, None, None]
+    bend = np.random.default_rng(seed).normal(size=(1, n, 2)) * 0.3
+    positions = start + (end - start) * fraction + bend * np.sin(np.pi * fraction)
     low = environment.region.vertices.min(axis=0)
     high = environment.region.vertices.max(axis=0)
     positions = np.clip(positions, low + 0.1, high - 0.1)
     time = np.arange(steps) * 0.1
-    nothing = np.full_like(positions, np.nan)
-    goals = nothing
+    unknown = np.full_like(positions, np.nan)
+    goals = unknown
     if controller != "rpf":
-        goals = np.array([partition(each, environment.region).centroid for each in positions])
+        goals = np.array([partition(points, environment.region).centroid for points in positions])
     return Record(
         environment=environment,
         team=Team.homogeneous(n),
@@ -72,7 +72,7 @@ def record_walk(
         velocities=np.gradient(positions, time, axis=0),
         forces=np.ones_like(positions),
         goals=goals,
-        obstacle_points=nothing,
+        obstacle_points=unknown,
     )
 
 
@@ -101,12 +101,12 @@ def build_scene(
     sensing_range: float = 3.0,
     communication_range: float = np.inf,
 ) -> Scene:
-    """Return a scene in the square with all that explains a decision."""
+    """Return a scene in the square with all observations and terms of a decision."""
     n = len(positions)
     zero = np.zeros_like(positions)
     forces = zero if forces is None else forces
     team = Team.homogeneous(n, sensing_range=sensing_range, communication_range=communication_range)
-    seen = Observations(
+    observations = Observations(
         positions,
         zero if velocities is None else velocities,
         Neighbors.from_ranges(positions, team.communication_range),
@@ -115,4 +115,6 @@ def build_scene(
         1.5,
     )
     terms = {"attraction": forces, "repulsion_robots": forces, "repulsion_obstacle": forces}
-    return Scene.from_snapshot(SQUARE, team, Snapshot(seen, Decision(forces, goals, terms)), label="RAPF")
+    return Scene.from_snapshot(
+        SQUARE, team, Snapshot(observations, Decision(forces, goals, terms)), label="RAPF"
+    )

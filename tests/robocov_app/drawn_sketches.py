@@ -1,4 +1,4 @@
-"""Strategies of hypothesis: sketches, valid and broken ones, and all edits of the editor."""
+"""Hypothesis strategies for valid and invalid sketches, and for all edits of the editor."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ _sizes = st.integers(-2, 30).map(lambda k: k / 10)
 
 
 def shapes(points=places, sizes=_sizes):
-    """Return a strategy for obstacles, many of them broken."""
+    """Return a strategy for obstacles, many of them invalid."""
     return st.one_of(
         st.builds(PolygonObstacle, rings(points), st.lists(rings(points), max_size=2).map(tuple), names),
         st.builds(CircleObstacle, points, sizes, names),
@@ -113,14 +113,14 @@ backgrounds = st.builds(
 
 @st.composite
 def drafts(draw, shape_strategy=None):
-    """Draw sketches of all kinds, many of them broken."""
-    held = draw(st.lists(shapes() if shape_strategy is None else shape_strategy, max_size=5))
+    """Draw sketches of all kinds, many of them invalid."""
+    drawn_shapes = draw(st.lists(shapes() if shape_strategy is None else shape_strategy, max_size=5))
     notes = draw(st.lists(st.sampled_from(["", "", "ask Ada", "2 m high"]), min_size=5, max_size=5))
     return Sketch(
         name=draw(st.sampled_from(["Hall", "", "Büro 1"])),
         description=draw(st.sampled_from(["", "One floor."])),
         boundary=draw(st.one_of(st.none(), st.just(HALL), rings())),
-        obstacles=tuple(Item(k, shape, notes[k]) for k, shape in enumerate(held)),
+        obstacles=tuple(Item(k, shape, notes[k]) for k, shape in enumerate(drawn_shapes)),
         starts=tuple(
             draw(st.dictionaries(st.sampled_from(["corner", "a b", "start"]), starts, max_size=2)).items()
         ),
@@ -133,11 +133,11 @@ def drafts(draw, shape_strategy=None):
 @st.composite
 def valid_sketches(draw, least=0, most=5):
     """Draw sketches with valid obstacles in a hall; starts may be blocked."""
-    held = draw(st.lists(valid_shapes(), min_size=least, max_size=most))
+    drawn_shapes = draw(st.lists(valid_shapes(), min_size=least, max_size=most))
     return Sketch(
         name="Hall",
         boundary=HALL,
-        obstacles=tuple(Item(k, shape) for k, shape in enumerate(held)),
+        obstacles=tuple(Item(k, shape) for k, shape in enumerate(drawn_shapes)),
         starts=draw(
             st.sampled_from(
                 [
@@ -182,9 +182,9 @@ def changes(draw, sketch):
     side = draw(st.sampled_from(transform.SIDES))
     axis = draw(st.sampled_from(["x", "y"]))
     edges = [
-        Edge(each, ring, k, points[k])
-        for each in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, _ in sketch.list_rings(each)
+        Edge(edge_owner, ring, k, points[k])
+        for edge_owner in (BOUNDARY, *(item.key for item in sketch.obstacles))
+        for ring, points, _ in sketch.list_rings(edge_owner)
         for k in range(len(points))
     ]
     edge = draw(st.sampled_from(edges)) if edges else Edge(BOUNDARY, 0, 0, a)
@@ -192,7 +192,7 @@ def changes(draw, sketch):
         sorted(selection.vertices, key=str) or [vertex for vertex, _ in list_vertices(sketch, owner)][:1]
     )
     key = owner if isinstance(owner, int) else 0
-    deeds = [
+    edits = [
         lambda: create.add_polygon(sketch, [a, b, (a[0], b[1])]),
         lambda: create.add_rectangle(sketch, [a, b]),
         lambda: create.add_circle(sketch, a, length),
@@ -248,7 +248,7 @@ def changes(draw, sketch):
         lambda: clipboard.paste(sketch, clipboard.copy_selection(sketch, selection), a),
     ]
     try:
-        return draw(st.sampled_from(deeds))()
+        return draw(st.sampled_from(edits))()
     except MapError as error:
         assert "\n" not in str(error) and str(error)
         return None

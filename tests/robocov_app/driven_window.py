@@ -124,8 +124,8 @@ class Driver:
             self.window.advance(0.0)
         self.window.run_frame(0.0)
 
-    def post(self, kind: int, **what: Any) -> None:
-        pygame.event.post(pygame.event.Event(kind, **what))
+    def post(self, kind: int, **attributes: Any) -> None:
+        pygame.event.post(pygame.event.Event(kind, **attributes))
 
     # mouse
 
@@ -194,11 +194,11 @@ class Driver:
             self.settle()
 
     def type(self, text: str) -> None:
-        for letter in text:
-            code = ord(letter) if letter.isascii() else 0
-            self.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
-            self.post(pygame.TEXTINPUT, text=letter)
-            self.post(pygame.KEYUP, key=code, mod=0, unicode=letter, scancode=0)
+        for character in text:
+            code = ord(character) if character.isascii() else 0
+            self.post(pygame.KEYDOWN, key=code, mod=0, unicode=character, scancode=0)
+            self.post(pygame.TEXTINPUT, text=character)
+            self.post(pygame.KEYUP, key=code, mod=0, unicode=character, scancode=0)
         self.settle()
 
     # the panel
@@ -270,7 +270,7 @@ class Driver:
         self.type(text)
 
     def drag_slider(self, name: str, part: float) -> None:
-        """Drag a slider's knob to a fraction of its way."""
+        """Drag a slider's knob to a fraction of its range."""
         knob, free = self.find_knob(name)
         x = self.get_widget("slider", name).rect.left + knob.width / 2 + part * free
         self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))

@@ -1,4 +1,4 @@
-"""Pictures to compare the window with: ``python tests/robocov_app/golden_windows.py`` draws them anew."""
+"""Reference images of windows. ``python tests/robocov_app/golden_windows.py`` renders them again."""
 
 import os
 from collections.abc import Callable
@@ -12,6 +12,7 @@ from robocov.mapfile import load_map
 FOLDER = Path(__file__).parents[1] / "golden"
 SIZE = (900, 600)
 FPS = 30
+MIN_VISIBLE_DIFFERENCE = 60
 
 
 def show_comparison(window) -> None:
@@ -19,7 +20,7 @@ def show_comparison(window) -> None:
     play_frames(window, 40)
 
 
-def show_question(window) -> None:
+def inspect_robot(window) -> None:
     window.viewer.inspection.selected = 2
     window.panel.show_tab("robot")
     window.do("layer:force_attraction")
@@ -48,7 +49,7 @@ def show_tour(window) -> None:
 
 SCENES: dict[str, tuple[str, Callable[[object], None]]] = {
     "compared-light": ("light", show_comparison),
-    "asked-dark": ("dark", show_question),
+    "asked-dark": ("dark", inspect_robot),
     "past-light": ("light", show_past),
     "helped-dark": ("dark", show_help),
     "toured-light": ("light", show_tour),
@@ -61,7 +62,7 @@ def play_frames(window, frames: int) -> None:
 
 
 def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
-    """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
+    """Render a scene. `spoil` changes its window before, to test the tolerance."""
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
@@ -69,10 +70,10 @@ def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None)
 
     theme, play = SCENES[name]
     session = Session(SessionScenario(load_map("rooms"), robots=4))
-    opening = ViewerLauncher(
+    launcher = ViewerLauncher(
         session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32
     )
-    with opening.window() as window:
+    with launcher.window() as window:
         spoil(window)
         play(window)
         return copy_pixels(window.screen).copy()
@@ -83,9 +84,9 @@ def read_golden(name: str) -> np.ndarray:
 
 
 def compute_difference(first: np.ndarray, second: np.ndarray) -> float:
-    """Return the part of pixels that anyone would see to be different."""
-    apart = np.abs(first.astype(int) - second.astype(int)).max(axis=2)
-    return float((apart > 60).mean())
+    """Return the fraction of pixels with a clearly visible difference."""
+    differences = np.abs(first.astype(int) - second.astype(int)).max(axis=2)
+    return float((differences > MIN_VISIBLE_DIFFERENCE).mean())
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ RARE_COMMANDS = {
     "tour": 3,
     "try": 6,
 }
-"""Commands that write files or take long, and how often each is pressed at most."""
+"""Commands that write files or take long, with the maximum number of times that each is used."""
 
 SIZES = ((1, 1), (2, 1), (3, 700), (200, 200), (460, 600), (640, 480), (900, 600), (1300, 30), (2000, 700))
 SCALES = (0.25, 0.5, 1.0, 1.0, 1.5, 3.0, 8.0)
@@ -121,7 +121,7 @@ ODD_FILES: dict[str, bytes] = {
 
 
 def write_odd_files(folder: Path) -> list[str]:
-    """Write files that nobody should drop on a window; return their names, and some of no file."""
+    """Write files that a window cannot open, and return their paths, and some paths without files."""
     folder.mkdir()
     (folder / "folder.json").mkdir()
     for name, content in ODD_FILES.items():
@@ -149,9 +149,9 @@ class RandomEvents:
     Parameters
     ----------
     window : BaseWindow
-        Window on a display that nobody sees.
+        Window on an invisible display.
     folder : Path
-        Folder for odd files, not there yet.
+        Folder for odd files, which does not exist yet.
     seed : int
         The same seed gives the same events.
     """
@@ -167,7 +167,7 @@ class RandomEvents:
         self.pressed: dict[str, int] = {}
 
     def play(self, count: int, after_frame: Callable[[], object] = lambda: None) -> None:
-        """Post `count` events, and run a frame after some of them each time."""
+        """Post a number of events, with a frame after every `EVENTS_PER_FRAME` events."""
         kinds: list[tuple[float, Callable[[], None]]] = [
             (0.24, self.press_key_of_command),
             (0.05, self.storm_keys),
@@ -228,9 +228,10 @@ class RandomEvents:
         if self.random.random() < 0.5:
             self.post(pygame.TEXTINPUT, text=text)
         else:
-            for letter in text[:40]:
-                self.post(pygame.KEYDOWN, key=min(ord(letter), 2**20), mod=0, unicode=letter, scancode=0)
-                self.post(pygame.TEXTINPUT, text=letter)
+            for character in text[:40]:
+                code = min(ord(character), 2**20)
+                self.post(pygame.KEYDOWN, key=code, mod=0, unicode=character, scancode=0)
+                self.post(pygame.TEXTINPUT, text=character)
         if self.random.random() < 0.6:
             self.post_key("return")
 
@@ -244,7 +245,7 @@ class RandomEvents:
     def drop_file(self) -> None:
         self.post(pygame.DROPFILE, file=self.random.choice(self.files))
 
-    def choose_place(self) -> tuple[int, int]:
+    def choose_position(self) -> tuple[int, int]:
         width, height = self.window.screen.get_size()
         dice = self.random.random()
         if dice < 0.04:
@@ -257,7 +258,7 @@ class RandomEvents:
 
     def move(self) -> None:
         before = self.at
-        self.at = self.choose_place()
+        self.at = self.choose_position()
         rel = self.at[0] - before[0], self.at[1] - before[1]
         buttons = tuple(int(k in self.held) for k in (1, 2, 3))
         self.post(pygame.MOUSEMOTION, pos=self.at, rel=rel, buttons=buttons, touch=False)
@@ -275,8 +276,15 @@ class RandomEvents:
     def turn_wheel(self) -> None:
         amount = self.random.choice((-1, 1, 1, 3, -3, 10**6, -(10**6), 0))
         precise = self.random.choice((float(amount), 0.0, 1e-9, math.nan, math.inf, -1e30))
-        turned = {"x": 0, "y": amount, "precise_x": 0.0, "precise_y": precise}
-        self.post(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
+        self.post(
+            pygame.MOUSEWHEEL,
+            x=0,
+            y=amount,
+            precise_x=0.0,
+            precise_y=precise,
+            flipped=False,
+            touch=False,
+        )
 
     def touch(self) -> None:
         kind = self.random.choice((pygame.FINGERDOWN, pygame.FINGERMOTION, pygame.FINGERUP))

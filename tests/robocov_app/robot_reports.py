@@ -32,19 +32,19 @@ def build_report(
     positions = np.array(positions, dtype=float)
     limits = {name: terms.pop(name) for name in tuple(terms) if name in Team.__dataclass_fields__}
     team = Team.homogeneous(len(positions), **limits)
-    nothing = np.full_like(positions, np.nan)
+    unknown = np.full_like(positions, np.nan)
     terms = {name: np.array(value, dtype=float) for name, value in terms.items()}
     if forces is None:
         forces = sum(terms.values(), np.zeros_like(positions))
-    seen = Observations(
+    observations = Observations(
         positions,
         np.zeros_like(positions) if velocities is None else np.array(velocities, dtype=float),
         Neighbors.from_ranges(positions, team.communication_range),
-        nothing if points is None else np.array(points, dtype=float),
+        unknown if points is None else np.array(points, dtype=float),
         environment.region,
     )
     goals = None if goals is None else np.array(goals, dtype=float)
-    snapshot = Snapshot(seen, Decision(np.array(forces, dtype=float), goals, terms, cells))
+    snapshot = Snapshot(observations, Decision(np.array(forces, dtype=float), goals, terms, cells))
     return explain(snapshot, team, environment, robot, numbers=names, recent=recent)
 
 

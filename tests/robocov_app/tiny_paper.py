@@ -1,4 +1,4 @@
-"""A study of the paper that is as small as it can be: everything is run, nothing is learnt."""
+"""The smallest study of the paper in which everything is run. Its results mean nothing."""
 
 import time
 from collections.abc import Iterator
@@ -58,7 +58,7 @@ def build_options(workers: int = 2) -> RunnerOptions:
 
 @contextmanager
 def share_folder(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
-    """Give a folder that all workers of a test session have in common, to one of them at a time."""
+    """Lock a folder that all workers of a test session share, and yield it."""
     base = factory.getbasetemp()
     folder = (base.parent if base.name.startswith("popen-") else base) / name
     folder.mkdir(exist_ok=True)

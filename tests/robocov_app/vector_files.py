@@ -1,4 +1,4 @@
-"""Small vector files, written for tests and read by their importers."""
+"""Small vector files for tests of importers."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions
 
 
 def read(folder: Path, kind: str, content: Any, **options: Any) -> ForeignMap:
-    """Write `content` (text, bytes, or what JSON can hold) to a file of that kind, and read it."""
+    """Write text, bytes, or a JSON value to a file of a format, and import the file."""
     importer = IMPORTERS[kind]
     path = folder / f"plan{importer.suffixes[0]}"
     if isinstance(content, bytes):
@@ -25,5 +25,5 @@ def build_square(x: float, y: float, width: float, height: float) -> list[list[f
 
 
 def build_svg(body: str, head: str = 'width="1000" height="600"') -> str:
-    """Return a document of SVG."""
+    """Return an SVG document."""
     return f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>'
