@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 import pygame
-from pygame import Rect
+from pygame import Rect, Surface
 
 from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import Theme
 from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
 from robocov_app.toolkit.widgets.page import Page
@@ -146,9 +147,16 @@ def _choose_strength(tint: _Tint, *, is_hovered: bool, is_held: bool) -> float:
 def draw_focus_ring(page: Page, rect: Rect, key: str) -> None:
     """Draw a ring around a widget if it has the focus."""
     if page.surface is not None and page.focus == key:
-        width = max(2, page.px(_FOCUS_RING_WIDTH_PX))
-        radius = page.px(CORNER_RADIUS_PX)
-        pygame.draw.rect(page.surface, page.theme.accent, rect, width, border_radius=radius)
+        draw_ring(page.surface, rect, page.theme, page.scale)
+
+
+def draw_ring(surface: Surface, rect: Rect, theme: Theme, scale: float) -> None:
+    """Draw a ring that stands out from any widget: in the accent color, with a light line inside."""
+    width = max(2, round(_FOCUS_RING_WIDTH_PX * scale))
+    radius = round(CORNER_RADIUS_PX * scale)
+    pygame.draw.rect(surface, theme.accent, rect, width, border_radius=radius)
+    inner = rect.inflate(-2 * width, -2 * width)
+    pygame.draw.rect(surface, theme.background, inner, max(1, width // 2), border_radius=radius)
 
 
 def draw_text(

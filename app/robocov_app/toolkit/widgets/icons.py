@@ -154,6 +154,12 @@ ICONS: Mapping[str, tuple[Stroke, ...]] = MappingProxyType(
             _line((8.4, 10.8), (15.6, 6.9)),
             _line((8.4, 13.2), (15.6, 17.1)),
         ),
+        "tune": (
+            _line((3.5, 7.0), (20.5, 7.0)),
+            _disc((8.5, 7.0), 3.0),
+            _line((3.5, 16.5), (20.5, 16.5)),
+            _disc((15.5, 16.5), 3.0),
+        ),
         # Tools.
         "hand": _ARROW,
         "select": _ARROW,

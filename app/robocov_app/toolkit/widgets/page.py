@@ -77,6 +77,10 @@ class Page(RowLayout):
         Position of the mouse, px.
     focus : str or None
         Key of the widget that receives key presses.
+    focused_rect : pygame.Rect or None
+        Position of that widget in the last run, also if it is scrolled out of sight, px.
+    reveals_focus : bool
+        Whether the scroll area scrolls to that widget when it is drawn next.
     active : str or None
         Key of the widget on which a mouse button is held down.
     grab_offset : float
@@ -110,6 +114,8 @@ class Page(RowLayout):
         self.surface: Surface | None = None
         self.pointer = (-1, -1)
         self.focus: str | None = None
+        self.focused_rect: Rect | None = None
+        self.reveals_focus = False
         self.active: str | None = None
         self.grab_offset = 0.0
         self.drag_value = 0.0
@@ -156,7 +162,9 @@ class Page(RowLayout):
     def list_focusable_keys(self) -> list[str]:
         """Return the keys of the widgets that can have the focus, in the order in which Tab visits them."""
         widgets = self.widgets.values()
-        return [widget.key for widget in widgets if widget.enabled and widget.kind not in ("label", "bar")]
+        keys = [widget.key for widget in widgets if widget.enabled and widget.kind not in ("label", "bar")]
+        # A slider and the text field of the same value have one key.
+        return list(dict.fromkeys(keys))
 
     # Focus
 
@@ -175,6 +183,7 @@ class Page(RowLayout):
     def set_focus(self, key: str) -> None:
         """Give the focus to a widget; if it is a text field, start editing it."""
         self.focus = key
+        self.reveals_focus = True
         self.open_list = None
         self.needs_redraw = True
         self.edit = None
@@ -289,6 +298,8 @@ class Page(RowLayout):
         disabled_reason : str
             Why the widget is disabled, which is appended to its tool tip; empty if it is enabled.
         """
+        if widget.key == self.focus:
+            self.focused_rect = widget.rect.copy()
         widget.rect = widget.rect.clip(self.clip)
         widget.enabled = not disabled_reason
         widget.tip = ": ".join(text for text in (widget.tip, disabled_reason) if text)

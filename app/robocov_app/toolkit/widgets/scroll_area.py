@@ -25,6 +25,8 @@ _BAR_RIGHT_PX = 1
 _KNOB_MARGINS_PX = (4, 2)
 """Amounts by which the drawn knob is narrower and lower than its area."""
 _HEIGHT_TOLERANCE_PX = 0.5
+_REVEAL_MARGIN_PX = 8
+"""Space between the edge of the area and a widget to which it scrolls."""
 
 # Fractions of the color of text in the color of the knob.
 _KNOB_SHADE = 0.3
@@ -77,8 +79,10 @@ def scroll(page: Page, key: str) -> Iterator[None]:
     page.y -= offset
     content_start = page.y
     page.clear_cells()
+    page.focused_rect = None
     yield
     page.end_row()
+    _reveal_focus(page, key, area)
     # The height is known only now. If it has changed, the scroll bar must be laid out again.
     new_height = page.y - content_start
     if abs(new_height - content_height) > _HEIGHT_TOLERANCE_PX:
@@ -90,6 +94,19 @@ def scroll(page: Page, key: str) -> Iterator[None]:
     page.clip = start_clip
     if page.surface is not None:
         page.surface.set_clip(None)
+
+
+def _reveal_focus(page: Page, key: str, area: Rect) -> None:
+    """Scroll to the widget that has just received the focus, if it is in this area but out of sight."""
+    rect = page.focused_rect
+    if rect is None or page.surface is None or not page.reveals_focus:
+        return
+    page.reveals_focus = False
+    margin = page.px(_REVEAL_MARGIN_PX)
+    shift = min(rect.top - margin - area.top, 0) or max(rect.bottom + margin - area.bottom, 0)
+    if shift:
+        page.scroll_offsets[key] += shift / page.scale
+        page.request_another_run()
 
 
 def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:

@@ -70,5 +70,5 @@ class RobotActions:
     def _require_selected(self) -> int:
         selected = self._viewer.selected_robot
         if selected is None:
-            raise ParameterError("no robot is selected: click one first, or press Tab")
+            raise ParameterError("no robot is selected: click one first, or press I")
         return selected

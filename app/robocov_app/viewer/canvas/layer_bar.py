@@ -12,7 +12,9 @@ from robocov_app.render.scene import Scene
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_card
 from robocov_app.toolkit.tools.pointer import Pixel
+from robocov_app.toolkit.widgets.appearance import draw_ring
 from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
+from robocov_app.toolkit.window.input import ENTER_KEYS
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.viewer.canvas.layer_chips import (
     CHIP_HEIGHT_PX,
@@ -33,6 +35,7 @@ MENU_COMMAND = "layers"
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 10.0
 _CHIP_GAP_PX = 5.0
+_FOCUS_MARGIN_PX = 3.0  # between a chip and the ring around it
 _MENU_COLUMN_PX = 192.0
 _MIN_MENU_COLUMN_PX = 158.0
 _MIN_COLUMN_WITH_KEYS_PX = 184.0
@@ -66,12 +69,15 @@ class LayerBar:
         Chips of the bar that were drawn last, with their boxes.
     rows : list of (Chip, Rect)
         Presets and layers of the open menu, with their boxes.
+    focus : str or None
+        The chip with the keyboard focus; see `FocusGroup`.
     """
 
     def __init__(self, view: ViewState, commands: CommandTable, run_command: Callable[[str], object]) -> None:
         self.is_open = False
         self.chips: list[tuple[Chip, Rect]] = []
         self.rows: list[tuple[Chip, Rect]] = []
+        self.focus: str | None = None
         self._view = view
         self._commands = commands
         self._run_command = run_command
@@ -87,6 +93,35 @@ class LayerBar:
         """Open or close the menu of all layers."""
         self.is_open = not self.is_open
 
+    # Keyboard focus
+
+    def list_focusable_keys(self) -> list[str]:
+        """Return the chips that can have the focus, in the order of Tab."""
+        return [_get_id(chip) for chip, _ in [*self.chips, *self.rows]]
+
+    def set_focus(self, key: str) -> None:
+        """Give the focus to a chip."""
+        self.focus = key
+
+    def stop_typing(self) -> None:
+        """Take the focus away."""
+        self.focus = None
+
+    def handle_key(self, name: str) -> bool:
+        """Handle a key while a chip has the focus; return whether it was used."""
+        if self.focus is None:
+            return False
+        if name == "escape":
+            self.focus = None
+            return True
+        if name not in (*ENTER_KEYS, "space"):
+            return False
+        for chip, _ in [*self.chips, *self.rows]:
+            if _get_id(chip) == self.focus:
+                self._run_command(chip.command)
+                return True
+        return False
+
     # Events
 
     def press(self, pixel: Pixel) -> bool:
@@ -95,6 +130,7 @@ class LayerBar:
         A press elsewhere closes the menu, and still acts on the map.
         """
         self._tool_tip.restart()
+        self.focus = None
         chip = self._find_chip(pixel)
         if chip is not None:
             self._run_command(chip.command)
@@ -129,7 +165,7 @@ class LayerBar:
     @property
     def frame_key(self) -> object:
         """Values that the frame depends on, besides the layers and the scenes."""
-        return self.is_open, self._hovered, bool(self._hovered) and self._tool_tip.is_due
+        return self.is_open, self.focus, self._hovered, bool(self._hovered) and self._tool_tip.is_due
 
     # Drawing
 
@@ -157,6 +193,7 @@ class LayerBar:
         self.rows = []
         if self.is_open:
             self._draw_menu(canvas, layout.arena, layers, scenes)
+        self._draw_focus(screen)
         self._draw_tool_tip(screen)
 
     def _arrange_bar(
@@ -284,6 +321,15 @@ class LayerBar:
             self.rows.append((chip, box))
             y += row_height
         return y + _GROUP_GAP_PX * scale
+
+    def _draw_focus(self, screen: Surface) -> None:
+        """Draw a ring around the chip with the focus; without such a chip, the bar has no focus."""
+        for chip, box in [*self.chips, *self.rows]:
+            if _get_id(chip) == self.focus:
+                margin = round(2 * _FOCUS_MARGIN_PX * self._scale)
+                draw_ring(screen, box.inflate(margin, margin), self._theme, self._scale)
+                return
+        self.focus = None
 
     def _draw_tool_tip(self, screen: Surface) -> None:
         """Draw the tool tip of the chip under the mouse once it is due."""

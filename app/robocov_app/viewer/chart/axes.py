@@ -81,7 +81,7 @@ def draw_axes(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
         canvas.surface.fill(line_color, (round(times.left), round(row), round(times.width), 1))
         position = (times.left - _VALUE_GAP_PX * frame.scale, row)
         canvas.draw_text(f"{value:.6g}", position, size=size, color=frame.theme.faint, anchor="right")
-    row = frame.layout.chart.height - 0.5 * BOTTOM_PX * frame.scale
+    row = scale.bottom + 0.5 * BOTTOM_PX * frame.scale
     step = _choose_time_step(canvas, frame, times)
     for time in list_ticks(0.0, times.end, step).tolist():
         position = (times.to_column(time), row)

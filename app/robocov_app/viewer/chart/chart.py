@@ -7,6 +7,14 @@ from robocov_app.look.theme import Theme
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.window.layout import Box, Layout, is_inside
 from robocov_app.viewer.chart.axes import draw_axes, draw_computation_state, draw_switch, draw_title
+from robocov_app.viewer.chart.branch_tree import (
+    BranchLine,
+    draw_branch_tree,
+    find_branch_line,
+    get_line_box,
+    list_branch_lines,
+    measure_tree,
+)
 from robocov_app.viewer.chart.captions import draw_captions
 from robocov_app.viewer.chart.curves import (
     GHOST_REACH_PX,
@@ -41,9 +49,16 @@ class Chart:
         Position of the pointer in the window; None if the tag at the pointer is not shown.
     ghosts : list of GhostLine
         Curves of other branches on the page.
+    layout : Layout
+        Layout of the window, from `arrange`.
+    theme : Theme
+        Colors, from `arrange`.
     switch_box : Box or None
         Area of the window where a click plots the other quantity; None if there is no other.
     """
+
+    layout: Layout
+    theme: Theme
 
     def __init__(self, viewer: Presenter) -> None:
         """Build a chart without a page; it is drawn after `arrange`."""
@@ -52,6 +67,7 @@ class Chart:
         self.ghosts: list[GhostLine] = []
         self.switch_box: Box | None = None
         self._selected_quantity = DISTANCE
+        self._branch_lines: list[BranchLine] = []
         self._page: pygame.Surface | None = None
         self._scale: ChartScale
         self._page_key: object = None
@@ -60,8 +76,8 @@ class Chart:
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Adopt the layout and the theme of the window."""
-        self._layout = layout
-        self._theme = theme
+        self.layout = layout
+        self.theme = theme
         self._page = None
 
     @property
@@ -77,13 +93,29 @@ class Chart:
         return self._frame.times
 
     @property
+    def branch_lines(self) -> list[BranchLine]:
+        """Lines of the tree of branches, as they were drawn last."""
+        return self._branch_lines
+
+    def find_branch(self, pixel: tuple[int, int]) -> int | None:
+        """Return the last node of the branch at a pixel, in the tree or as a curve; None without one."""
+        line = find_branch_line(self._frame, self._branch_lines, pixel)
+        if line is not None:
+            return line.node
+        return self.find_ghost(pixel)
+
+    def get_branch_box(self, line: BranchLine) -> pygame.Rect:
+        """Return the area of a branch's line in the window."""
+        return get_line_box(self._frame, line)
+
+    @property
     def _has_times(self) -> bool:
         """Whether mean times are known; they are computed only if robots differ in maximum speed."""
         return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
 
     @property
     def _frame(self) -> ChartFrame:
-        return ChartFrame(self._layout, self._theme, self.viewer.session, self.quantity)
+        return ChartFrame(self.layout, self.theme, self.viewer.session, self.quantity)
 
     def switch_quantity(self) -> str:
         """Show the other quantity, and return the status message."""
@@ -100,11 +132,14 @@ class Chart:
 
     def find_ghost(self, pixel: tuple[int, int]) -> int | None:
         """Return the number of the last node of the branch whose curve is at a pixel; None without one."""
-        point = np.array([pixel[0], pixel[1] - self._layout.chart.top])
-        return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self._layout.scale)
+        point = np.array([pixel[0], pixel[1] - self.layout.chart.top])
+        return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self.layout.scale)
 
     def _describe_ghost(self, pixel: tuple[int, int]) -> str:
-        """Describe the branch whose curve is at a pixel; empty without one."""
+        """Describe the branch at a pixel, in the tree or as a curve; empty without one."""
+        line = find_branch_line(self._frame, self._branch_lines, pixel)
+        if line is not None:
+            return line.text
         node = self.find_ghost(pixel)
         for ghost in self.viewer.session.timeline.ghosts:
             if ghost.node == node:
@@ -126,9 +161,11 @@ class Chart:
         page = self._page
         if self._update_page_key(frame) or page is None:
             page = self._draw_page(frame)
-        screen.blit(page, self._layout.chart.position)
+        screen.blit(page, self.layout.chart.position)
         cut_off = {pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes}
         draw_captions(screen, frame, self._scale, cut_off)
+        hovered = None if self.hover is None else self.find_branch(self.hover)
+        draw_branch_tree(screen, frame, self._branch_lines, hovered)
         draw_slider_state(screen, frame)
         if self.hover is not None:
             ghost = self._describe_ghost(self.hover)
@@ -146,6 +183,8 @@ class Chart:
             tuple(pane.number for pane in timeline.panes),
             len(timeline.events),
             len(timeline.ghosts),
+            len(timeline.document.nodes),
+            timeline.head.number,
             frame.times,
             frame.quantity,
             self.viewer.costs.state,
@@ -168,7 +207,9 @@ class Chart:
         self._page_time = self.viewer.now
         curves = [curve.values for curve in frame.list_curves()]
         ghosts = [ghost.values for ghost in frame.list_ghosts()]
-        scale = build_chart_scale(frame.times, layout, curves + ghosts)
+        self._branch_lines = list_branch_lines(frame.timeline)
+        tree_height = measure_tree(len(self._branch_lines))
+        scale = build_chart_scale(frame.times, layout, curves + ghosts, tree_height)
         self._scale = scale
         canvas = create_flat_canvas(page, frame.theme, frame.scale)
         page.fill(frame.theme.panel)

@@ -1,55 +1,71 @@
-"""Marks of events, such as edits and failures, on the chart."""
+"""Icons of events, such as edits and failures, at the top of the chart."""
+
+import pygame
 
 from robocov_app.look.colors import mix
 from robocov_app.render.canvas import Canvas
+from robocov_app.toolkit.overlay import draw_rounded_box
+from robocov_app.toolkit.widgets.icons import render_icon
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import ChartScale
+from robocov_app.viewer.session.past.curves import SessionEvent
 
-EVENT_REACH_PX = 5
+EVENT_REACH_PX = 8
 """Maximum distance, at scale 1, of the pointer from an event that its tag describes."""
-_EVENT_SIGNS = {
-    "obstacle": "■",
-    "robot": "+",
-    "failure": "×",
-    "law": "◆",
-    "limits": "◆",
-    "hand": "●",
-    "density": "▲",
+_EVENT_ICONS = {
+    "obstacle": "wall",
+    "robot": "robot",
+    "failure": "failure",
+    "law": "tune",
+    "limits": "tune",
+    "hand": "hand",
+    "density": "brush",
+    "pane": "panel",
 }
-"""Symbol of each kind of event."""
-_OTHER_EVENT_SIGN = "•"
+"""Icon of each kind of event."""
+_OTHER_EVENT_ICON = "step"
 _MAX_DESCRIBED_EVENTS = 3
 _LINE_STRENGTH = 0.3
+_BADGE_EDGE_STRENGTH = 0.4
 
 # Lengths in pixels at scale 1.
-_TEXT_TOP_PX = 6
-_TEXT_GAP_PX = 3
-_NEXT_TEXT_GAP_PX = 8
-_SIGN_WIDTH_PX = 8
+_BADGE_PX = 18.0
+_ICON_PX = 14.0
+_BADGE_TOP_PX = 1.0
 
 
 def draw_events(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
-    """Draw a line for each event, with its text if there is space, or else with its symbol alone."""
-    events = frame.timeline.events
+    """Draw a line for each event, and a badge with its icon; of events close together, the last one's."""
     times = frame.times
     line_color = mix(frame.theme.panel, frame.theme.ink, _LINE_STRENGTH)
-    for event in events:
+    for event in frame.timeline.events:
         frame.draw_rule(canvas.surface, times.to_column(event.time), line_color, top=0)
-    size = frame.theme.small_text
-    row = scale.top + _TEXT_TOP_PX * frame.scale
-    free_from = scale.times.left  # column from which on there is space for the next text
-    for event in events:
-        column = times.to_column(event.time)
-        sign = _EVENT_SIGNS.get(event.kind, _OTHER_EVENT_SIGN)
-        text = f"{sign} {event.text}"
-        width = canvas.measure_text(text, size)
-        if column + width > scale.times.right:
-            text = sign
-            width = round(_SIGN_WIDTH_PX * frame.scale)
-        if column >= free_from:
-            position = (column + _TEXT_GAP_PX * frame.scale, row)
-            canvas.draw_text(text, position, size=size, color=frame.theme.faint)
-            free_from = column + width + _NEXT_TEXT_GAP_PX * frame.scale
+    for event in select_badges(frame):
+        _draw_badge(canvas, frame, event, scale.top)
+
+
+def select_badges(frame: ChartFrame) -> list[SessionEvent]:
+    """Return the events whose badges do not overlap those of later events."""
+    selected: list[SessionEvent] = []
+    free_until = float("inf")
+    for event in reversed(frame.timeline.events):
+        column = frame.times.to_column(event.time)
+        if column <= free_until:
+            selected.append(event)
+            free_until = column - _BADGE_PX * frame.scale
+    return selected[::-1]
+
+
+def _draw_badge(canvas: Canvas, frame: ChartFrame, event: SessionEvent, top: float) -> None:
+    theme = frame.theme
+    side = round(_BADGE_PX * frame.scale)
+    box = pygame.Rect(0, round(top + _BADGE_TOP_PX * frame.scale), side, side)
+    box.centerx = round(frame.times.to_column(event.time))
+    edge = mix(theme.panel, theme.ink, _BADGE_EDGE_STRENGTH)
+    draw_rounded_box(canvas.surface, box, theme.background, edge=edge, radius=side // 2)
+    name = _EVENT_ICONS.get(event.kind, _OTHER_EVENT_ICON)
+    icon = render_icon(name, round(_ICON_PX * frame.scale), theme.ink)
+    canvas.surface.blit(icon, icon.get_rect(center=box.center), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def describe_events_at(frame: ChartFrame, column: int) -> str:

@@ -129,7 +129,9 @@ class ChartScale:
         return np.column_stack([columns, rows])
 
 
-def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array]) -> ChartScale:
+def build_chart_scale(
+    times: TimeScale, layout: Layout, curves: Sequence[Array], tree_height: float = 0.0
+) -> ChartScale:
     """Build the scale of a chart so that all values of its curves are visible.
 
     Parameters
@@ -138,13 +140,15 @@ def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array])
     layout : Layout
     curves : sequence of (k,) arrays
         Values of the curves; they may be empty.
+    tree_height : float
+        Height of the tree of branches below the time axis, px at scale 1.
 
     Returns
     -------
     ChartScale
     """
     top = TOP_PX * layout.scale
-    bottom = layout.chart.height - BOTTOM_PX * layout.scale
+    bottom = layout.chart.height - (BOTTOM_PX + tree_height) * layout.scale
     values = np.concatenate([*curves, np.empty(0)])
     low = high = np.nan
     if len(values):

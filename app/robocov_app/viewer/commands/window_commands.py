@@ -32,6 +32,8 @@ class ViewerWindowActions(WindowActions):
         Opens the dialog that lists and enters branches.
     toggle_layer_menu : callable
         Opens or closes the menu of all layers.
+    focus_next, focus_previous : callable
+        Give the keyboard focus to the next or the previous control.
     open_share_menu : callable
         Opens the menu of what can be shared.
     toggle_lesson : callable
@@ -46,6 +48,8 @@ class ViewerWindowActions(WindowActions):
     open_file: Action
     list_branches: Action
     toggle_layer_menu: Action
+    focus_next: Action
+    focus_previous: Action
     open_share_menu: Action
     toggle_lesson: Action
     quit: Action
@@ -82,6 +86,8 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
     group.add("layers", "Menu of layers and presets", actions.toggle_layer_menu, "l")
     group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
+    group.add("focus:next", "Next control; Enter or Space uses it", actions.focus_next, "tab", repeats=True)
+    group.add("focus:previous", "Previous control", actions.focus_previous, "shift+tab", repeats=True)
     group.add("fullscreen", "Full screen", actions.toggle_fullscreen, "f11")
     return group.commands
 

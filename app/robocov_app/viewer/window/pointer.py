@@ -111,7 +111,8 @@ class ViewerPointer(Pointer):
             return viewer.tool.choose_cursor(viewer.session)
         if not self._is_over_time():
             return "arrow"
-        if self._chart.is_on_switch(self.pixel):
+        is_on_branch = self._chart.find_branch(self.pixel) is not None
+        if is_on_branch or self._chart.is_on_switch(self.pixel):
             return "hand"
         return "sideways"
 
@@ -158,7 +159,7 @@ class ViewerPointer(Pointer):
         if chart.is_on_switch(pixel):
             viewer.attempt(chart.switch_quantity)
             return None
-        node = chart.find_ghost(pixel)
+        node = chart.find_branch(pixel)
         if node is not None:
             viewer.attempt(lambda: viewer.playback.go_to_node(node))
             return None

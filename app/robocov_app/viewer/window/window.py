@@ -13,17 +13,20 @@ from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
+from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.chart.chart_focus import ChartFocus
 from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.commands.window_commands import ViewerWindowActions, list_window_commands
 from robocov_app.viewer.costs.cost_curves import CostCurves
@@ -48,6 +51,7 @@ from robocov_app.viewer.window.top_bar import TopBar
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 _LESSON_HINT = "F2 back to the lesson · Esc ends it"
+_FOCUS_KEYS = ("tab", "shift+tab")
 _ASPECT_DECIMALS = 3  # smaller changes of the shape of the map do not change the layout
 
 
@@ -111,6 +115,10 @@ class ViewerWindow(CommandWindow):
         The video being recorded.
     run_saver : RunSaver
         Saves runs in other processes.
+    focus : KeyboardFocus
+        Moves the keyboard focus through all controls.
+    chart_focus : ChartFocus
+        The keyboard focus in the chart.
     share : ShareActions
         Shares the session as text, as a file or as a link.
     is_help_open : bool
@@ -154,6 +162,8 @@ class ViewerWindow(CommandWindow):
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
         self.top_bar = TopBar(viewer, self.commands, self.do)
         self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.do)
+        self.chart_focus = ChartFocus(self.chart)
+        self.focus = KeyboardFocus(self._list_focus_groups)
         self.pointer = ViewerPointer(
             viewer,
             self.canvas,
@@ -186,6 +196,8 @@ class ViewerWindow(CommandWindow):
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
             toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),
+            focus_next=lambda: self.focus.step(1),
+            focus_previous=lambda: self.focus.step(-1),
             open_share_menu=self.open_share_menu,
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
@@ -200,6 +212,17 @@ class ViewerWindow(CommandWindow):
     def parts(self) -> Sequence[WindowPart]:
         """Top bar, tool rail and panel."""
         return (self.top_bar, self.tool_rail, self.panel)
+
+    def _list_focus_groups(self) -> list[FocusGroup]:
+        """Return what Tab visits: top bar, tool rail, chips, panel and chart, as far as they are visible."""
+        groups: list[FocusGroup] = [self.top_bar.ui]
+        if not self.tool_rail.hidden:
+            groups.append(self.tool_rail.ui)
+        groups.append(self.layer_bar)
+        if not self.panel.hidden and not self.panel.is_covered:
+            groups.append(self.panel.ui)
+        groups.append(self.chart_focus)
+        return groups
 
     def show_result(self, message: str) -> None:
         """Show the message of a command of the palette, and update the report on the robot."""
@@ -307,6 +330,7 @@ class ViewerWindow(CommandWindow):
             any(part.ui.needs_redraw for part in self.parts),
             self.lesson.frame_key,
             self.layer_bar.frame_key,
+            self.chart_focus.focus,
         )
 
     def _pass_time(self, seconds: float) -> None:
@@ -352,6 +376,7 @@ class ViewerWindow(CommandWindow):
             self.screen.fill(self.theme.background, pygame.Rect(layout.arena))
         self.canvas.draw(self.screen)
         self.chart.draw(self.screen)
+        self.chart_focus.draw(self.screen)
         self._draw_status()
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
@@ -452,11 +477,28 @@ class ViewerWindow(CommandWindow):
         self.viewer.files.open_file(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Offer a key to the lesson as an answer, and then to the panel; return whether it was used."""
-        return self.lesson.handle_key(event.unicode) or super().use_key(event)
+        """Offer a key to the lesson as an answer, and then to the control with the focus.
+
+        Returns
+        -------
+        bool
+            Whether it was used. Tab is not: its command moves the focus.
+        """
+        name = get_key_name(event)
+        if name in _FOCUS_KEYS:
+            return False
+        return (
+            self.lesson.handle_key(event.unicode)
+            or self.layer_bar.handle_key(name)
+            or self.chart_focus.handle_key(name)
+            or super().use_key(event)
+        )
 
     def handle_mouse(self, event: pygame.event.Event) -> None:
         """Pass a mouse event to the page of the lesson, or else to the panel, the chart or the panes."""
+        if event.type == pygame.MOUSEBUTTONDOWN:
+            self.layer_bar.stop_typing()
+            self.chart_focus.stop_typing()
         is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
         if not (is_left_press and self.lesson.click(event.pos)):
             super().handle_mouse(event)
