@@ -173,7 +173,7 @@ _SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
 
 @kernel
 def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array, points: Array) -> None:
-    """Write the nearest points to `points`; see `find_nearest_points`."""
+    """Store the nearest point to each position in `points`; see `find_nearest_points`."""
     info = np.empty(_INFO_SIZE)  # a cpPointQueryInfo
     for i in range(len(positions)):
         arguments = (
@@ -197,7 +197,7 @@ def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array
 def _cast_rays(
     space: int, query: int, positions: Array, ends: Array, fractions: Array, is_hit: BoolArray
 ) -> None:
-    """Write the fractions up to the first shapes, and whether there are any; see `cast_rays`."""
+    """Write the fraction of each ray up to the first shape, and whether it hits one; see `cast_rays`."""
     info = np.empty(_INFO_SIZE)  # a cpSegmentQueryInfo
     for i in range(len(positions)):
         for ray in range(ends.shape[1]):

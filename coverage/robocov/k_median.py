@@ -316,7 +316,10 @@ def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
 
 @kernel
 def _apply_lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, IntArray]:
-    """Return the cost of the sources, and the best source for the targets of each."""
+    """Return the cost of the sources and, for each of them, the best column for its targets.
+
+    Targets are rows of the table, sources are columns. Each target belongs to its nearest source.
+    """
     nearest = _find_nearest_sources(table, sources)
     cost = 0.0
     has_targets = np.zeros(len(sources), dtype=np.bool_)
@@ -327,7 +330,7 @@ def _apply_lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tupl
         has_targets[k] = True
         for column in range(table.shape[1]):
             sums[k, column] += table[t, column]
-    # Sources that are fixed or have no targets keep their columns. No two sources may become equal.
+    # Sources that are fixed or have no targets keep their columns. No two sources may get the same column.
     is_taken = np.zeros(table.shape[1], dtype=np.bool_)
     for k in range(len(sources)):
         is_taken[sources[k]] |= fixed[k] or not has_targets[k]

@@ -96,7 +96,7 @@ class Tiles(NamedTuple):
 def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     """Build the sites of a lattice and their tiles.
 
-    The region's bounding box, widened to a square from its lower left corner, is cut into ``side²`` cells.
+    The region's bounding box, extended to a square from its lower left corner, is cut into ``side²`` cells.
 
     Parameters
     ----------
@@ -121,6 +121,7 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     for first in range(0, side * side, _CELLS_PER_BLOCK):
         cells = np.arange(first, min(first + _CELLS_PER_BLOCK, side * side))
         centers = _compute_centers(cells, side, spacing, geodesics.grid.origin)
+        # Column c of `is_inside` says which cells are in component c of the free space.
         is_inside = geodesics.count_windings(geodesics.grid.snap(centers)) == 1
         is_free = is_inside.any(axis=1)
         all_cells.append(cells[is_free])

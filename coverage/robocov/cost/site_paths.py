@@ -190,7 +190,7 @@ def find_site_paths(
 def _write_tile_paths(
     tiles: Tiles, search: Search, tile: int, team: int, unit: float, paths: SitePaths
 ) -> None:
-    """Write the paths that a search has found to the sites of a tile to the row of a team."""
+    """Store the paths that a search has found to the sites of a tile in the row of a team in `paths`."""
     for slot in range(SLOTS):
         site = tiles.site[tile, slot]
         if site == NO_SITE:
@@ -210,8 +210,9 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
     """Find the paths from the robots of a team, (n, 2), to all sites.
 
     At first, each site belongs to the robot that is nearest in a straight line. Sites that this robot does
-    not see are hidden. Paths to them are searched via corners, and from other robots. Return whether the
-    index of the walls around the robots had enough entries.
+    not see are hidden. Paths to them are searched via corners, and from other robots. `is_covered`, (c,),
+    says which components of the free space contain robots. Return whether the index of the walls around the
+    robots had enough entries.
     """
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
@@ -339,10 +340,10 @@ def _find_nearest_robots_of_tile(
 
 @kernel
 def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
-    """Find the hidden sites of a tile: those that their nearest robot does not see, because of a wall.
+    """Find the hidden sites of a tile: those that a wall hides from their nearest robot.
 
-    They are marked in a bit mask with one bit for each slot of the tile. Sites in components of the free
-    space without robots have no path.
+    They are marked in a bit mask with one bit for each slot of the tile. `is_covered`, (c,), says which
+    components of the free space contain robots; sites in the others have no path.
     """
     tiles = cost_map.tiles
     hidden_slots = 0
@@ -358,6 +359,7 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
             if is_certainly_visible(search.wall_index, robot, x, y):
                 continue
             if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
+                # Infinite until a path via a corner, or from another robot, is found.
                 search.site_length[tile, slot] = np.inf
                 hidden_slots |= 1 << slot
     search.hidden_slots[tile] = hidden_slots

@@ -93,9 +93,9 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 
 def _choose_grid_shape(request: Request) -> GridShape:
-    """Choose the numbers of columns and rows of a grid of about the requested number of cells.
+    """Choose the number of columns and rows of a grid with about the requested number of cells.
 
-    Grids of nearly square cells are preferred.
+    Grids with nearly square cells are preferred.
     """
 
     def compute_mismatch(shape: GridShape) -> float:
@@ -184,15 +184,17 @@ def _clear_disc(
     segments = _list_segments(walls)
     starts = np.column_stack([np.take(x, segments.columns), np.take(y, segments.rows)])
     ends = np.column_stack([np.take(x, segments.end_columns), np.take(y, segments.end_rows)])
-    # A wall extends by half its thickness to both sides: in x if it is vertical, in y if it is horizontal.
-    is_wide = np.column_stack([~segments.is_horizontal, segments.is_horizontal])
-    half_widths = thickness / 2.0 * is_wide
-    lower_left = starts - half_widths
-    upper_right = ends + half_widths
+    # A wall extends half its thickness to either side: in x if it is vertical, in y if it is horizontal.
+    # `is_across` says which of the two axes lies across each wall.
+    is_across = np.column_stack([~segments.is_horizontal, segments.is_horizontal])
+    margins = thickness / 2.0 * is_across
+    lower_left = starts - margins
+    upper_right = ends + margins
     boxes = shapely.box(*lower_left.T, *upper_right.T)
-    is_touched = shapely.intersects(boxes, shapely.Point(corner_disc.center).buffer(corner_disc.radius))
+    disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
+    is_touched = shapely.intersects(boxes, disc)
     for k in np.flatnonzero(is_touched).tolist():
-        segments.remove(walls, k)
+        segments.remove_from(walls, k)
     return bool(is_touched.any())
 
 
@@ -210,8 +212,8 @@ class _Segments(NamedTuple):
     is_horizontal: BoolArray
     """(w,) Whether each wall leads to the right. The others lead upwards."""
 
-    def remove(self, walls: BoolArray, k: int) -> None:
-        """Remove wall k of the list from an array of walls, which is changed in place."""
+    def remove_from(self, walls: BoolArray, k: int) -> None:
+        """Remove segment k from an array of walls, which is changed in place."""
         direction = _HORIZONTAL if self.is_horizontal[k] else _VERTICAL
         walls[self.columns[k], self.rows[k], direction] = False
 
@@ -320,7 +322,7 @@ def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
             is_candidate &= is_dead_end
     candidates = np.flatnonzero(is_candidate)
     chosen = candidates[int(rng.integers(len(candidates)))]
-    segments.remove(walls, chosen)
+    segments.remove_from(walls, chosen)
 
 
 def _count_openings(walls: BoolArray) -> IntArray:

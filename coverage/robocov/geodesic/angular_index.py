@@ -125,14 +125,19 @@ class AngularWallIndex(NamedTuple):
 
 
 class _SpannedBins(NamedTuple):
-    """The angular bins that a wall spans, seen from a source."""
+    """The angular bins that a wall spans, seen from a source.
+
+    The wall covers a bin if it crosses every direction of the bin.
+    """
 
     first: int
+    """The first bin that contains a direction to the wall."""
     last: int
+    """The last such bin (inclusive)."""
     first_covered: int
-    """The first bin that the wall covers completely."""
+    """The first bin that the wall covers."""
     end_covered: int
-    """The bin after the last one that the wall covers completely."""
+    """The bin after the last one that the wall covers (exclusive)."""
 
 
 @kernel
@@ -331,11 +336,11 @@ def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squa
 def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, entry_count: int) -> int:
     """Add a wall to the bins that it spans if it faces the source; return the new number of entries.
 
-    The directions from the source are divided into angular bins, each with a list of the walls in it. The
-    wall limits the clear distance of a bin, up to which nothing is hidden, to its own smallest distance. If
-    it covers the whole bin, it also limits the horizon, beyond which everything is hidden, to its largest
-    one. A wall beyond the horizon of a bin is not added to it. Distances and angles are padded against
-    rounding.
+    The directions from the source are divided into angular bins, each with a list of the walls in it.
+    Nothing is hidden up to the clear distance of a bin, which is at most the smallest distance of each wall
+    in the bin. Everything is hidden beyond the horizon of a bin, which is at most the largest distance of
+    each wall that covers the whole bin. A wall beyond the horizon of a bin is not added to the bin. Distances
+    and angles are padded to allow for rounding.
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
@@ -362,7 +367,8 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
         entry_count += 1
         if bins.first_covered <= unwrapped_bin < bins.end_covered:
             index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_distance)
-    # The last bin is covered only in part; the walls that follow this one may cover the rest.
+    # The wall covers only the first part of the bin in which it ends. If the next walls cover the rest, the
+    # chain of these walls covers the bin, and its largest distance limits the horizon.
     k = _wrap_bin(bins.end_covered, bin_count)
     has_partial_bin = bins.first_covered <= bins.end_covered < bins.first + bin_count
     if has_partial_bin and max_squared_distance < index.squared_horizon[source, k]:
@@ -376,13 +382,16 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
 
 @kernel
 def _span_bins(start_angle: float, end_angle: float, bin_count: int) -> _SpannedBins:
-    """Return the bins between two pseudo-angles. Bins beyond a full turn are not wrapped around."""
+    """Return the bins between two pseudo-angles. Bins beyond a full turn are not wrapped around.
+
+    Spanned bins are rounded outward and covered bins inward, so that rounding errors of angles do no harm.
+    """
     bins_per_unit = bin_count / _FULL_TURN
     first = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
     last = int(np.floor((end_angle + _ANGLE_PADDING) * bins_per_unit))
     return _SpannedBins(
         first=first,
-        # No bin appears twice.
+        # At most a full turn, so that no bin appears twice.
         last=min(last, first + bin_count - 1),
         first_covered=int(np.ceil((start_angle + _ANGLE_PADDING) * bins_per_unit)),
         end_covered=int(np.floor((end_angle - _ANGLE_PADDING) * bins_per_unit)),

@@ -114,9 +114,9 @@ class Geodesics:
     def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
         """Build the graph of the corners that see each other."""
         count = len(self.corners)
-        visible = np.empty(count, np.int64)
+        visible_buffer = np.empty(count, np.int64)  # Scratch space of `find_links`.
         pairs, lengths = self.run_for_corners(
-            partial(find_links, self.walls, visible),
+            partial(find_links, self.walls, visible_buffer),
             index_columns=2,
             length_columns=1,
             progress=None if heartbeat is None else lambda _: heartbeat(),

@@ -99,17 +99,21 @@ class ConfigurationSpace:
         return None
 
     def _push_apart(self, positions: Array, pairs: IntArray) -> Array:
-        """Return (n, 2) positions with the robots of (p, 2) pairs pushed apart, both by the same distance."""
+        """Return the (n, 2) positions after the robots of each of the (p, 2) pairs are pushed apart.
+
+        Both robots of a pair move by the same distance.
+        """
         first = pairs[:, 0]
         second = pairs[:, 1]
         offset = positions[second] - positions[first]
         distance = compute_lengths(offset)
         # The direction between coincident robots is undefined: use a fixed one that differs between pairs.
         is_coincident = distance == 0.0
-        numbers = first[is_coincident] + second[is_coincident] * len(positions)
-        offset[is_coincident] = compute_spread_directions(numbers)
-        length = np.where(is_coincident, 1.0, distance)
-        fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / length
+        pair_numbers = first[is_coincident] + second[is_coincident] * len(positions)
+        offset[is_coincident] = compute_spread_directions(pair_numbers)
+        # The offsets of coincident robots are unit vectors now.
+        offset_length = np.where(is_coincident, 1.0, distance)
+        fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / offset_length
         push = offset * fraction[:, None]
         new_positions = positions.copy()
         np.subtract.at(new_positions, first, push)

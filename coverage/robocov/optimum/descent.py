@@ -108,9 +108,10 @@ class _Descent:
     recent_pairs: deque[_CurvaturePair] = field(default_factory=lambda: deque(maxlen=_MEMORY))
 
     def step(self) -> bool:
-        """Move the robots to a lower cost; return whether that was possible."""
+        """Move the robots to positions of lower cost; return whether that was possible."""
         gradient = _compute_gradient(self.result)
-        curvature = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
+        # Distances less than half the spacing of the sites are below the resolution of the cost.
+        curvature = _compute_curvature(self.result, min_distance=self.cost.spacing / 2.0)[:, None]
         improved = None
         if self.recent_pairs:
             direction = _compute_quasi_newton_direction(gradient, curvature, self.recent_pairs)

@@ -279,10 +279,10 @@ class GridPlanner(MapWindow):
         if key not in self._visible_nodes:
             if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
                 self._visible_nodes.clear()
-            close = self._find_close_nodes(position, self.has_clearance)
-            visible = close[self.find_clear_lines(position, self.nodes[close], self.is_blocked)]
+            close_nodes = self._find_close_nodes(position, self.has_clearance)
+            is_visible = self.find_clear_lines(position, self.nodes[close_nodes], self.is_blocked)
             # A robot that seems to be inside a wall is actually next to it.
-            self._visible_nodes[key] = visible if len(visible) else close[:1]
+            self._visible_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
         return self._visible_nodes[key]
 
     def _find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
@@ -320,8 +320,8 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (w, 2) array, m
-            Waypoints, each in sight of the one before. The last one is the goal, or the node closest to it
-            that a path leads to, or the position itself if no path leads anywhere. No tight cell is crossed
+            Waypoints, each in sight of the one before. The last one is the goal, or the closest node to it
+            that can be reached, or the position itself if no node can be reached. No tight cell is crossed
             between waypoints. If the position itself is tight, the route leaves it in a straight line.
         """
         is_direct = self.find_clear_lines(position, goal[None], self.is_tight, self.clearance)[0]
@@ -331,13 +331,15 @@ class GridPlanner(MapWindow):
         if first == NO_NODE:
             return np.array(position[None])
         distance, predecessor = self._find_shortest_paths(first)
-        close = self._find_close_nodes(goal, np.isfinite(distance) & self.has_clearance)
-        if not len(close):
+        close_nodes = self._find_close_nodes(goal, np.isfinite(distance) & self.has_clearance)
+        if not len(close_nodes):
             return np.array(position[None])
-        is_visible = self.find_clear_lines(goal, self.nodes[close], self.is_tight)
+        # The robot may be too close to a wall where its route starts, but not where it ends. Therefore no
+        # cells around the goal are ignored.
+        is_visible = self.find_clear_lines(goal, self.nodes[close_nodes], self.is_tight)
         # The last node is the nearest one in sight of the goal, or simply the nearest one if none is in sight
         # (`argmax` returns the first True, or 0 if there is none).
-        last = int(close[is_visible.argmax()])
+        last = int(close_nodes[is_visible.argmax()])
         path = [last]
         while path[-1] != first:
             path.append(int(predecessor[path[-1]]))
@@ -358,11 +360,12 @@ class GridPlanner(MapWindow):
         If possible, no tight cell, which is too close to a wall, lies on the line to the node. Those around
         the position do not count, because the robot may be too close to a wall.
         """
-        close = self._find_close_nodes(position, self.has_clearance)
-        is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
+        close_nodes = self._find_close_nodes(position, self.has_clearance)
+        ends = self.nodes[close_nodes]
+        is_visible = self.find_clear_lines(position, ends, self.is_tight, 2.0 * self.clearance)
         if not is_visible.any():
-            is_visible = self.find_clear_lines(position, self.nodes[close], self.is_blocked)
-        return int(close[is_visible.argmax()]) if is_visible.any() else NO_NODE
+            is_visible = self.find_clear_lines(position, ends, self.is_blocked)
+        return int(close_nodes[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
         """Return the waypoints without those that can be skipped, because later ones are in sight.

@@ -7,7 +7,7 @@ g = b b' + 2 (a c' + a' c) determines how they meet. They intersect in two point
 
 With r n the point of a curve that is nearest to the generator, and its curvature k = 2 a, the parameter t of
 
-    q(t) = r n + (2 t m - 2 k t² n) / (1 + k² t²),      m = n turned left,
+    q(t) = r n + (2 t u - 2 k t² n) / (1 + k² t²),      u = n turned left by 90°,
 
 is half the tangent of half the angle on a circle, and half the distance on a line. The cell is to the left
 of the curve. The condition of every other curve on q(t) is a quadratic in t, so that both intersections come
@@ -521,11 +521,11 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_cou
 
 @kernel
 def _evaluate(curve: Array, t: float) -> tuple[float, float]:
-    """Return the point q(t) of a curve, m.
+    """Return the point q(t) of a curve, in meters.
 
-    With n the normal of the curve, m = n turned left, r its distance from the generator and k its curvature,
-    q(t) = r n + (2 t m - 2 k t² n) / (1 + k² t²). For large t, the fraction is divided by t², so that nothing
-    overflows.
+    The equation of q(t) is in the description of the module: `outward` is the coordinate along the normal n
+    of the curve, `leftward` the one along n turned left. For large t, numerator and denominator of the
+    fraction are divided by t² to avoid overflow.
     """
     curvature = 2.0 * curve[_COEFFICIENT]
     if abs(curvature * t) <= 1.0:
@@ -548,8 +548,9 @@ def _find_parameter(curve: Array, x: float, y: float) -> float:
 
     The point may lie off the curve because of rounding.
     """
-    # Insert q(t): its components are outward = -2 k t² / (1 + k² t²) and leftward = 2 t / (1 + k² t²). Both
-    # quotients below are then equal to t. If the divisor of the first one is small, the second is accurate.
+    # Substitute q(t): relative to r n, its components are outward = -2 k t² / (1 + k² t²) and
+    # leftward = 2 t / (1 + k² t²). Both quotients below then equal t. Where the divisor of the first one is
+    # small, the second one is accurate.
     curvature = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]
