@@ -171,7 +171,7 @@ class MapError(InputError):
 
     @classmethod
     def from_issues(cls, where: str, issues: Sequence[Issue], unlisted: int = 0) -> MapError:
-        """Build the error of a document.
+        """Build the error for the issues of a document.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class MapError(InputError):
         issues : sequence of Issue
             At least one.
         unlisted : int
-            Number of issues in addition to these.
+            Number of further issues, which are not in `issues`.
 
         Returns
         -------

@@ -151,7 +151,7 @@ def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[E
     Parameters
     ----------
     name : str
-        "failures" or "joins", for messages.
+        "failures" or "joins", used in error messages.
     kind : Failure or Join
     values : iterable of (robot, time) or (robot, time, place)
 

@@ -135,9 +135,11 @@ class Adaptive(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
-        """Return the memory of robots that have not measured anything."""
+        """Return the memory of robots that have not measured anything yet."""
         robot_count = len(team)
-        lattice = Lattice.build(region, int(self.basis), self.correlation)
+        # Gains are floats, even where they are whole numbers.
+        functions_per_side = int(self.basis)
+        lattice = Lattice.build(region, functions_per_side, self.correlation)
         sample_count, function_count = lattice.functions.shape
         return AdaptiveMemory(
             team=team,
@@ -195,7 +197,7 @@ class Adaptive(BaseController):
         neighbor_positions = seen.positions[pairs.robot] - pairs.offset
         is_own = find_own_samples(samples, seen.positions, pairs.robot, neighbor_positions)
         if self.estimate == "gp":
-            memory = self._learn_by_process(seen, memory)
+            memory = self._learn_by_gaussian_process(seen, memory)
         else:
             memory = self._learn_by_basis(seen, memory, is_own)
         goals = compute_sample_centroids(is_own, samples, memory.estimates, seen.positions)
@@ -244,8 +246,8 @@ class Adaptive(BaseController):
             parameter_exchange=exchange.start_period(),
         )
 
-    def _learn_by_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with the robots' own measurements, and the estimates from all that they know."""
+    def _learn_by_gaussian_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
+        """Return the memory with the robots' new measurements, and estimates from all known measurements."""
         lattice = memory.lattice
         values = _measure(seen)
         measurements = memory.measurements.copy()
@@ -255,7 +257,7 @@ class Adaptive(BaseController):
             is_new = measurements[robot, square] != values[robot]
             measurements[robot, square] = values[robot]
             if is_new or memory.has_new_measurements[robot]:
-                estimate = self._estimate_by_process(lattice, measurements[robot])
+                estimate = self._estimate_by_gaussian_process(lattice, measurements[robot])
                 estimates[robot] = np.maximum(estimate, self.least)
         return replace(
             memory,
@@ -265,18 +267,25 @@ class Adaptive(BaseController):
             measurement_exchange=memory.measurement_exchange.start_period(measurements),
         )
 
-    def _estimate_by_process(self, lattice: Lattice, measurements: Array) -> Array:
-        """Return the estimate of one robot at the samples, (k,), from measurements in the squares, (s,)."""
+    def _estimate_by_gaussian_process(self, lattice: Lattice, measurements: Array) -> Array:
+        """Return one robot's estimate at the samples, (k,), given its measurements in the squares, (s,).
+
+        It is the mean of the Gaussian process, plus `explore` standard deviations. All variances and
+        covariances are relative to the variance of the prior, whose standard deviation is taken to be as
+        large as its mean, `prior`.
+        """
         is_known = ~np.isnan(measurements)
-        covariance = lattice.square_covariance[is_known][:, is_known]
-        factor = scipy.linalg.cho_factor(covariance + _NOISE_VARIANCE * np.eye(len(covariance)))
+        known_covariance = lattice.square_covariance[is_known][:, is_known]
+        noise = _NOISE_VARIANCE * np.eye(len(known_covariance))
+        factor = scipy.linalg.cho_factor(known_covariance + noise)
         weights = scipy.linalg.cho_solve(factor, measurements[is_known] - self.prior)
         estimate = self.prior + lattice.sample_covariance[:, is_known] @ weights
         if self.explore:
-            # The standard deviation at a sample is taken from the nearest square.
-            square_covariance = lattice.square_covariance[:, is_known]
-            solution = scipy.linalg.cho_solve(factor, square_covariance.T).T
-            variance = np.maximum(1.0 - (square_covariance * solution).sum(axis=1), 0.0)
+            # The standard deviation at a sample is taken from the nearest square. Row i of `cross_covariance`
+            # contains the covariances of square i and the squares with a measurement.
+            cross_covariance = lattice.square_covariance[:, is_known]
+            solution = scipy.linalg.cho_solve(factor, cross_covariance.T).T
+            variance = np.maximum(1.0 - (cross_covariance * solution).sum(axis=1), 0.0)
             nearest_square = lattice.sample_covariance.argmax(axis=1)
             estimate += self.explore * self.prior * np.sqrt(variance)[nearest_square]
         return np.asarray(estimate)

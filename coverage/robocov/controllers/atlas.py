@@ -431,9 +431,9 @@ class Atlas(BaseController):
             if evasion_goal is not None:
                 return replace(state, motion=OwnMotion(own.goal, viewpoint)), evasion_goal
         # After a change of the team or the walls, the path length starts from zero.
-        path_increase = max(state.path.length - previous.path.length, 0.0)
+        added_length = max(state.path.length - previous.path.length, 0.0)
         path, motion = self._choose_motion(
-            state, own, position, path_increase, is_agreed=cooperation.is_agreed
+            state, own, position, added_length, is_agreed=cooperation.is_agreed
         )
         goal = motion.goal if motion.viewpoint is None else motion.viewpoint
         return replace(state, path=path, motion=motion), goal
@@ -527,31 +527,39 @@ class Atlas(BaseController):
         )
 
     def _choose_motion(
-        self, state: PlannerState, own: OwnGoal, position: Array, path_increase: float, *, is_agreed: bool
+        self, state: PlannerState, own: OwnGoal, position: Array, added_length: float, *, is_agreed: bool
     ) -> tuple[TraveledPath, OwnMotion]:
-        """Return a robot's path, and its motion: to its own goal, or first to a viewpoint."""
+        """Return a robot's updated path and its motion: straight to its own goal, or first to a viewpoint.
+
+        The robot looks for a viewpoint when it has arrived at its goal, and again in every plan on the way to
+        a viewpoint. `added_length` is the length of its path since the last plan, m.
+        """
         assert state.basis is not None
         planner = state.basis.planner
         path = state.path
         previous_viewpoint = None if state.motion is None else state.motion.viewpoint
-        if previous_viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
+        is_away_from_goal = math.dist(own.goal, position) > _ARRIVAL_RADIUS_M
+        if previous_viewpoint is None and is_away_from_goal:
             return path, OwnMotion(own.goal)
         if previous_viewpoint is not None:
-            path = replace(path, viewpoint_length=path.viewpoint_length + path_increase)
+            path = replace(path, viewpoint_length=path.viewpoint_length + added_length)
             if math.dist(previous_viewpoint, position) < _ARRIVAL_RADIUS_M:
                 path = replace(path, viewpoints=(*path.viewpoints, previous_viewpoint))
         viewpoint = None
         node = planner.find_own_node(position)
-        # The goal of a robot without others hardly depends on unknown space.
-        if node >= 0 and self.stake < 1.0 and len(state.basis.robots) > 1:
+        # The goal of a lone robot hardly depends on unknown space, so it needs no viewpoints.
+        has_others = len(state.basis.robots) > 1
+        if node >= 0 and self.stake < 1.0 and has_others:
+            # The longer the path to viewpoints already is, the more must be at stake for another one.
             patience = self.patience * (_SHARED_PATIENCE_FACTOR if is_agreed else 1.0)
             doubling_length = patience * state.known_map.raster.region.diameter
             doublings = min(path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
+            min_stake = self.stake * own.cost * 2.0**doublings
             viewpoint = find_viewpoint(
                 planner,
                 own.cell_distances,
                 path_lengths=planner.get_distances(node),
-                min_stake=self.stake * own.cost * 2.0**doublings,
+                min_stake=min_stake,
                 previous_viewpoints=path.viewpoints,
             )
         return path, OwnMotion(own.goal, viewpoint, is_idle=viewpoint is None)

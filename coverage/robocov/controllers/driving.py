@@ -305,7 +305,7 @@ def find_nearest_allowed(
 def _find_allowed_interval(
     normals: Array, offsets: Array, k: int, radius: float, slack: float
 ) -> tuple[float, float]:
-    """Return the interval of t in which the edge of half plane k is in the disc and in those before it.
+    """Return the interval of t in which the edge of half plane k lies in the disc and half planes 0 to k - 1.
 
     With (nx, ny) the normal of half plane k, the points of its edge are offset (nx, ny) + t (-ny, nx). The
     lower end of the interval is infinite if no point is allowed.
@@ -316,9 +316,10 @@ def _find_allowed_interval(
     high = math.sqrt(max(radius * radius - offset * offset, 0.0))
     low = -high
     if offset < -radius:
+        # Half plane k excludes the whole disc.
         low = math.inf
     for j in range(k):
-        # Half plane j allows the points with slope t <= max_rise.
+        # Half plane j allows the points with slope * t <= max_rise.
         slope = normals[j, 1] * nx - normals[j, 0] * ny
         max_rise = offsets[j] - offset * (normals[j, 0] * nx + normals[j, 1] * ny)
         if slope >= _MIN_SLOPE:
@@ -326,7 +327,7 @@ def _find_allowed_interval(
         elif slope <= -_MIN_SLOPE:
             low = max(low, max_rise / slope)
         elif max_rise < -slack:
-            # The edges are parallel, and no point of this one is allowed.
+            # The edges are parallel, and half plane j excludes all of edge k.
             low = math.inf
     return low, high
 

@@ -117,15 +117,15 @@ class FrontierMedian(SharedMapController):
         return np.asarray(np.where(is_long[labels], labels, 0))
 
     def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
-        """Return the path length from each robot to each target, (k, t) m; infinite if there is no path."""
+        """Return the path length from each robot to each target, (k, t) m; inf where there is no path."""
         planner = situation.planner
-        with_clearance = np.flatnonzero(planner.has_clearance)
-        if not len(targets) or not len(with_clearance):
+        clear_nodes = np.flatnonzero(planner.has_clearance)
+        if not len(targets) or not len(clear_nodes):
             return np.full((len(situation.positions), len(targets)), np.inf)
-        squared_distances = ((targets[:, None] - planner.nodes[with_clearance]) ** 2).sum(axis=2)
-        nodes = with_clearance[squared_distances.argmin(axis=1)]
+        squared_distances = ((targets[:, None] - planner.nodes[clear_nodes]) ** 2).sum(axis=2)
+        target_nodes = clear_nodes[squared_distances.argmin(axis=1)]
         return np.array(
-            [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+            [planner.compute_distances_from(position[None])[target_nodes] for position in situation.positions]
         )
 
     def _assign_targets(self, situation: Situation, targets: Array, path_lengths: Array) -> Array:

@@ -412,7 +412,7 @@ class Poduri(BaseController):
         """Return whether the selected links are critical for the neighbor, as far as the robot can tell.
 
         A link is critical for the neighbor if at most K robots are near it, within η R_c, and fewer than K
-        are nearer to it than the robot is. Only robots that the robot knows count: itself and its neighbors.
+        are nearer to it than the robot is. Only robots known to the robot count: itself and its neighbors.
         """
         knows = _find_known_robots(seen)
         # Entry (i, j) is the number of robots near j that robot i knows. Products of float matrices are much
@@ -423,8 +423,10 @@ class Poduri(BaseController):
         candidates = selected[has_few_near]
         distances = np.full(knows.shape, np.inf)
         distances[links.robot, links.neighbor] = links.distance
-        # Entry (c, k) of both arrays is about candidate c and robot k.
-        is_nearer = distances[links.neighbor[candidates]] < links.distance[candidates, None]
+        # In all (c, n) arrays, row c belongs to candidate c, and column k to robot k.
+        neighbor_distances = distances[links.neighbor[candidates]]
+        own_distance = links.distance[candidates, None]
+        is_nearer = neighbor_distances < own_distance
         is_known = knows[links.robot[candidates]]
         nearer_counts = (is_nearer & is_known).sum(axis=1)
         is_critical = np.zeros(len(selected), dtype=bool)

@@ -53,7 +53,7 @@ class Sightings:
         return cls(positions=np.full((*shape, 2), np.nan), times=np.full(shape, -np.inf))
 
     def update(self, seen: Observations, team: Team) -> Sightings:
-        """Return the sightings with the robots that are heard in this step, and without those that are lost.
+        """Return the sightings, updated with the robots heard in this step and without the lost ones.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class Sightings:
         return replace(self, positions=positions, times=times)
 
     def receive(self, seen: Observations) -> Sightings:
-        """Return the sightings with those that arrive in this step, where they are newer."""
+        """Return the sightings, updated with the newer ones that the robots receive in this step."""
         if not seen.messages:
             return self
         positions = self.positions.copy()

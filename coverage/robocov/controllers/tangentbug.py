@@ -343,20 +343,21 @@ class ObstacleView:
         return None if np.isnan(distances).all() else self.points[int(np.nanargmin(distances))]
 
     def find_contour_ends(self, direction: Array, jump: float) -> dict[int, ContourEnd]:
-        """Return the ends of the contour that blocks the view in a direction, by the turn toward each.
+        """Return the ends of the contour that blocks the view in a direction.
 
         Parameters
         ----------
         direction : (2,) array
             Of any length.
         jump : float, m
-            The contour ends before a ray whose free distance exceeds that of the previous ray by this, and
-            before a ray whose free distance is the range of the sensor.
+            Minimum increase of the free distance from one ray to the next at an end of the contour. The
+            contour also ends before a ray whose free distance is the range of the sensor.
 
         Returns
         -------
         dict of int to ContourEnd
-            By `COUNTERCLOCKWISE` and `CLOCKWISE`; empty if the contour is closed.
+            The end that a turn in each direction leads to, by `COUNTERCLOCKWISE` and `CLOCKWISE`. Empty if
+            the contour is closed.
         """
         first_ray = int((self.directions * direction).sum(axis=1).argmax())
         blocked_distance = self.compute_free_distance(direction)
@@ -369,7 +370,9 @@ class ObstacleView:
             is_past_end = (distances > previous + jump) | (distances >= self.reach)
             if is_past_end.any():
                 k = int(is_past_end.argmax())
-                point = self.directions[rays[k]] * min(distances[k], previous[k] + jump)
+                # The robot moves to a free point close to the contour, not to the far end of the free ray.
+                end_distance = min(distances[k], previous[k] + jump)
+                point = self.directions[rays[k]] * end_distance
                 ends[turn] = ContourEnd(ray=int(rays[k]), point=point)
         return ends
 

@@ -174,7 +174,7 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
 
 
 def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
-    """Run a file, or its text, as a module."""
+    """Load a file, or its stored text, as a module. This runs its code."""
     loader = None
     path = os.path.realpath(file)
     modules: Mapping[str, ModuleText] = {}
@@ -182,6 +182,7 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
         loader = _TextLoader(source.path, source.text)
         path = source.path
         modules = source.modules
+    # If the modules that the file imports are stored as well, its folder is not needed.
     if not modules:
         _add_import_folder(Path(path).parent)
     # Each file gets its own name, so two files called mine.py do not replace each other.

@@ -166,7 +166,7 @@ class ArrayCache:
 
     @staticmethod
     def compute_key(*parts: bytes | str | float) -> str:
-        """Compute the key of arrays from the inputs that determine them.
+        """Compute a key for arrays from the inputs that determine them.
 
         Parameters
         ----------

@@ -168,7 +168,7 @@ def describe_mismatch(expected: str, value: object, *, is_missing: bool = False)
 def build_document_error(
     error: ValidationError, where: str, build_issue: Callable[[ErrorDetails], Issue]
 ) -> MapError:
-    """Build the error of a document that does not fit its model.
+    """Build the error for a document that does not fit its model.
 
     Parameters
     ----------

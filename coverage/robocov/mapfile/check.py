@@ -101,7 +101,7 @@ class MapReport:
         return self.free_area / self.area
 
     def to_dict(self) -> dict[str, Any]:
-        """Build the JSON document of the report, with units in its keys.
+        """Build the JSON document of the report, with units in the names of its keys.
 
         Returns
         -------

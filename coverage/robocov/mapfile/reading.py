@@ -227,18 +227,20 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
 def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
     """Return the density that a model describes.
 
-    A raster without an extent covers the bounding box of the boundary. The folder is that of the map and its
-    picture; None if the map did not come from a file.
+    A raster without an extent covers the bounding box of the boundary. `folder` contains the map and its
+    picture; it is None if the map did not come from a file.
     """
     if not isinstance(model, RasterModel):
         return model.build()
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
+        # Weights of pictures are rounded when they are read, so none of them is as small as this.
         values[values < MIN_WEIGHT] = 0.0
     else:
         values = _read_weights(model, folder, where)
     x, y = zip(*boundary, strict=True)
     x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
+    # A map lists the top row first, a `Raster` the lowest one.
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 

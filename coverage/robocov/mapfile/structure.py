@@ -138,7 +138,7 @@ def _build_unknown_key_issue(path: list[Any], model: type[Model]) -> Issue:
 
 
 def _build_unknown_kind_issue(path: JsonPath, value: object, kinds: list[str]) -> Issue:
-    """Build the issue for an obstacle, a start or a density that has no known kind."""
+    """Build the issue for an obstacle, a start or a density whose kind is missing or unknown."""
     expected = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
         return Issue.at_path(path, describe_mismatch(f"an object whose kind is {expected}", value))

@@ -277,16 +277,16 @@ class Scenario:
     def build_simulation(
         self, controller: Controller | None = None, *, steps: int = 0, is_computed: bool = False
     ) -> Simulation:
-        """Build the simulation of the run.
+        """Build the simulation for this run.
 
         Parameters
         ----------
         controller : Controller or None
-            By default the controller of the scenario.
+            Defaults to the controller of the scenario.
         steps : int
-            Number of control steps taken before.
+            Number of control steps already taken.
         is_computed : bool
-            Whether a simulation computed the starting positions, which are then not checked for overlaps.
+            Whether the starting positions come from a simulation. If so, they are not checked for overlaps.
 
         Returns
         -------
@@ -309,7 +309,7 @@ class Scenario:
         )
 
     def build_recorder(self, controller: Controller, name: str | None = None) -> Recorder:
-        """Build the recorder of the run.
+        """Build the recorder for this run.
 
         Parameters
         ----------

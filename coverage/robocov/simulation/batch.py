@@ -120,7 +120,7 @@ class SimulationBatch:
         self._steps = 0
         for start_positions in positions:
             require_free_starts(environment, start_positions, self.team, MAX_START_OVERLAP_M)
-        self._caller = ControllerCaller(controller, environment.static, time=0.0)
+        self._controller_caller = ControllerCaller(controller, environment.static, time=0.0)
         self._joint_team = Team.concatenate([self.team] * run_count)
         self._rows = [slice(run * robot_count, (run + 1) * robot_count) for run in range(run_count)]
         obstacles = build_obstacles(environment)
@@ -133,7 +133,7 @@ class SimulationBatch:
         self._decides_jointly = robot_count <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
         # One memory for all runs, or one for each.
         if self._decides_jointly:
-            memories = [self._caller.begin(environment.region, self._joint_team, self.time)]
+            memories = [self._controller_caller.begin(environment.region, self._joint_team, self.time)]
         else:
             memories = [self._begin_run() for _ in range(run_count)]
         self._memories: list[Any] = memories
@@ -150,7 +150,7 @@ class SimulationBatch:
 
     def _begin_run(self) -> Any:
         """Return the memory of the robots of one run before their first decision."""
-        return self._caller.begin(self.environment.region, self.team, self.time)
+        return self._controller_caller.begin(self.environment.region, self.team, self.time)
 
     def __len__(self) -> int:
         """Return the number of runs."""
@@ -167,7 +167,7 @@ class SimulationBatch:
     @property
     def controller(self) -> Controller:
         """The controller of all teams."""
-        return self._caller.controller
+        return self._controller_caller.controller
 
     @property
     def time(self) -> float:
@@ -228,7 +228,7 @@ class SimulationBatch:
             Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run.
         """
         if self._observations is None:
-            scanning = self._caller.scanning
+            scanning = self._controller_caller.scanning
             self._observations = build_observations(
                 world=self._world,
                 sensor=self.sensor,
@@ -298,7 +298,7 @@ class SimulationBatch:
             else:
                 observations = [self._receive_messages(run) for run in range(len(self))]
             decisions = [
-                self._caller.decide(observed, memory)
+                self._controller_caller.decide(observed, memory)
                 for observed, memory in zip(observations, self._memories, strict=True)
             ]
             self._decision = _BatchDecision(

@@ -132,7 +132,7 @@ class Simulation:
         if not state.is_computed:
             check_joins(environment, self.conditions)
             _check_robots_fit(environment, self.team, state, self.conditions, self.time)
-        self._caller = ControllerCaller(controller, environment.static, self.time)
+        self._controller_caller = ControllerCaller(controller, environment.static, self.time)
         self._world = self._build_world(state)
         self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
         has_team_changes = self.conditions is not None and self.conditions.has_team_changes
@@ -146,7 +146,7 @@ class Simulation:
         self._complete_graph: Neighbors | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graph = Neighbors(len(self.team))
-        self.memory: Any = self._caller.begin(environment.region, self.team, self.time)
+        self.memory: Any = self._controller_caller.begin(environment.region, self.team, self.time)
         self._start_step()
 
     def _build_world(self, state: TeamState) -> World | ChangingWorld:
@@ -184,7 +184,7 @@ class Simulation:
     @property
     def controller(self) -> Controller:
         """The controller of the team."""
-        return self._caller.controller
+        return self._controller_caller.controller
 
     @property
     def time(self) -> float:
@@ -284,7 +284,7 @@ class Simulation:
         if self._snapshot is None:
             knowledge = self._get_knowledge()
             start_time = process_time()
-            decision = self._caller.decide(knowledge.observations, self.memory)
+            decision = self._controller_caller.decide(knowledge.observations, self.memory)
             self.decision_time += process_time() - start_time
             if self._perception is None:
                 self._snapshot = Snapshot(knowledge.observations, decision, sent_bytes=self.sent_bytes)
@@ -311,11 +311,12 @@ class Simulation:
         return self._knowledge
 
     def _sense(self) -> Observations:
-        """Return the observations of robots with ideal sensors and communication."""
+        """Return what robots with ideal sensors and communication observe now."""
+        # The graph is complete, whatever the positions, if all communication ranges are infinite.
         neighbors = self._complete_graph
         if neighbors is None:
             neighbors = Neighbors.from_ranges(self.positions, self.team.communication_range)
-        scanning = self._caller.scanning
+        scanning = self._controller_caller.scanning
         return build_observations(
             world=self._world,
             sensor=self.sensor,
@@ -464,7 +465,7 @@ class Simulation:
         """
         twin = self.copy()
         twin.environment = environment
-        twin._caller = ControllerCaller(self.controller, environment.static, self.time)
+        twin._controller_caller = ControllerCaller(self.controller, environment.static, self.time)
         return twin
 
     def with_memory(self, memory: Any, inbox: Inbox | None = None) -> Simulation:

@@ -172,7 +172,7 @@ class ChangingWorld:
             ) from None
 
     def _build_world(self) -> None:
-        """Build the world of the robots that work; without such robots it is None."""
+        """Build the world of the working robots, or set it to None if there are none."""
         self._protect_state()
         self._working_rows = np.flatnonzero(self.working)
         self._world: World | None = None
