@@ -261,7 +261,7 @@ def test_unusable_maps_are_refused(
         ({"radius": 0.0}, "radius: expected a number from 0.001 to 100 m, got 0.0"),
         ({"keep": "some"}, "keep: expected one of largest, all"),
         ({"inside": (math.nan, 1.0)}, r"inside: expected two numbers from -10000000 to"),
-        ({"inside": (0.0, 1.0), "keep": "all"}, "inside: keeps one part of the free space, but keep is all"),
+        ({"inside": (0.0, 1.0), "keep": "all"}, "keep: expected largest with the option inside, got all"),
         ({"default_start": "door"}, "default_start: expected one of room, uniform"),
     ],
 )

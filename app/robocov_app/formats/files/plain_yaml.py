@@ -147,22 +147,23 @@ class _YamlReader:
         merged_mappings: list[Value] = []
         inner_depth = 0
         for event in self._iterate_collection():
+            # The event is that of a key; the events of its value follow, and are read from the same iterator.
             if not isinstance(event, yaml.ScalarEvent):
                 kind = "an alias" if isinstance(event, yaml.AliasEvent) else "a collection"
-                raise MapError(f"{self._locate(event)}: expected a word as the name, got {kind}")
-            name = self._build(event, depth).value
-            assert isinstance(name, str)
+                raise MapError(f"{self._locate(event)}: expected a scalar as the key, got {kind}")
+            key = self._build(event, depth).value
+            assert isinstance(key, str)
             item = self._build(next(self.events), depth + 1)
             inner_depth = max(inner_depth, item.depth)
-            if name == "<<" and event.style is None:  # no style: not in quotes
+            if key == "<<" and event.style is None:  # no style: not in quotes
                 merged_mappings += self._list_merged_mappings(item.value, event)
-            elif name in mapping:
-                raise MapError(f"{self._locate(event)}: {to_one_line(name)}: duplicate key")
+            elif key in mapping:
+                raise MapError(f"{self._locate(event)}: {to_one_line(key)}: duplicate key")
             else:
-                mapping[name] = item.value
+                mapping[key] = item.value
         for merged_mapping in merged_mappings:
             assert isinstance(merged_mapping, dict)
-            # Keys of the mapping itself, and of mappings that were merged before, take precedence.
+            # Keys of the mapping itself, and of mappings merged earlier, take precedence.
             mapping = merged_mapping | mapping
         return mapping, inner_depth + 1
 

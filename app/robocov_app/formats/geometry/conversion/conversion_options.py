@@ -47,10 +47,10 @@ class Shaping(Options):
         if self.inside is None:
             return
         if len(self.inside) != 2 or not all(abs(value) <= MAX_COORDINATE_M for value in self.inside):
-            wanted = f"expected two numbers from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
-            raise ParameterError(f"inside: {wanted}, got {quote(self.inside)}")
+            expected = f"expected two numbers from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
+            raise ParameterError(f"inside: {expected}, got {quote(self.inside)}")
         if self.keep == "all":
-            raise ParameterError("inside: keeps one part of the free space, but keep is all")
+            raise ParameterError("keep: expected largest with the option inside, got all")
 
 
 @dataclass(eq=False)

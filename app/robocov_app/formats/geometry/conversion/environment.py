@@ -56,29 +56,29 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
     Raises
     ------
     MapError
-        If no robot could drive in the map, or if it is too large.
+        If the map has no room for a robot, or if it is too large.
     """
     conversion = Conversion(foreign, shaping, where)
     boundary_parts = build_valid_boundary(conversion)
-    read = build_valid_free_space(conversion, boundary_parts)
-    cleaned = _remove_hairs(read, conversion)
+    original = build_valid_free_space(conversion, boundary_parts)
+    cleaned = _remove_hairs(original, conversion)
     selection = select_parts(cleaned.free, conversion)
     parts = drop_specks(selection.parts, conversion)
     outer = _choose_boundary(boundary_parts, parts, selection, conversion)
     conversion.require_at_most(MAX_OBSTACLES, sum(len(part.interiors) for part in parts), "obstacles")
     require_room(parts, conversion)
-    before = MultiPolygon(parts)
-    simplified = _simplify(before, read, conversion)
+    unsimplified = MultiPolygon(parts)
+    simplified = _simplify(unsimplified, original, conversion)
     conversion.require_at_most(MAX_VERTICES, shapely.count_coordinates(simplified.free), "vertices")
-    layout = build_layout(simplified, outer, before, read, conversion)
+    layout = build_layout(simplified, outer, unsimplified, original, conversion)
     if foreign.primitives and shapely.get_num_coordinates(simplified.free) <= _MAX_CHECKED_VERTICES:
-        layout = restore_primitives(layout, simplified, before, conversion)
+        layout = restore_primitives(layout, simplified, unsimplified, conversion)
     _report_deviation(layout.deviation, simplified.free, conversion)
     environment = _to_environment(layout, simplified.free, conversion)
     _report_unreachable(environment, conversion)
     return environment, _build_report(
         environment,
-        read=read,
+        original=original,
         simplified=simplified,
         layout=layout,
         cleaned=cleaned,
@@ -90,7 +90,7 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
 def _build_report(
     environment: Environment,
     *,
-    read: MultiPolygon,
+    original: MultiPolygon,
     simplified: SimplifiedSpace,
     layout: MapLayout,
     cleaned: Cleaned,
@@ -108,7 +108,7 @@ def _build_report(
         format=foreign.format,
         vertices_read=foreign.vertices_read,
         vertices_kept=vertex_count,
-        area_read=float(read.area),
+        area_read=float(original.area),
         area_kept=environment.free_area,
         size=(round(width, conversion.digits), round(height, conversion.digits)),
         obstacles=len(environment.obstacles),
@@ -170,22 +170,27 @@ def _choose_boundary(
     return outer
 
 
-def _simplify(before: MultiPolygon, read: MultiPolygon, conversion: Conversion) -> SimplifiedSpace:
+def _simplify(unsimplified: MultiPolygon, original: MultiPolygon, conversion: Conversion) -> SimplifiedSpace:
     """Return the free space with fewer vertices, rounded; walls move by at most the tolerance."""
     foreign = conversion.foreign
     tolerance = conversion.tolerance
     _report_large_cells(conversion)
-    sharp = before
+    sharp = unsimplified
     if foreign.cut_corners:
-        sharp = MultiPolygon([sharpen_corners(part, tolerance) for part in before.geoms])
+        sharp = MultiPolygon([sharpen_corners(part, tolerance) for part in unsimplified.geoms])
     # If sharpening and simplification together move walls too far, the next attempt does less.
-    attempts = [(sharp, tolerance), (sharp, tolerance / 2), (before, tolerance / 2), (before, 0.0)]
+    attempts = [
+        (sharp, tolerance),
+        (sharp, tolerance / 2),
+        (unsimplified, tolerance / 2),
+        (unsimplified, 0.0),
+    ]
     for plan, allowed in attempts:
         simple = simplify_free_space(plan, allowed, foreign.cell, conversion.radius)
         free = round_polygons(simple.free, conversion.digits)
         if free.is_empty:
-            raise MapError(f"{conversion.where}: only {read.area:.3g} m² are free: is the scale right?")
-        if measure_deviation(before, free).distance <= tolerance + conversion.grid:
+            raise MapError(f"{conversion.where}: only {original.area:.3g} m² are free: is the scale right?")
+        if measure_deviation(unsimplified, free).distance <= tolerance + conversion.grid:
             break
     conversion.changed += simple.changed
     return simple._replace(free=free)

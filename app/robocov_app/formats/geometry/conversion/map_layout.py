@@ -56,8 +56,8 @@ class MapLayout(NamedTuple):
 def build_layout(
     simplified: SimplifiedSpace,
     outer: Polygon | None,
-    before: MultiPolygon,
-    read: MultiPolygon,
+    unsimplified: MultiPolygon,
+    original: MultiPolygon,
     conversion: Conversion,
 ) -> MapLayout:
     """Build the boundary and the obstacles around a simplified free space.
@@ -67,9 +67,9 @@ def build_layout(
     simplified : SimplifiedSpace
     outer : Polygon or None, m
         The boundary. None stands for the outline of the free space.
-    before : MultiPolygon, m
+    unsimplified : MultiPolygon, m
         The free space before simplification.
-    read : MultiPolygon, m
+    original : MultiPolygon, m
         The whole free space in the file.
     conversion : Conversion
 
@@ -94,8 +94,8 @@ def build_layout(
         digits=conversion.digits,
     )
     if outer is not None:
-        solid = remove_slivers(solid, shapely.difference(outer, read), simplified.tolerance)
-    return MapLayout(boundary, solid, [], measure_deviation(before, free))
+        solid = remove_slivers(solid, shapely.difference(outer, original), simplified.tolerance)
+    return MapLayout(boundary, solid, [], measure_deviation(unsimplified, free))
 
 
 def build_boundary(

@@ -37,7 +37,7 @@ _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 
 
 def restore_primitives(
-    layout: MapLayout, simplified: SimplifiedSpace, before: MultiPolygon, conversion: Conversion
+    layout: MapLayout, simplified: SimplifiedSpace, unsimplified: MultiPolygon, conversion: Conversion
 ) -> MapLayout:
     """Replace polygons of a layout that consist of circles and walls by these primitives.
 
@@ -49,7 +49,7 @@ def restore_primitives(
     layout : MapLayout
     simplified : SimplifiedSpace
         The simplified free space, which the layout surrounds.
-    before : MultiPolygon, m
+    unsimplified : MultiPolygon, m
         The free space before simplification.
     conversion : Conversion
 
@@ -57,7 +57,7 @@ def restore_primitives(
     -------
     MapLayout
     """
-    max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (before, simplified.free))
+    max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (unsimplified, simplified.free))
     rejected: frozenset[Primitive] = frozenset()
     for _ in range(_MAX_ROUNDS):
         candidate = _match_primitives(layout, simplified.tolerance, max_rooms, rejected, conversion)
@@ -74,7 +74,7 @@ def restore_primitives(
             continue
         # Removes the vertices where the boundary met polygons that are gone now.
         boundary = round_polygons(candidate.boundary.simplify(0.0), conversion.digits).geoms[0]
-        deviation = measure_deviation(before, candidate.compute_free())
+        deviation = measure_deviation(unsimplified, candidate.compute_free())
         # A circle and its polygon may differ by the sagitta of the polygon's sides.
         limit = conversion.tolerance + conversion.grid + MAX_SAGITTA_M
         if deviation.distance > max(limit, layout.deviation.distance):

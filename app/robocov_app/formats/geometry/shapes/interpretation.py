@@ -62,17 +62,17 @@ _MAX_EXTENT_M = 10.0 * MAX_SIZE_M
 
 
 def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation:
-    """Interpret a drawing by the rules of this module.
+    """Interpret a drawing by the rules in the docstring of this module.
 
     Parameters
     ----------
     drawing : Drawing
     solid : bool
-        Whether closed outlines are solid if the option ``outlines`` is not given. If False, they are free,
-        unless rule 1 or 2 finds a boundary of other outlines, or there are only lines.
+        Whether the format draws closed outlines as solid; the option ``outlines`` takes precedence. If False,
+        outlines are free, except for those within a boundary that rule 1 or 2 finds.
     overlap : bool
-        Whether outlines may overlap and are all free, like JuPedSim's accessible areas. Rule 2 then applies
-        only if all others lie entirely in the largest one.
+        Whether outlines may overlap and all count as free, as in JuPedSim's accessible areas. Rule 2 then
+        applies only if the largest outline contains all others entirely.
 
     Returns
     -------

@@ -158,10 +158,7 @@ def _are_close(outlines: Array, snap: float) -> bool:
 
 
 def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
-    """Return the gaps between pairs of polygons that are narrower than a tolerance, m.
-
-    `walls` is the part of one polygon's boundary along a gap. The gap's width is measured at three points.
-    """
+    """Return the gaps narrower than a tolerance, m, between pairs of polygons."""
     first, second = STRtree(parts).query(parts, predicate="dwithin", distance=tolerance)
     is_ordered = first < second
     first = first[is_ordered]
@@ -169,13 +166,19 @@ def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
     near = np.unique(np.concatenate([first, second]))
     reach = np.full(len(parts), None, dtype=object)
     reach[near] = shapely.buffer(parts[near], _REACH * tolerance, quad_segs=2)
+    # The wall of a pair is the longest piece of the first polygon's boundary that runs along the second one.
     walls = shapely.intersection(shapely.boundary(parts[first]), reach[second])
     walls = np.array([_find_longest(wall) for wall in walls], dtype=object)
+    # The width of a gap is measured at three points of its wall.
     widths = np.stack([_measure_distances(walls, parts[second], place) for place in (0.25, 0.5, 0.75)])
-    # If only corners are close, as those of diagonal rooms where two gaps cross, there is no gap to close.
-    is_gap = shapely.length(walls) > _MIN_LENGTH * tolerance
-    # If the parts touch, or the wall between them is a wedge, there is none either.
-    is_gap &= (widths[1] > 0.0) & (np.ptp(widths, axis=0) <= _MAX_WIDENING * tolerance)
+    # Where the gaps between four rooms cross, only the corners of diagonally opposite rooms are close to each
+    # other. Their wall is short, and there is no gap to close between them.
+    is_long = shapely.length(walls) > _MIN_LENGTH * tolerance
+    # Parts that touch have no gap between them.
+    is_open = widths[1] > 0.0
+    # What lies between parts that are not parallel is a wall in the form of a wedge.
+    is_even = np.ptp(widths, axis=0) <= _MAX_WIDENING * tolerance
+    is_gap = is_long & is_open & is_even
     surroundings = shapely.intersection(reach[first[is_gap]], reach[second[is_gap]])
     return _Gaps(surroundings, widths[1, is_gap])
 

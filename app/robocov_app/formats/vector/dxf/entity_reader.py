@@ -237,10 +237,11 @@ class EntityReader:
         place : str
             Place in the file, for messages.
         width : float, m
+            Width in the file; 0 if there is none. The option ``thickness`` takes precedence over it.
         """
         gap = np.abs(points[0] - points[-1])
-        do_ends_meet = bool((gap <= _MAX_RELATIVE_GAP * np.abs(points).max()).all())
-        is_closed = len(points) > 3 and do_ends_meet
+        ends_meet = bool((gap <= _MAX_RELATIVE_GAP * np.abs(points).max()).all())
+        is_closed = len(points) > 3 and ends_meet
         has_width = width > 0.0
         if is_closed and not has_width:
             self._shapes.add_outline([points[:-1]], labels, rule="evenodd", place=place)

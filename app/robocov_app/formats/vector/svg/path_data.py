@@ -19,6 +19,8 @@ _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A
 """Number of arguments of each command."""
 _ARC_FLAGS = (3, 4)
 """Indices of the arguments of an arc that are flags, 0 or 1, which need no separator after them."""
+_MIN_HALF_LENGTH = 1e-150
+"""Half the length of the shortest chord of an arc, in semi-axes; the square of this is not yet zero."""
 
 
 class Subpath(NamedTuple):
@@ -284,8 +286,8 @@ class _Pen:
         rx = abs(values[0])
         ry = abs(values[1])
         angle = math.radians(values[2])
-        is_large = bool(values[3])
-        is_positive = bool(values[4])
+        is_large_arc = bool(values[3])
+        is_positive_sweep = bool(values[4])
         start = self._position
         if end == start:
             return
@@ -294,7 +296,7 @@ class _Pen:
             return
         turn = complex(math.cos(angle), math.sin(angle))
         half_chord = (start - end) / 2 * turn.conjugate()
-        # In units of the half axes, the ellipse is a circle of radius 1.
+        # In units of the semi-axes, the ellipse is a circle of radius 1.
         point = complex(half_chord.real / rx, half_chord.imag / ry)
         half_length = abs(point)
         if half_length > 1.0:
@@ -302,14 +304,16 @@ class _Pen:
             rx = rx * half_length
             ry = ry * half_length
             point = point / half_length
-        ratio = math.sqrt(max(1.0 / max(min(half_length, 1.0), 1e-150) ** 2 - 1.0, 0.0))
-        side = 1j if is_large == is_positive else -1j
-        middle = side * ratio * point
-        # The length of the chord gives the sweep accurately even for huge radii.
-        sweep = 2.0 * math.asin(min(half_length, 1.0))
-        if is_large:
+            half_length = 1.0
+        # Distance of the center from the middle of the chord, as a multiple of half the chord.
+        distance = math.sqrt(1.0 / max(half_length, _MIN_HALF_LENGTH) ** 2 - 1.0)
+        side = 1j if is_large_arc == is_positive_sweep else -1j
+        middle = side * distance * point
+        # Computed from the length of the chord, the sweep is accurate even for huge radii.
+        sweep = 2.0 * math.asin(half_length)
+        if is_large_arc:
             sweep = math.tau - sweep
-        sweep = math.copysign(sweep, 1.0 if is_positive else -1.0)
+        sweep = math.copysign(sweep, 1.0 if is_positive_sweep else -1.0)
         u = turn * rx
         v = turn * (1j * ry)
         center = (start + end) / 2 + u * middle.real + v * middle.imag
