@@ -366,7 +366,7 @@ def render_comparison_png(comparison: Comparison) -> bytes:
 
 
 def _compute_history(record: Record) -> CostHistory | None:
-    """Compute the cost of a run; None if that would take long, or is not possible."""
+    """Compute the cost of a run; return None if that would take too long, or is impossible."""
     if shapely.get_num_coordinates(record.environment.free) > MAX_COST_VERTICES:
         return None
     duration = float(record.time[-1] - record.time[0])

@@ -191,7 +191,7 @@ def _build_wall_with_door(
 
 
 def _build_home(rng: np.random.Generator) -> FloorPlan:
-    """Draw a flat: a rectangle that is divided repeatedly, with a door in each wall, and some furniture."""
+    """Generate a flat: a rectangle that is divided repeatedly, a door in each wall, and some furniture."""
     width = rng.uniform(10.0, 14.0)
     height = rng.uniform(8.0, 11.0)
     flat = _Flat(rng)
@@ -266,12 +266,12 @@ class _Flat:
 
 
 def _build_office(rng: np.random.Generator) -> FloorPlan:
-    """Draw an office floor: offices on one side of a corridor, an open space with desks on the other."""
+    """Generate an office floor: offices on one side of a corridor, an open space with desks on the other."""
     width = rng.uniform(16.0, 20.0)
     height = rng.uniform(10.0, 12.0)
     corridor_low = height * rng.uniform(0.48, 0.56)
     corridor_high = corridor_low + rng.uniform(1.4, 1.9)
-    # The order of the parts determines which random numbers each part gets.
+    # Keep the order of the parts: it determines which random numbers each part gets.
     obstacles = [
         *_build_offices(rng, width, corridor_high, height),
         *_build_open_space_wall(rng, width, corridor_low),
@@ -281,7 +281,7 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
 
 
 def _build_offices(rng: np.random.Generator, width: float, low: float, high: float) -> list[Obstacle]:
-    """Draw a row of offices between two heights: walls, a door to the corridor for each, and some shelves."""
+    """Generate a row of offices between two heights: walls, doors to the corridor, and some shelves."""
     obstacles: list[Obstacle] = []
     partitions = np.linspace(0.0, width, int(rng.integers(5, 8)))
     partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
@@ -299,7 +299,7 @@ def _build_offices(rng: np.random.Generator, width: float, low: float, high: flo
 
 
 def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> list[Obstacle]:
-    """Draw the wall between the corridor and the open space, with two doors."""
+    """Generate the wall between the corridor and the open space, with two doors."""
     left_door = width * rng.uniform(0.15, 0.35)
     right_door = width * rng.uniform(0.65, 0.85)
     middle = width / 2.0
@@ -312,7 +312,7 @@ def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> 
 
 
 def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[Obstacle]:
-    """Draw two rows of desks in an open space of a width and depth."""
+    """Generate two rows of desks in an open space of a width and depth."""
     columns_x = np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6))
     rows_y = (_LOWER_DESKS_Y_M, depth - _UPPER_DESKS_MARGIN_M)
     corners = itertools.product(columns_x, rows_y)
@@ -329,7 +329,7 @@ def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
 
 
 def _build_yard(rng: np.random.Generator) -> FloorPlan:
-    """Draw a park: a convex piece of land with houses, a pond, hedges and trees."""
+    """Generate a park: a convex piece of land with houses, a pond, hedges and trees."""
     offsets = rng.uniform(-0.25, 0.25, _YARD_CORNERS)
     angles = np.sort((np.arange(_YARD_CORNERS) + offsets) * 2.0 * np.pi / _YARD_CORNERS)
     center_x, center_y = _YARD_CENTER_M
@@ -361,7 +361,7 @@ def _build_house(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_pond(rng: np.random.Generator) -> Obstacle:
-    """Draw a pond: a polygon, roughly an ellipse with a wavy shore."""
+    """Generate a pond: a polygon, roughly an ellipse with a wavy shore."""
     angles = np.linspace(0.0, 2.0 * np.pi, _POND_CORNERS, endpoint=False)
     radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
     shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
@@ -369,7 +369,7 @@ def _build_pond(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_hedge(rng: np.random.Generator) -> Obstacle:
-    """Draw a hedge: a wall with a right angle between two equal parts."""
+    """Generate a hedge: a wall with a right angle between two equal parts."""
     start = _draw_yard_point(rng)
     angle = rng.uniform(0.0, np.pi)
     along = np.array((np.cos(angle), np.sin(angle)))
@@ -385,7 +385,7 @@ def _build_tree(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_plant(rng: np.random.Generator) -> FloorPlan:
-    """Draw a factory hall: racks in rows, and behind a partition with a gate, machines and columns."""
+    """Generate a factory hall: racks in rows, and behind a partition with a gate, machines and columns."""
     width = rng.uniform(15.0, 19.0)
     height = rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
@@ -414,7 +414,7 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
 
 
 def _build_traffic(rng: np.random.Generator) -> FloorPlan:
-    """Draw a hall with shelves, and two or three vehicles that drive back and forth in the aisles."""
+    """Generate a hall with shelves, and two or three vehicles that drive back and forth in the aisles."""
     width = 16.0
     height = 11.0
     obstacles: list[Obstacle] = []

@@ -227,7 +227,7 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
         "name": name,
         "title": suite.format_heading(name),
         "summary": _summarize_track(name),
-        "table": PageTable("Ratings", ratings.HEAD, rows, frozenset({1})),
+        "table": PageTable("Ratings", ratings.HEAD, rows, text_columns=frozenset({1})),
         "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
         "incomplete": _build_incomplete_table(track_ratings, entries),
         "plots": _build_plots(name, ranked, entries),
@@ -244,21 +244,25 @@ def _summarize_track(name: str) -> str:
 
 
 def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
-    """Build the table of entries that lack runs, with the gaps of yardsticks over the same runs."""
+    """Build the table of entries that lack runs.
+
+    For comparison, each row also contains the gaps of the yardsticks over the runs that the entry has.
+    """
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
     rows = []
     for rating in track_ratings:
         if rating.is_complete:
             continue
         keys = [ratings.get_run_key(row) for row in rating.rows]
-        compared = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
-        cells = [format_number(100.0 * other.compute_median("gap"), ".1f") for other in compared]
+        column_ratings = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
+        gaps = [100.0 * column_rating.compute_median("gap") for column_rating in column_ratings]
+        cells = [format_number(gap, ".1f") for gap in gaps]
         runs = f"{rating.run_count} of {len(ratings.list_run_keys(rating.track))}"
         rows.append((rating.label, entries.information[rating.label], runs, *cells))
     yardstick_headings = [f"{yardstick.label}, %" for yardstick in yardsticks]
     head = ("Controller", "Knows", "Runs", "Gap, %", *yardstick_headings)
     caption = "Incomplete entries, not ranked: median gaps over their own runs"
-    return PageTable(caption, head, rows, frozenset({1}))
+    return PageTable(caption, head, rows, text_columns=frozenset({1}))
 
 
 def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
@@ -457,7 +461,7 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
         rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
     head = ("Controller", "Name", "Code", "Gains", "Versions")
-    return PageTable("Entries", head, rows, frozenset({1, 2, 3, 4}))
+    return PageTable("Entries", head, rows, text_columns=frozenset({1, 2, 3, 4}))
 
 
 def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
@@ -475,4 +479,4 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         for reason, runs in runs_by_reason.items():
             rows.append((label, str(len(runs)), reason, runs[0]))
     head = ("Controller", "Runs", "What happened", "First run")
-    return PageTable("Runs to look into", head, rows, frozenset({2, 3}))
+    return PageTable("Runs to look into", head, rows, text_columns=frozenset({2, 3}))

@@ -92,8 +92,9 @@ def command(options: Arguments) -> None:
 
         save_ratios(rows, options.plot, get_theme(options.theme))
     machine = _describe_machine()
-    print_answer(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
-    if not options.json:
+    if options.json:
+        print_answer(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
+    else:
         _print_tables(rows)
         _print_machine(machine)
     if interruption is not None:

@@ -69,7 +69,7 @@ def command(options: Arguments) -> int:
 
 
 def open_editor(options: Arguments) -> None:
-    """Show the editor until it is closed, or save its screenshot."""
+    """Show the editor until it is closed, or save a screenshot of it."""
     from robocov_app.editor.ui.launch import EditorLauncher
     from robocov_app.web import show
 

@@ -414,7 +414,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         Raises
         ------
         InputError
-            If the scenario is impossible.
+            If the scenario cannot start.
         """
         from robocov.scenario import Scenario
 

@@ -243,13 +243,13 @@ def plot_comparison(
     for number, panel in enumerate(panels):
         axes = page.add_map_axes(panel.box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         arena.draw_run(axes, records[number], theme, colors)
-        if layout.is_one_line:
+        if layout.has_one_line_captions:
             _write_one_line(page, captions, number, panel, layout.caption_width)
         else:
             _write_two_lines(page, captions, number, panel)
     first_box = panels[0].box
     _write_heading(page, captions.shared, first_box, layout.caption_height + _HEADING_RISE * page.scale)
-    footer_boxes = [_widen_box(panel) if layout.is_one_line else panel.box for panel in panels]
+    footer_boxes = [_widen_box(panel) if layout.has_one_line_captions else panel.box for panel in panels]
     page.draw_footer(handles, footer_boxes, first_box.width / extent.width)
     return page.figure
 
@@ -264,8 +264,8 @@ class _ComparisonLayout:
         Space above all panels, for the heading.
     columns : int
     column_width : float
-    is_one_line : bool
-        Whether the name of a run and its facts are in one line.
+    has_one_line_captions : bool
+        Whether the name of a run and its facts are on one line.
     caption_width, caption_height : float
         Size of the lines above a panel.
     gap : float
@@ -275,13 +275,13 @@ class _ComparisonLayout:
     top: float
     columns: int
     column_width: float
-    is_one_line: bool
+    has_one_line_captions: bool
     caption_width: float
     caption_height: float
     gap: float
 
     def compute_page_height(self, count: int, aspect: float, footer_height: float) -> int:
-        """Return the height of a page for a number of panels with an aspect, px."""
+        """Return the height of a page for a number of panels with a given aspect ratio, px."""
         rows = math.ceil(count / self.columns)
         panels_height = rows * (self.caption_height + self.column_width / aspect + self.gap)
         height = self.top + panels_height + footer_height
@@ -289,15 +289,15 @@ class _ComparisonLayout:
 
 
 def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) -> _ComparisonLayout:
-    """Choose the layout of panels with an aspect; captions are in one line if they all fit."""
+    """Choose the layout of panels with a given aspect ratio; captions are on one line if they all fit."""
     scale = page.scale
     top = _TOP_WITHOUT_HEADING * scale
     if captions.shared:
         top = _TOP_WITH_HEADING * scale
     columns = _choose_columns(page, captions, aspect, top)
     column_width = (page.size[0] - page.margin) / columns - page.margin
-    is_one_line = captions.max_joined_width <= column_width
-    if is_one_line:
+    has_one_line_captions = captions.max_joined_width <= column_width
+    if has_one_line_captions:
         caption_width = captions.max_joined_width
         caption_height = _ONE_LINE_CAPTION * scale
     else:
@@ -307,7 +307,7 @@ def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) ->
         top=top,
         columns=columns,
         column_width=column_width,
-        is_one_line=is_one_line,
+        has_one_line_captions=has_one_line_captions,
         caption_width=caption_width,
         caption_height=caption_height,
         gap=_PANEL_GAP * scale,

@@ -55,7 +55,7 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
 
 
 def _find_adjacency(record: Record, positions: Array, working: BoolArray) -> IntArray:
-    """Return the pairs of robots whose cells share an edge, (m, 2), the lower index first."""
+    """Return the pairs of robots whose cells share an edge, as an (m, 2) array with the lower index first."""
     robots = np.flatnonzero(working & np.isfinite(positions).all(axis=1))
     if len(robots) < 2:
         return np.empty((0, 2), dtype=np.intp)

@@ -49,7 +49,7 @@ def draw_comparison_frames(
     Parameters
     ----------
     records : sequence of Record
-        The record of each pane. Panes of shorter runs stay at their last step.
+        The record of each pane. A pane whose run is shorter stays at its last step.
     costs : sequence of CostHistory
         The cost along each run.
     layout : PaneLayout
@@ -77,11 +77,11 @@ def draw_comparison_frames(
         )
         for record, cost in zip(records, costs, strict=True)
     ]
-    panes: list[Frame] = []
-    for new_panes in zip_longest(*pane_videos):
+    current_frames: dict[int, Frame] = {}
+    for new_frames in zip_longest(*pane_videos):
         # None stands for a video that has ended; its pane keeps the last frame.
-        panes = [old if new is None else new for new, old in zip_longest(new_panes, panes)]
-        yield layout.compose_page(panes, settings.color_theme)
+        current_frames |= {pane: frame for pane, frame in enumerate(new_frames) if frame is not None}
+        yield layout.compose_page(list(current_frames.values()), settings.color_theme)
 
 
 def save_videos(

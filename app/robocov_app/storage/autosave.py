@@ -42,10 +42,12 @@ _Content: TypeAlias = Callable[[], Mapping[str, Any]]
 
 
 class _PendingDraft(NamedTuple):
-    """A draft to be written: file of the document (None if it has none), content (None if all is saved)."""
+    """A draft to be written."""
 
     path: Path | None
-    content: _Content | None
+    """File of the document; None if it has none."""
+    build_content: _Content | None
+    """Returns the unsaved work; None if everything is saved."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +246,7 @@ class Autosaver:
         return draft
 
     def _write(self, draft: _PendingDraft) -> None:
-        """Write a draft to the draft folder."""
+        """Write a draft to the draft folder; if everything is saved, it only names the file that is open."""
         assert self._folder is not None
         encoded_path = None
         if draft.path is not None:
@@ -255,11 +257,11 @@ class Autosaver:
             "path": encoded_path,
             "when": datetime.now().astimezone().isoformat(timespec="seconds"),
         }
-        if draft.content is not None:
-            record |= draft.content()
+        if draft.build_content is not None:
+            record |= draft.build_content()
         with replace_file(self._folder / _FILE_NAME) as temporary:
             temporary.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
-        self._has_draft = draft.content is not None
+        self._has_draft = draft.build_content is not None
 
 
 def flush_all(timeout: float) -> None:

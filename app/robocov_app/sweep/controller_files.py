@@ -40,7 +40,7 @@ def load_study_controller(name: str, folder: Path) -> tuple[type[Any], Controlle
 
 
 def _read_source(name: str, folder: Path) -> ControllerSource | None:
-    """Read the file of a controller named ``file.py:Class``; None for other names."""
+    """Read the source file of a controller named ``file.py:Class``; return None for any other name."""
     file_name, _, class_name = name.rpartition(":")
     if not class_name or not file_name.endswith(".py"):
         return None

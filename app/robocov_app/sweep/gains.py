@@ -138,7 +138,7 @@ def _parse_value(known: Mapping[str, Gain | Option], name: str, value: object, p
 
 
 def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) -> Gain | Option:
-    """Return a gain by its name; raise ParameterError if the controller has no such gain."""
+    """Look up a gain by its name; raise ParameterError if the controller has no such gain."""
     if name in known:
         return known[name]
     # The path leads to the value of the gain, or to an item in a list of values.

@@ -220,7 +220,9 @@ class Ledger:
             raise DamagedRunError from fault
 
     def store(self, task: Task, outcome: Outcome) -> None:
-        """Write the folder of a run atomically; an earlier folder is replaced.
+        """Write the folder of a run, replacing an earlier one.
+
+        The folder gets its name only when it is complete, so no run can have a partly written folder.
 
         Parameters
         ----------

@@ -169,11 +169,12 @@ def _execute_remaining(
     progress: SweepProgress,
     interruption: Interruption,
 ) -> RobocovError | None:
-    """Execute the remaining tasks, and return the error that ended them, if any.
+    """Execute the remaining tasks, and return the error that stopped them, if any.
 
-    It is not raised here, because the rows of finished runs are still to be written.
+    It is not raised here, because the caller must still write the rows of the runs finished before it.
     """
     try:
+        # Reused runs have rows that can be written before any task is executed.
         outcomes.rows.write()
         for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
             reporter.update(progress)

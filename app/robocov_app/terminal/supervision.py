@@ -32,7 +32,7 @@ _PARENT_POLL_S = 1.0
 
 
 def find_own_controllers(words: Sequence[str]) -> list[str]:
-    """Find the controllers of the user in a command line, and in the study that it names.
+    """Find the user's own controllers in a command line and in the study that it names.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
 from robocov_app.render.surface_cache import cache_surfaces
 from robocov_app.toolkit.window.layout import Box
 
-_FINE = 4
+_SUPERSAMPLING = 4
 """Rounded boxes are drawn larger by this factor and then scaled down, which smooths their edges."""
 _BOX_CACHE_BYTES = 4_000_000
 _VEIL_ALPHA = 150
@@ -57,11 +57,11 @@ def create_flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
 
 @cache_surfaces(_BOX_CACHE_BYTES)
 def _render_rounded_box(size: tuple[int, int], fill: Color, edge: Color, radius: int, width: int) -> Surface:
-    large = Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
+    large = Surface((size[0] * _SUPERSAMPLING, size[1] * _SUPERSAMPLING), pygame.SRCALPHA, 32)
     box = large.get_rect()
-    pygame.draw.rect(large, edge, box, border_radius=radius * _FINE)
-    inner = box.inflate(-2 * width * _FINE, -2 * width * _FINE)
-    pygame.draw.rect(large, fill, inner, border_radius=max(radius - width, 0) * _FINE)
+    pygame.draw.rect(large, edge, box, border_radius=radius * _SUPERSAMPLING)
+    inner = box.inflate(-2 * width * _SUPERSAMPLING, -2 * width * _SUPERSAMPLING)
+    pygame.draw.rect(large, fill, inner, border_radius=max(radius - width, 0) * _SUPERSAMPLING)
     return pygame.transform.smoothscale(large.premul_alpha(), size)
 
 

@@ -45,7 +45,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     ----------
     window : BaseWindow
     options : WebOptions
-        Options of a command; with ``--serve``, the window is shown in browsers.
+        Options of the command; with ``--serve``, the window is shown in browsers.
     folder : Path
         The only folder in which a window in a browser can read and write files.
 
@@ -54,7 +54,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     RobocovError
         If the optional "web" dependencies are not installed.
     KeyboardInterrupt
-        If a served window was ended by SIGINT, SIGTERM or SIGHUP.
+        If SIGINT, SIGTERM or SIGHUP ended a served window.
     """
     if not options.serve:
         window.run()
@@ -64,7 +64,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
 
-    # The window of a visitor is behind a server that has its own link.
+    # With --each, a visitor's window runs in a child process, and pages connect through its parent's server.
     is_relayed = parent_process() is not None
     with (
         WebDisplay(options.host, options.port, folder, is_relayed=is_relayed) as display,

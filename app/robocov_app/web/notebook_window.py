@@ -52,9 +52,9 @@ class LiveWindow:
         import_optional("websockets", "web")
         self.height = height
         command = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
-        # Running the cell again creates a new window, so drafts are not needed.
+        # Running the notebook cell again creates a new window, so drafts are not needed.
         environment = {**os.environ, DRAFTS: ""}
-        # Errors go to a file: a full pipe without a reader would block the process.
+        # Errors go to a file: a full pipe that nobody reads would block the process.
         with tempfile.TemporaryFile() as errors:
             self._process = subprocess.Popen(
                 command,
@@ -66,13 +66,13 @@ class LiveWindow:
             )
             self.close = weakref.finalize(self, _end_process, self._process)
             assert self._process.stdout is not None
-            first_line = re.match(r"open (\S+)", self._process.stdout.readline())
-            if first_line is None:
+            link_match = re.match(r"open (\S+)", self._process.stdout.readline())
+            if link_match is None:
                 self._process.wait()
                 errors.seek(0)
                 text = errors.read().decode(errors="replace").strip().removeprefix("robocov: error: ")
                 raise RobocovError(text or "the window did not open")
-            self.link = first_line[1]
+            self.link = link_match[1]
 
     def _repr_html_(self) -> str:
         link = self.link

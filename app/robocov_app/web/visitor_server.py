@@ -356,12 +356,11 @@ class VisitorServer:
 
     def _remove_idle_windows(self) -> None:
         """Remove windows that have ended, and end those that have been idle for too long."""
-        self._processes = [process for process in self._processes if process.is_alive()]
+        self._processes = [child for child in self._processes if child.is_alive()]
         for visitor, window in list(self._windows.items()):
             if window.ending is not None or not window.opening.done():
                 continue
-            process = window.process
-            if process is None or not process.is_alive:
+            if window.process is None or not window.process.is_alive:
                 del self._windows[visitor]
             elif window.idle_time >= self._max_idle_s:
                 window.ending = asyncio.create_task(self._end(visitor, window))

@@ -61,7 +61,7 @@ class WindowInput:
             self._has_arrived.clear()
 
     def post(self, window: BaseWindow) -> None:
-        """Fit the window to the page, and post the messages that have arrived as pygame events."""
+        """Fit the window to the page, and post the received messages as pygame events."""
         page = self._page
         if page is not None and page is not self._fitted_page:
             self._fitted_page = page
@@ -71,8 +71,9 @@ class WindowInput:
             held = getattr(self._messages[0], "held", self._held)
             if held != self._held:
                 if has_posted:
-                    # pygame has one global state of held modifier keys: the window must first handle the
-                    # events posted so far, and gets the others in the next frame.
+                    # pygame has one global state of held modifier keys, so the window must first handle the
+                    # events posted so far. It gets the others in the next frame, which must not wait for
+                    # new input.
                     self._has_arrived.set()
                     return
                 self._held = held

@@ -20,15 +20,16 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     """Run `robocov maps`."""
     rows = [_build_row(name) for name in list_bundled_maps()]
-    print_answer(options, {"maps": rows}, indent=1)
-    if not options.json:
-        columns = [
-            ("map", BOLD),
-            ("size in m", {"no_wrap": True}),
-            ("starts, the default first", {}),
-            ("description", {}),
-        ]
-        print_table(columns, [_format_cells(row) for row in rows])
+    if options.json:
+        print_answer(options, {"maps": rows}, indent=1)
+        return
+    columns = [
+        ("map", BOLD),
+        ("size in m", {"no_wrap": True}),
+        ("starts, the default first", {}),
+        ("description", {}),
+    ]
+    print_table(columns, [_format_cells(row) for row in rows])
 
 
 def _build_row(name: str) -> dict[str, Any]:

@@ -401,9 +401,8 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
     Parameters
     ----------
     canvas : Canvas
-        The canvas.
     corners : (k, 2) array, px
-        Corners of all rings, one ring after the other.
+        Corners of all rings, ring by ring.
     ends : list of int
         Index after the last corner of each ring.
     color : tuple of int
@@ -416,9 +415,11 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
                 canvas.draw_thin_path(corners[start:end].tolist(), color, is_closed=True)
         return
     # Index of the next corner in the ring: after the last corner, the first one.
-    following = np.arange(1, len(corners) + 1)
-    following[np.array(ends) - 1] = [0, *ends[:-1]]
-    edges = np.hstack([corners, corners[following]])
+    next_corners = np.arange(1, len(corners) + 1)
+    first_corners = [0, *ends[:-1]]
+    last_corners = np.array(ends) - 1
+    next_corners[last_corners] = first_corners
+    edges = np.hstack([corners, corners[next_corners]])
     # Skipping edges outside the image saves time.
     box = canvas.surface.get_clip().inflate(2 * LINE_REACH_PX, 2 * LINE_REACH_PX)
     low = np.minimum(edges[:, :2], edges[:, 2:])

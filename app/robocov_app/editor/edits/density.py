@@ -186,7 +186,10 @@ def _set_features(
 
 
 def _get_base(density: Density | None) -> float:
-    """Return the floor or background of a density; raise MapError if the density is of another kind."""
+    """Return the density outside all peaks and polygons, or its value if it is uniform (1 without a density).
+
+    Raise MapError if the density is of another kind.
+    """
     if density is None:
         return 1.0
     if isinstance(density, Gaussians):

@@ -343,7 +343,7 @@ def build_geometry(shape: Obstacle) -> shapely.Geometry:
 
 def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
     """Build the area of a circle; its center if the radius is invalid."""
-    if not _is_within_reach([circle.center]):
+    if not _is_within_coordinate_limit([circle.center]):
         return shapely.GeometryCollection()
     if not 0.0 < circle.radius <= MAX_SIZE_M:
         return shapely.Point(circle.center)
@@ -352,7 +352,7 @@ def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
 
 def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
     """Build the area of a wall; its line if the width or length is invalid."""
-    if not wall.points or not _is_within_reach(wall.points):
+    if not wall.points or not _is_within_coordinate_limit(wall.points):
         return shapely.GeometryCollection()
     line = _build_line(wall.points)
     is_valid = line.length > 0.0 and 0.0 < wall.width <= MAX_SIZE_M
@@ -362,12 +362,12 @@ def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
 
 
 def _build_polygon(shape: env.PolygonObstacle) -> shapely.Geometry:
-    """Build the area of a polygon without invalid holes; a line if it has fewer than three vertices."""
-    if not shape.vertices or not _is_within_reach(shape.vertices):
+    """Build the area of a polygon, without holes that are invalid; a line if it has too few vertices."""
+    if not shape.vertices or not _is_within_coordinate_limit(shape.vertices):
         return shapely.GeometryCollection()
     if len(shape.vertices) < 3:
         return _build_line(shape.vertices)
-    holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_within_reach(hole)]
+    holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_within_coordinate_limit(hole)]
     if len(holes) == len(shape.holes):
         polygon = shape.polygon
     else:
@@ -384,5 +384,5 @@ def _build_line(points: Sequence[Point]) -> shapely.Geometry:
     return shapely.LineString(points)
 
 
-def _is_within_reach(points: Iterable[Point]) -> bool:
+def _is_within_coordinate_limit(points: Iterable[Point]) -> bool:
     return all(abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M for x, y in points)

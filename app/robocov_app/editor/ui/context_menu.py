@@ -43,14 +43,14 @@ def _list_object_groups(editor: Editor) -> list[list[str]]:
 def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
     """Return the groups of commands for a selection that contains obstacles."""
     selection = editor.selection
-    count = len(selection.items & editor.sketch.index_by_key.keys())
+    obstacle_count = len(selection.items & editor.sketch.index_by_key.keys())
     groups = [["cut", "copy", "duplicate", "delete"]]
     groups.append(_list_width_commands(editor))
     if len(selection.owners) == 1 and not selection.boundary:
         groups.append(["name", "fit:selection"])
     groups.append(["rotate:left", "rotate:right", "mirror:x", "mirror:y"])
-    if count > 1:
-        # A menu must fit into the window, so the panel has the commands that align objects.
+    if obstacle_count > 1:
+        # The commands that align objects are only in the panel, so that the menu fits into the window.
         groups.append(["unite", "subtract", "intersect", "divide"])
         groups.append(["group", "lock", "hide"])
     else:

@@ -316,13 +316,15 @@ class ImportDialog(Dialog):
         return self.imported.report.format_lines()
 
     def _draw_report(self, ui: Ui, bottom: float) -> None:
-        """Draw the report of the import or the problem, and a hint, above the lower edge `bottom`."""
+        """Draw the report of the import or the problem, then a hint, down to the lower edge `bottom`."""
         lines: list[str] = []
         for text in self._list_report_lines():
             lines += wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))
         max_lines = int((bottom - ui.y) / REPORT_LINE_PX) - 1
         if len(lines) > max_lines:
-            lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
+            # The last line that fits gives the number of lines left out.
+            shown_lines = lines[: max_lines - 1]
+            lines = [*shown_lines, f"and {len(lines) - len(shown_lines)} more lines"]
         ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
             color = ui.theme.ink

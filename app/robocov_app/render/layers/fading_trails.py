@@ -18,7 +18,7 @@ MARGIN_PX = 5.0
 """Space around trajectories, px, in addition to their width."""
 FADE_PIECE_PX = 4.0
 """Distance that the fastest robot covers between two drawn corners, at scale 1."""
-_FINENESS = 2
+_SUPERSAMPLING = 2
 """Trajectories are drawn this many times larger and then shrunk, for antialiasing."""
 _FADE_EXPONENT = 0.7
 """Below 1, trajectories fade slowly at first, so that older parts can still be followed."""
@@ -71,8 +71,8 @@ def draw_fading_trails(
     steps = np.minimum(ages, FADE_STEPS).astype(int)
     rows = _select_corners(pixels, steps, FADE_PIECE_PX * canvas.scale)
     steps = steps[rows]
-    sketch = Sketch(box, _FINENESS)
-    points = (pixels[rows] - np.array(box.topleft) + 0.5) * _FINENESS
+    sketch = Sketch(box, _SUPERSAMPLING)
+    points = (pixels[rows] - np.array(box.topleft) + 0.5) * _SUPERSAMPLING
     # All robots' sections of one shade are drawn before newer ones, so that these are on top at crossings.
     bounds = [0, *(np.flatnonzero(np.diff(steps)) + 1).tolist(), len(rows) - 1]
     tips = np.full((len(pen.colors), 2), np.nan)
@@ -101,10 +101,10 @@ def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen:
         The ends of the parts drawn now; unchanged for robots that have hardly moved.
     """
     shades = {color: premultiply(color, opacity) for color in set(pen.colors)}
-    width = max(1, round(pen.width * _FINENESS))
-    is_rounded = width > _MIN_ROUNDED_WIDTH_PX * _FINENESS
+    width = max(1, round(pen.width * _SUPERSAMPLING))
+    is_rounded = width > _MIN_ROUNDED_WIDTH_PX * _SUPERSAMPLING
     # Negated, so that robots without a tip (nan) count as moved.
-    has_moved = ~(np.abs(points - tips).max(axis=(0, 2)) < _FINENESS)
+    has_moved = ~(np.abs(points - tips).max(axis=(0, 2)) < _SUPERSAMPLING)
     is_present: BoolArray = np.asarray(np.isfinite(points).all(axis=(0, 2)))
     continues = is_present & ~np.isnan(tips[:, 0])
     paths = points.copy()

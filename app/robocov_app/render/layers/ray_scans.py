@@ -14,7 +14,7 @@ from robocov_app.render.clipping import clip_polygon, clip_segment, limit_pixels
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.scene import Scene
 
-_FINENESS = 2
+_SUPERSAMPLING = 2
 """Scans are drawn larger and shrunk: drawing hundreds of smooth rays would take far longer."""
 _HIT_RADIUS_PX = 1.5
 """Radius of the end of a ray, at scale 1."""
@@ -82,7 +82,7 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     box = sprites.find_visible_box(limit_pixels(all_ends), _MARGIN_PX, canvas.surface)
     if box is None:
         return
-    sketch = sprites.Sketch(box, _FINENESS)
+    sketch = sprites.Sketch(box, _SUPERSAMPLING)
     _draw_large_scans(sketch, canvas, scans)
     sketch.draw_on(canvas.surface)
     hits = np.concatenate([scan.hits for scan in scans])
@@ -98,7 +98,8 @@ def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]
     large = sketch.large
     corner = np.array(sketch.box.topleft) - 0.5
     large_scans = [
-        _Scan((scan.position - corner) * _FINENESS, (scan.ends - corner) * _FINENESS) for scan in scans
+        _Scan((scan.position - corner) * _SUPERSAMPLING, (scan.ends - corner) * _SUPERSAMPLING)
+        for scan in scans
     ]
     outlines: list[Array] = []
     for scan in large_scans:
@@ -108,19 +109,19 @@ def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]
     for scan in large_scans:
         _draw_rays(large, scan, canvas)
     for outline in outlines:
-        pygame.draw.lines(large, premultiply(color, _OUTLINE_OPACITY), True, outline.tolist(), _FINENESS)
+        pygame.draw.lines(large, premultiply(color, _OUTLINE_OPACITY), True, outline.tolist(), _SUPERSAMPLING)
 
 
 def _draw_rays(large: pygame.Surface, scan: _Scan, canvas: Canvas) -> None:
     """Draw the rays of an enlarged scan, each from where rays are far enough apart."""
     along = scan.ends - scan.position
     lengths = np.hypot(along[:, 0], along[:, 1])
-    starts = _choose_ray_starts(len(scan.ends)) * canvas.scale * _FINENESS
-    is_visible = lengths > starts + _FINENESS
+    starts = _choose_ray_starts(len(scan.ends)) * canvas.scale * _SUPERSAMPLING
+    is_visible = lengths > starts + _SUPERSAMPLING
     fractions = starts[is_visible] / lengths[is_visible]
     first_points = scan.position + along[is_visible] * fractions[:, None]
     color = premultiply(canvas.theme.final, _RAY_OPACITY)
-    width = max(1, round(_RAY_WIDTH_PX * canvas.scale * _FINENESS))
+    width = max(1, round(_RAY_WIDTH_PX * canvas.scale * _SUPERSAMPLING))
     for start, end in zip(first_points.tolist(), scan.ends[is_visible].tolist(), strict=True):
         visible_ends = clip_segment(start, end)
         if visible_ends:

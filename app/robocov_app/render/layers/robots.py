@@ -167,6 +167,7 @@ build_robots_legend = build_legend(legend.ROBOT, _draw_robot_symbol)
 
 def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
     """Draw failed robots crossed out, with their numbers next to them."""
+    # Arrays of all robots contain the failed ones first, then the working ones.
     failed_centers = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
     working_centers = np.empty((0, 2))
     true_radii = [scene.get_failed_radius(number) for number in scene.failed]
@@ -174,13 +175,13 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
         working_centers = canvas.camera.to_pixels(scene.snapshot.positions)
         true_radii += scene.team.radius.tolist()
     centers = np.concatenate([failed_centers, working_centers])
-    fitted = fit_radii(
+    fitted_radii = fit_radii(
         centers,
         np.array(true_radii) * canvas.camera.zoom,
-        MIN_RADIUS_PX * canvas.scale,
-        _FAILED_SIZE_FACTOR * READABLE_RADIUS_PX * canvas.scale,
+        low=MIN_RADIUS_PX * canvas.scale,
+        high=_FAILED_SIZE_FACTOR * READABLE_RADIUS_PX * canvas.scale,
     )
-    failed_radii = round_to_half(np.minimum(fitted[: len(failed_centers)], _MAX_RADIUS_PX))
+    failed_radii = round_to_half(np.minimum(fitted_radii[: len(failed_centers)], _MAX_RADIUS_PX))
     all_radii = np.concatenate([failed_radii, compute_drawn_radii(canvas, scene)])
     for number, center, radius in zip(scene.failed, failed_centers, failed_radii.tolist(), strict=True):
         _draw_failed_robot(canvas, center[0], center[1], radius)

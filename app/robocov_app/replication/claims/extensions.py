@@ -71,7 +71,7 @@ def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
             f"In a mixed team, {label} reaches points sooner on average with cells by time than by distance.",
         ),
         outcomes.compare(by_time.key, by_distance.key, "time"),
-        ratio_measure="median ratio of the mean time, cells by time to cells by distance",
+        ratio_measure="median of the mean time with cells by time / with cells by distance",
         wins_measure="runs in which it is lower",
         explain=lambda pairs: (
             f"Median of the mean time until the first robot arrives: "

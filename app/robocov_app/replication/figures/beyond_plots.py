@@ -29,7 +29,7 @@ _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 
 def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
-    """Return the functions that draw the plots beyond the paper, by their names."""
+    """Return a function that draws each plot that is not in the paper, by the name of the plot."""
     theme = get_theme(theme)
     samples = build_gap_samples(results)
     heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
@@ -37,18 +37,18 @@ def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
         {
             "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
             "beyond-pairs": plan_pairs_plot(
-                _list_duel_rows(results), "ratio of our cost to the other's, per pair (1: equal)", theme
+                _list_duel_rows(results), "our cost / cost of the other, per pair (1: equal)", theme
             ),
             "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
             "beyond-targets": plan_pairs_plot(
                 _list_target_rows(results),
-                "cost relative to the centroid's, per pair (1: equal)",
+                "cost / cost with the centroid, per pair (1: equal)",
                 theme,
             ),
             "beyond-density": _plan_density_figure(results, theme),
             "beyond-teams": plan_pairs_plot(
                 _list_team_rows(results),
-                "ratio of mean times, cells by time to cells by distance, per pair (1: equal)",
+                "mean time with cells by time / with cells by distance, per pair (1: equal)",
                 theme,
             ),
             "beyond-conditions": _plan_degradations_plot(results, theme),

@@ -126,7 +126,7 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
 def _draw_curve(
     axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
-    """Draw the median ratios of a controller, with error bars for their intervals."""
+    """Draw the median ratios of a controller, with error bars for their confidence intervals."""
     color = to_plot_color(style.get_color(theme))
     y = np.array([degradation.ratio.estimate for degradation in degradations])
     ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])

@@ -168,9 +168,10 @@ def compare_pair(first: RunGroup, second: RunGroup) -> GroupComparison | None:
         maps.append(MapPairs(map_name, first_distances, second_distances, ratio))
     ratio = maps[0].ratio
     if len(maps) > 1:
-        logarithms = [float(np.log(pairs.ratio.estimate)) for pairs in maps]
-        ratio = _exponentiate(bootstrap(logarithms, "mean"))
-    unpaired_cases = first_runs.keys() ^ second_runs.keys()  # in only one of them
+        log_ratios = [float(np.log(pairs.ratio.estimate)) for pairs in maps]
+        ratio = _exponentiate(bootstrap(log_ratios, "mean"))
+    # The symmetric difference contains the cases of only one group.
+    unpaired_cases = first_runs.keys() ^ second_runs.keys()
     return GroupComparison(first, second, tuple(maps), ratio, len(unpaired_cases))
 
 
@@ -192,7 +193,7 @@ def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
 
 
 def _exponentiate(effect: Interval) -> Interval:
-    """Convert an interval of logarithms to an interval of ratios."""
+    """Convert an interval of log_ratios to an interval of ratios."""
     with np.errstate(over="ignore"):
         estimate, low, high = np.exp([effect.estimate, effect.low, effect.high]).tolist()
     return Interval(estimate, low, high)

@@ -39,7 +39,7 @@ def _build_gains_table(caption: str, groups: Sequence[RunGroup], result: Reporte
         else:
             gains = format_gains(group.gains, result.gain_units)
         rows.append((group.label, group.controller, gains or NO_VALUE))
-    return PageTable(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}))
+    return PageTable(caption, ("Controller", "Name", "Gains"), rows, text_columns=frozenset({1, 2}))
 
 
 def _format_gain_ranges(group: RunGroup, result: ReportedResult) -> str:

@@ -27,7 +27,7 @@ def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable | Non
         rows.append(row)
     caption = "Final mean distance of the first divided by that of the second"
     head = ("First", "Second", "Ratio", "First is", "First is lower in")
-    return PageTable(caption, head, rows, frozenset({1, 3}))
+    return PageTable(caption, head, rows, text_columns=frozenset({1, 3}))
 
 
 def build_map_pairs_tables(comparisons: Sequence[GroupComparison]) -> list[PageTable]:
@@ -37,7 +37,7 @@ def build_map_pairs_tables(comparisons: Sequence[GroupComparison]) -> list[PageT
     for comparison in comparisons:
         if len(comparison.maps) > 1:
             rows = [_build_map_row(pairs) for pairs in comparison.maps]
-            tables.append(PageTable(comparison.label, head, rows, frozenset({5})))
+            tables.append(PageTable(comparison.label, head, rows, text_columns=frozenset({5})))
     return tables
 
 

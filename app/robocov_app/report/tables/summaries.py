@@ -143,4 +143,4 @@ def build_runs_table(result: ReportedResult) -> PageTable | None:
         rows.append((labels[run], map_name, run.start or NO_VALUE, seed, *cells))
     headings = [column.heading for column in columns]
     head = ("Controller", "Map", "Start", "Seed", *headings)
-    return PageTable("Every run", head, rows, frozenset({1, 2}))
+    return PageTable("Every run", head, rows, text_columns=frozenset({1, 2}))

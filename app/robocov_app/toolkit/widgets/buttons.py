@@ -39,7 +39,7 @@ _TICK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
 """Corners of the tick, as fractions of the check box."""
 _TICK_WIDTH = 1 / 8
 """Width of the lines of the tick, as a fraction of the check box."""
-_FINE = 4
+_SUPERSAMPLING = 4
 """The tick is drawn larger by this factor and then scaled down, which smooths its edges."""
 
 # Fractions of the accent color that are mixed into the background.
@@ -245,9 +245,9 @@ def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> 
     if not value or page.surface is None:
         return
     # Lines with smooth edges: draw the tick enlarged, and scale it down.
-    side = _FINE * box.width
+    side = _SUPERSAMPLING * box.width
     large = Surface((side, side), pygame.SRCALPHA, 32)
-    line_width = max(_FINE, round(_TICK_WIDTH * side))
+    line_width = max(_SUPERSAMPLING, round(_TICK_WIDTH * side))
     corners = [(x * side, y * side) for x, y in _TICK]
     for start, end in pairwise(corners):
         pygame.draw.line(large, get_accent_ink(theme), start, end, line_width)

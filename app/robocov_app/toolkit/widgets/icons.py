@@ -17,7 +17,7 @@ GRID = 24.0
 """Number of units of the grid along a side of an icon."""
 _LINE_UNITS = 1.9
 """Width of the lines, in units of the grid."""
-_FINE = 4
+_SUPERSAMPLING = 4
 """Icons are drawn larger by this factor and then scaled down, which smooths their edges."""
 _ARC_STEP_DEG = 12.0
 _CACHE_BYTES = 1_000_000
@@ -274,8 +274,8 @@ def render_icon(name: str, side: int, color: Color) -> Surface:
     pygame.Surface
         The surface is cached, so callers must not draw on it.
     """
-    unit = side * _FINE / GRID
-    large = Surface((side * _FINE, side * _FINE), pygame.SRCALPHA, 32)
+    unit = side * _SUPERSAMPLING / GRID
+    large = Surface((side * _SUPERSAMPLING, side * _SUPERSAMPLING), pygame.SRCALPHA, 32)
     for stroke in ICONS[name]:
         points = [(x * unit, y * unit) for x, y in stroke.points]
         if stroke.is_filled:

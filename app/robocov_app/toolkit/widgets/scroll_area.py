@@ -156,7 +156,7 @@ def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: f
     float
     """
     bar = _build_bar(page, key, area, content_height, offset)
-    offset = _read_bar(page, bar, area, offset)
+    offset = _read_input(page, bar, area, offset)
     page.scroll_offsets[key] = offset
     page.widgets[bar.key] = Widget("bar", key, bar.knob, value=offset)
     _draw_bar(page, bar)
@@ -175,8 +175,8 @@ def _build_bar(page: Page, key: str, area: Rect, content_height: float, offset: 
     return bar
 
 
-def _read_bar(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
-    """Return the scroll offset after the mouse event of this run: a turn of the wheel, a press or a drag."""
+def _read_input(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
+    """Return the scroll offset after the current mouse event: a turn of the wheel, a press or a drag."""
     event = page.get_event()
     is_pressed = page.is_pressed(bar.track)
     is_dragged = page.active == bar.key and page.is_event(pygame.MOUSEMOTION)
@@ -184,15 +184,15 @@ def _read_bar(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
         offset -= get_wheel_notches(event) * _NOTCH_PX
         page.consume_event()
     elif is_pressed or is_dragged:
-        is_on_knob = is_pressed and bool(bar.knob.collidepoint(page.pointer))
+        is_knob_press = is_pressed and bool(bar.knob.collidepoint(page.pointer))
         if is_pressed:
             page.active = bar.key
             page.consume_event()
             page.grab_offset = bar.knob.height / 2
-            if is_on_knob:
+            if is_knob_press:
                 page.grab_offset = page.pointer[1] - bar.knob.top
-        # A press outside the knob moves the middle of the knob there at once.
-        if not is_on_knob:
+        # A press on the knob moves nothing yet; one outside centers the knob on the pointer.
+        if not is_knob_press:
             knob_offset = page.pointer[1] - page.grab_offset - bar.track.top
             offset = knob_offset / bar.free_height * bar.max_offset
     return min(max(offset, 0.0), bar.max_offset)

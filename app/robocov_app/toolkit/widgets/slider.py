@@ -116,23 +116,23 @@ def show_slider(
 
 
 def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
-    """Return the value after the mouse or key event of this run; it may lie beyond the ends."""
+    """Return the value after the current mouse or key event; it may lie beyond the ends."""
     track = values.track
     knob_left = track.left + values.free_width * values.compute_fraction(value)
     is_pressed = page.is_pressed(track)
-    is_on_knob = is_pressed and knob_left <= page.pointer[0] <= knob_left + values.knob_width
+    is_knob_press = is_pressed and knob_left <= page.pointer[0] <= knob_left + values.knob_width
     if is_pressed:
         page.active = key
         page.consume_event()
         page.grab_offset = values.knob_width / 2
         page.drag_value = value
-        if is_on_knob:
+        if is_knob_press:
             page.grab_offset = page.pointer[0] - knob_left
     is_dragged = page.active == key and page.is_event(pygame.MOUSEMOTION)
     is_fine = not values.step and bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
     if is_dragged and is_fine:
         return _drag_finely(page, values)
-    if is_dragged or (is_pressed and not is_on_knob):
+    if is_dragged or (is_pressed and not is_knob_press):
         fraction = (page.pointer[0] - page.grab_offset - track.left) / values.free_width
         page.drag_value = values.low + values.span * fraction
         return page.drag_value

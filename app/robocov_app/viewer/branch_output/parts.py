@@ -160,15 +160,16 @@ class BranchPart:
 
 
 def split_branch(branch: SelectedBranch) -> list[BranchPart]:
-    """Simulate a branch, and split it into recorded parts: a new one starts whenever a setup changes."""
+    """Simulate a branch, and split it into recorded parts. A new part starts whenever a setup changes."""
     parts: list[BranchPart] = []
     panes: list[Pane] = []
     for run, node in branch.replay():
         panes = run.panes
         setups = {pane.number: pane.setup for pane in panes}
         if not parts or parts[-1].setups != setups:
-            # An edit that lasts several steps may change the setups in each of them. Only the last change
-            # starts a part, so the part that an earlier change of the same node started is dropped.
+            # An edit that lasts several steps may change the setups in each of them. Only its last change
+            # starts a part, so drop the part that an earlier change of the same node started. If the node
+            # restarts the run, that part stays, because it contains the start.
             if parts and parts[-1].node is node and node.scenario is None:
                 parts.pop()
             recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}
@@ -235,18 +236,22 @@ def _describe_origin(part: BranchPart, setup: PaneSetup, record: Record, dt: flo
 
 
 def _describe_start(part: BranchPart, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
+    """Return what differs from a start at time 0, at rest, with all robots working."""
     origin: dict[str, Any] = {}
     if part.first_step:
         origin["began_at_s"] = part.first_step * dt
     if record.velocities[0].any():
         origin["start_velocities_m_per_s"] = record.velocities[0].tolist()
-    if setup.failed or setup.numbers != tuple(range(1, len(setup.numbers) + 1)):
+    # Without failed and removed robots, the numbers are 1, 2, 3 and so on.
+    complete_numbers = tuple(range(1, len(setup.numbers) + 1))
+    if setup.failed or setup.numbers != complete_numbers:
         origin["robots"] = list(setup.numbers)
         origin["failed"] = {str(number): list(position) for number, position in setup.failed.items()}
     return origin
 
 
 def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
+    """Return the robots that the user dragged or placed, with times since the start of the part, s."""
     origin: dict[str, Any] = {}
     if part.handled:
         origin["touched"] = [_describe_handled(time, part.first_step, dt) for time in part.handled]

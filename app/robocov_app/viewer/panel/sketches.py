@@ -29,7 +29,7 @@ _CAPTION_TEXT_PX = 10.0
 _ROBOT_RADIUS_PX = 6.0
 _LINE_PX = 1.6
 _ARROW_HEAD_PX = 5.0
-_FINE = 4
+_SUPERSAMPLING = 4
 """Sketches are drawn larger by this factor and then scaled down, which smooths their edges."""
 _DASH_COUNT = 28
 """Number of dashes of a dashed circle."""
@@ -147,8 +147,8 @@ def _render_sketch(parameter: str, scale: float) -> Surface:
     sketch = Surface((2 * side + gap, side + round(_CAPTION_PX * scale)), pygame.SRCALPHA, 32)
     text_size = round(_CAPTION_TEXT_PX * scale)
     for is_large, caption in ((False, "small"), (True, "large")):
-        large = Surface((side * _FINE, side * _FINE), pygame.SRCALPHA, 32)
-        _SCENES[parameter](_Pen(large, side * _FINE / _SCENE_PX), is_large=is_large)
+        large = Surface((side * _SUPERSAMPLING, side * _SUPERSAMPLING), pygame.SRCALPHA, 32)
+        _SCENES[parameter](_Pen(large, side * _SUPERSAMPLING / _SCENE_PX), is_large=is_large)
         scene = pygame.transform.smoothscale(large.premul_alpha(), (side, side))
         left = side + gap if is_large else 0
         sketch.blit(scene, (left, 0))

@@ -27,7 +27,7 @@ MAX_SHOWN_NUMBERS = 9
 """Number of robots above which robots are drawn small."""
 
 _CENTIMETERS = 100.0
-_FINENESS = 3
+_SUPERSAMPLING = 3
 """Outlines are drawn larger by this factor and then scaled down, which smooths their edges."""
 _TRANSPARENT = (0, 0, 0, 0)
 _EDGE_SMOOTHINGS = 2
@@ -196,12 +196,12 @@ def _render_outline(
     """Render a map, transparent where it is free; the colors are those of obstacles, boundary and outside."""
     obstacle, boundary, outside = colors
     outline = load_previews().outlines[name]
-    width = size[0] * _FINENESS
-    height = size[1] * _FINENESS
+    width = size[0] * _SUPERSAMPLING
+    height = size[1] * _SUPERSAMPLING
     large = Surface((width, height), pygame.SRCALPHA, 32)
     large.fill(outside)
     left, bottom, right, top = outline.bounds
-    inset = line_px * _FINENESS
+    inset = line_px * _SUPERSAMPLING
     factor = np.array([(width - inset - 1) / (right - left), -(height - inset - 1) / (top - bottom)])
     shift = np.array([inset / 2 - left * factor[0], inset / 2 - top * factor[1]])
     rings = [(ring * factor + shift).tolist() for ring in outline.rings]
@@ -210,7 +210,7 @@ def _render_outline(
         color = _TRANSPARENT if _is_counter_clockwise(ring) else obstacle
         pygame.draw.polygon(large, color, points)
         # Thin walls would be invisible without an edge.
-        pygame.draw.lines(large, obstacle, True, points, _FINENESS)
+        pygame.draw.lines(large, obstacle, True, points, _SUPERSAMPLING)
     pygame.draw.lines(large, boundary, True, rings[0], inset)
     return pygame.transform.smoothscale(large.premul_alpha(), size)
 
