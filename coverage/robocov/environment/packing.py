@@ -47,8 +47,11 @@ def compute_max_points(area: BaseGeometry, spacing: float) -> int:
     int
     """
     # Discs of diameter `spacing` around the points lie in the buffered area. No packing of the plane is
-    # denser than the hexagonal lattice; in a small area, one more disc may fit.
-    return 1 + int(area.buffer(spacing / 2).area / (spacing**2 * _ROW_SPACING))
+    # denser than the hexagonal lattice; in each separate part, one more disc may fit.
+    max_points = 0
+    for part in shapely.get_parts(area):
+        max_points += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _ROW_SPACING))
+    return max_points
 
 
 def estimate_max_points(area: BaseGeometry, spacing: float) -> int:

@@ -26,8 +26,8 @@ MAX_BYTES = 2_000_000_000
 """Default limit for the arrays of one file: about the largest run that the application accepts."""
 _MAX_COMPRESSION_RATIO = 100
 """Maximum size of the arrays relative to that of the file: more is a decompression bomb."""
-_MIN_RATIO_BYTES = 256_000_000
-"""The compression ratio of arrays up to this size does not matter."""
+_RATIO_EXEMPT_BYTES = 256_000_000
+"""Arrays up to this total size may have any compression ratio."""
 _MAX_READ_BYTES = 1 << 20
 """Largest single read: the central directory of a zip file with arrays is short."""
 _DAMAGE_ERRORS = (
@@ -90,8 +90,8 @@ def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, 
     """Raise ValueError if entries are too large, or have the same name."""
     # No stream yields more than the size in its entry, regardless of its content.
     total = sum(entry.file_size for entry in entries)
-    if total > min(max_bytes, max(_MIN_RATIO_BYTES, _MAX_COMPRESSION_RATIO * file_size)):
-        raise ValueError(f"too many arrays: {total / 1e6:,.0f} MB in a file of {file_size / 1e6:,.1f} MB")
+    if total > min(max_bytes, max(_RATIO_EXEMPT_BYTES, _MAX_COMPRESSION_RATIO * file_size)):
+        raise ValueError(f"arrays too large: {total / 1e6:,.0f} MB, from a file of {file_size / 1e6:,.1f} MB")
     for name, count in Counter(entry.filename for entry in entries).items():
         if count > 1:
             raise ValueError(f"duplicate entry {name!r}")
@@ -154,12 +154,12 @@ class ArrayCache:
 
     @classmethod
     def open_default(cls) -> ArrayCache | None:
-        """Open the cache in the user's folder, or in that of the environment variable ``ROBOCOV_CACHE``.
+        """Open the cache in the folder that ``ROBOCOV_CACHE`` names, or else in the user's cache folder.
 
         Returns
         -------
         ArrayCache or None
-            None if the variable is empty.
+            None if the environment variable is empty.
         """
         folder = find_cache_root()
         return None if folder is None else cls(folder)

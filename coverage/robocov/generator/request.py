@@ -39,7 +39,10 @@ class Request:
         Number of obstacles, blocks, rooms, cells or chambers, depending on the kind of map.
     area : float
         Blocked fraction of the map's area.
-    gap, width, height : float, m
+    gap : float, m
+        Smallest gap between obstacles.
+    width, height : float, m
+        Sides of the map.
 
     Raises
     ------
@@ -72,7 +75,7 @@ class Request:
 
     @property
     def unit(self) -> float:
-        """Side of a square that would contain each obstacle if the map were divided evenly, m."""
+        """Side of the square that each obstacle would get if the map were divided evenly, m."""
         return math.sqrt(self.width * self.height / self.count)
 
     @property

@@ -14,7 +14,7 @@ from robocov.sensor import RangeSensor
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 
 MAX_CONTACT_GAP_M = 1e-3
-"""Gap below which two bodies are in contact."""
+"""Largest gap at which two bodies count as in contact."""
 
 _FIRST_REACH_M = 1.0
 """Range of the first query for a nearest wall; a query with a larger range takes longer."""
@@ -49,9 +49,9 @@ def compute_clearances(record: Record) -> Array:
 
 
 def _compute_clearances_from_sensed_points(record: Record) -> Array:
-    """Compute the distances between robots and the nearest obstacle points that they sensed.
+    """Compute the clearances from the obstacle points that the robots sensed.
 
-    The record must be of walls that do not change, and of exact sensing. If a robot sensed no obstacle, its
+    This is valid only if walls do not change and sensing is exact. If a robot sensed no obstacle, its
     nearest wall is beyond its sensing range, and is found by queries with growing ranges.
     """
     positions = record.positions.reshape(-1, 2)
@@ -150,8 +150,8 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
             i = order[t, first]
             for second in range(first + 1, len(radius)):
                 j = order[t, second]
-                # The gap is at least as wide as in x. Robots farther along x are not closer. The comparison
-                # is false for nan.
+                # A lower bound on the gap, from x alone. It grows along `order`, so no later robot is closer.
+                # It is nan for robots that do not work, which ends the loop as well.
                 gap_bound = positions[t, j, 0] - positions[t, i, 0] - max_diameter
                 if not gap_bound <= max(min_gaps[t], MAX_CONTACT_GAP_M):
                     break

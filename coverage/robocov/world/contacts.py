@@ -3,8 +3,8 @@
 Besides positions and velocities, pymunk stores cached impulses, overlap corrections that it has yet to
 apply, and a search tree whose shape depends on the past. A step must depend on nothing but positions and
 velocities, so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved
-as if there were no contacts (`FreeSpace`), and those that pymunk reports in contact are moved again, from the
-same state, by a `ContactSolver`, which stores nothing between steps.
+as if there were no contacts (`ContactDetector`), and those that pymunk reports in contact are moved again,
+from the same state, by a `ContactSolver`, which stores nothing between steps.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _COLLISION_SLOP_M = 1e-4
 _MOVER_COLLISION_BIAS = 1e-9
 """Fraction of an overlap that remains after one second if obstacles move: not 0, so that a robot that one of
 them has run over is pushed out gradually."""
-_MIN_ITERATIONS = 20
-"""Solver iterations for robots of equal mass."""
+_BASE_ITERATIONS = 20
+"""Solver iterations, to which those for the ratio of masses are added."""
 _MAX_CORNER_WALLS = 3
 """Maximum number of walls in a corner that a pushed robot is moved out of, one after the other."""
 
 
-class FreeSpace:
+class ContactDetector:
     """Moves robots as if there were no contacts, and reports which robots did touch something.
 
     Several teams may share the space; robots of different teams pass through each other.
@@ -91,7 +91,7 @@ class FreeSpace:
 
         Parameters
         ----------
-        states : (m, 4) array, m and m/s
+        states : (movers, 4) array, m and m/s
             As `bodies.compute_mover_states` returns them.
         """
         self._arrays.states[self._mover_rows] = states
@@ -146,7 +146,7 @@ class ContactSolver:
         space, self._movers = build_obstacle_space(obstacles)
         # A light robot between a heavy one and a wall needs about as many iterations as the ratio of masses.
         mass_ratio = float(team.mass.max() / team.mass.min())
-        space.iterations = _MIN_ITERATIONS + math.ceil(2.0 * mass_ratio)
+        space.iterations = _BASE_ITERATIONS + math.ceil(2.0 * mass_ratio)
         space.collision_slop = _COLLISION_SLOP_M
         # With 0, each substep removes all overlap.
         space.collision_bias = _MOVER_COLLISION_BIAS if self._movers else 0.0
@@ -177,7 +177,7 @@ class ContactSolver:
         states : (k, 4) array, m and m/s
             x, y, vx, vy of these robots.
         net_forces : (k, 2) array, N
-        mover_states : (m, 4) array, m and m/s
+        mover_states : (movers, 4) array, m and m/s
             As `bodies.compute_mover_states` returns them.
         max_speed : (k,) array, m/s
             Maximum speed of each robot afterwards: a contact can make it faster than its drive can.
@@ -218,7 +218,7 @@ class ContactSolver:
             self._space.remove(*bodies)
 
     def _count_substeps(self, robots: IntArray, states: Array, net_forces: Array, dt: float) -> int:
-        """Return the number of substeps in which no robot sinks into anything by more than allowed."""
+        """Return how many substeps limit the travel in each to `_max_travel`, at most `_MAX_SUBSTEPS`."""
         max_squared_speed = 0.0
         mass = self._team.mass[robots].tolist()
         for (_, _, vx, vy), (fx, fy), m in zip(states.tolist(), net_forces.tolist(), mass, strict=True):

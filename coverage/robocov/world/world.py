@@ -14,7 +14,7 @@ from robocov.errors import ParameterError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, compute_mover_states
-from robocov.world.contacts import ContactSolver, FreeSpace
+from robocov.world.contacts import ContactDetector, ContactSolver
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
 from robocov.world.obstacle_pieces import Obstacles
 from robocov.world.unicycles import (
@@ -145,7 +145,7 @@ class World:
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
         # Both are built on demand, and are the only objects that a step changes in place.
-        self._spaces: list[tuple[slice, FreeSpace]] | None = None
+        self._spaces: list[tuple[slice, ContactDetector]] | None = None
         self._contact_solver: ContactSolver | None = None
 
     def place(self, run: int, positions: Array) -> None:
@@ -317,7 +317,7 @@ class World:
         """Return the rows of the robots of a run."""
         return slice(run * self._team_size, (run + 1) * self._team_size)
 
-    def _get_spaces(self) -> list[tuple[slice, FreeSpace]]:
+    def _get_spaces(self) -> list[tuple[slice, ContactDetector]]:
         """Return the spaces that move robots and detect contacts, each with the rows of its robots.
 
         They are built by the first call. Each space contains the teams of up to `MAX_TEAMS_PER_SPACE` runs.
@@ -327,7 +327,7 @@ class World:
             robots_per_space = MAX_TEAMS_PER_SPACE * self._team_size
             for start in range(0, len(self.team), robots_per_space):
                 rows = slice(start, min(start + robots_per_space, len(self.team)))
-                space = FreeSpace(
+                space = ContactDetector(
                     obstacles=self._obstacles,
                     team=self.team[rows],
                     positions=self.positions[rows],
