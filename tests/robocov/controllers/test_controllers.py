@@ -173,7 +173,7 @@ def test_the_information_test_can_fail(controller: Controller) -> None:
         "dispersion": [0.5, 0.7],
         "geodesic-lloyd": [1.2, 0.6],
         "atlas": [-2.5, -3.0],
-        "atlas-shared": [-2.5, -3.0],
+        "atlas-shared": [-0.9, -0.4],
         **{name: [-0.85, -0.45] for name in SHARING},
     }
     step = steps.get(controller.name, [0.6, 0.3])

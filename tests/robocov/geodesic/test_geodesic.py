@@ -247,7 +247,7 @@ def test_a_large_map_agrees_with_brute_force():
     ring = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])
     rings = [rng.uniform(0.05, 0.95, 2) + rng.uniform(0.02, 0.07) * ring for _ in range(24)]
     environment = build_environment(*rings, [(0.5, 0.5), (0.7, 0.5), (0.6, 0.8)])
-    cost = CoverageCost(environment, lattice=10)
+    cost = CoverageCost(environment, lattice=10, radius=0.0)
     robots = cost.points[[3, 30, 31, 60]]
     expected = brute.compute_distances(environment.free, robots, cost.points)
     np.testing.assert_allclose(
