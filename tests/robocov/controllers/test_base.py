@@ -27,6 +27,7 @@ def test_each_controller_states_its_information() -> None:
     assert shared_map == {
         "adaptive",
         "atlas-shared",
+        "exploring-lloyd",
         "frontier-median",
         "greedy-submodular",
         "voronoi-graph",

@@ -63,9 +63,9 @@ def play_editor(folder: Path, seed: int, events: int) -> ExceptionLog:
 class CostsOfSmallMaps(Costs):
     """Costs of maps with few obstacles. Larger maps would take long, and are tested elsewhere."""
 
-    def set_environment(self, environment: Environment) -> None:
+    def set_environment(self, environment: Environment, radius: float) -> None:
         if len(environment.obstacles) < 10:
-            super().set_environment(environment)
+            super().set_environment(environment, radius)
         else:
             self.forget()
             self._map_request = None

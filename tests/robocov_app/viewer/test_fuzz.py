@@ -80,9 +80,9 @@ BUTTONS = (1, 1, 1, 1, 2, 3, 4, 8)
 class CostsOfSmallMaps(Costs):
     """Costs of maps with few obstacles. Larger maps would take long, and are tested elsewhere."""
 
-    def set_environment(self, environment: Environment) -> None:
+    def set_environment(self, environment: Environment, radius: float) -> None:
         if len(environment.obstacles) < 15:
-            super().set_environment(environment)
+            super().set_environment(environment, radius)
         else:
             self.forget()
             self._map_request = None

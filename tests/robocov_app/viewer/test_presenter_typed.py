@@ -59,7 +59,7 @@ def test_errors_are_shown_without_paths_in_files() -> None:
 def test_a_new_map_is_passed_to_the_costs() -> None:
     viewer = build_presenter()
     maps = []
-    viewer.costs.set_environment = maps.append  # type: ignore[method-assign]
+    viewer.costs.set_environment = lambda environment, _radius: maps.append(environment)  # type: ignore[method-assign]
     run_command(viewer, "step")
     assert maps == []
     viewer.attempt(lambda: viewer.files.open_map("square"))

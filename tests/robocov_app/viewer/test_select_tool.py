@@ -69,7 +69,7 @@ def test_a_click_selects_an_obstacle_and_delete_deletes_it(driver: Driver) -> No
 
 def test_delete_removes_the_selected_robot(driver: Driver) -> None:
     driver.click_at(PILLAR)
-    driver.press_key("tab")
+    driver.press_key("i")
     assert driver.viewer.selected_robot == 1
     assert driver.viewer.selected_obstacle is None
     driver.press_key("delete")

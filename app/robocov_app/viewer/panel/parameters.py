@@ -76,6 +76,8 @@ GAIN_LABELS: Mapping[str, str] = MappingProxyType(
         "coupling": "Coupling",
         "correlation": "Correlation length",
         "explore": "Exploration bonus",
+        "squares": "Squares per side",
+        "exploration": "Exploration limit",
         "shrink": "Obstacle stiffness",
         "nodes": "Maximum nodes",
         "beta": "Path cost",
