@@ -139,7 +139,7 @@ def test_a_killed_served_editor_loses_at_most_about_a_second(tmp_path: Path, num
 def test_a_killed_served_viewer_loses_at_most_about_a_second(tmp_path: Path, number: int) -> None:
     words = ("demo", "square", "--robots", "3", "--lattice", "8", "--paused", "--folder", str(tmp_path))
     with serve_window(*words, cwd=tmp_path) as link, open_controlling_client(link) as client:
-        client.press("Tab")  # selects robot 1
+        client.press("i")  # selects robot 1
         client.press("Delete")
         wait_for(lambda: read_drafts(tmp_path) and read_drafts(tmp_path)[0].get("session"))
         link.process.send_signal(number)
