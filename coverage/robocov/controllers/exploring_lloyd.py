@@ -160,7 +160,7 @@ class ExploringLloyd(BaseController):
     information: ClassVar[Information] = "shared map"
 
     squares: float = gain(
-        64.0, "squares", "along the longer side of the region", low=4.0, high=200.0, whole=True
+        64.0, "1", "number of squares along the longer side of the region", low=4.0, high=200.0, whole=True
     )
     prior: float = gain(1.0, "1", "density of unknown squares, relative to known ones", low=1e-3, high=1e3)
     exploration: float = gain(0.6, "1", "unknown fraction of a cell's mass that is explored", high=1.0)
