@@ -196,6 +196,7 @@ def list_state(driver: Driver) -> list[object]:
         session.timeline.scenario,
         [pane.controller for pane in session.timeline.panes],
         window.canvas._painters[0].camera,
+        [group.focus for group in window._list_focus_groups()],
         window.is_help_open,
         window.layer_bar.is_open,
         window.dialogs.is_open,
@@ -219,6 +220,7 @@ def test_every_key_runs_its_command(shared: Driver, monkeypatch: pytest.MonkeyPa
     done: list[str] = []
     shared.window.dialogs.close()
     shared.window.panel.ui.stop_typing()
+    shared.window.focus.leave()
     monkeypatch.setattr(shared.window, "do", done.append)
     for command in shared.window.commands.commands:
         for key in command.keys:
