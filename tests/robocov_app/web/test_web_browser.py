@@ -228,7 +228,7 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         put = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
         browser.driver.execute_async_script(put)
         for kind in ("mousePressed", "mouseReleased"):  # the map's name
-            event = {"type": kind, "x": 1150, "y": 281, "button": "left", "clickCount": 1}
+            event = {"type": kind, "x": 1150, "y": 99, "button": "left", "clickCount": 1}
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
         press_with_control(browser, "a")
         press_with_control(browser, "v", "paste")
