@@ -30,7 +30,7 @@ _INFORMATION_NOTES = {
     "shared map": "   (shares maps by messages)",
     "whole map": "   (informed: whole map)",
 }
-"""What is printed next to the name of a controller, by the information that it uses."""
+"""Text that is printed next to the name of a controller, by the information that it uses."""
 
 
 @dataclass

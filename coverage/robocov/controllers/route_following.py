@@ -55,7 +55,7 @@ class RouteProgress(NamedTuple):
 
 
 class RouteGains(NamedTuple):
-    """How robots follow their routes."""
+    """Gains with which robots follow their routes."""
 
     k_prop: float
     """Speed per meter of distance to the goal, 1/s."""

@@ -41,7 +41,7 @@ _MAX_REPAIR_MEMORY_S = 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Digest:
-    """What a robot reports about the scans that it has. Immutable.
+    """Report of a robot about the scans that it has. Immutable.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class ReceivedDigest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobotExchange:
-    """What one robot has of the exchange. Immutable."""
+    """State of the exchange of one robot. Immutable."""
 
     log: ScanLog
     own_scan: NumberedScan | None = None

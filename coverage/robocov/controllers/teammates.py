@@ -20,7 +20,7 @@ REPORT_BYTES = 28
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TeammateReport:
-    """What a robot reports to its neighbors about k others. Immutable.
+    """Report of a robot to its neighbors about k others. Immutable.
 
     Attributes
     ----------

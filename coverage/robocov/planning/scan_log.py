@@ -110,7 +110,7 @@ def number_scans(
 
 
 class Inventory(NamedTuple):
-    """Which scans a robot has, as it reports them to others."""
+    """The scans that a robot has, as it reports them to others."""
 
     counts: IntArray
     """(n,) Number of the first scan of each robot that is missing."""

@@ -1,4 +1,4 @@
-"""What the run in the window depends on, so that it can be simulated without the window."""
+"""Everything that the run in the window depends on, so that it can be simulated without the window."""
 
 from dataclasses import dataclass, replace
 
