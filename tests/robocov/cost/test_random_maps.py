@@ -63,7 +63,7 @@ def test_distances_are_exact_for_maps_of_any_size_and_position(kind, count, seed
 def test_distances_agree_with_the_brute_force(kind, count, seed, robots):
     environment = build_random_map(kind, count, seed)
     assume(environment is not None and len(shapely.get_coordinates(environment.free)) < 120)
-    cost = CoverageCost(environment, 5)
+    cost = CoverageCost(environment, 5, radius=0.0)
     candidates = draw_positions(environment, 3 * robots, seed).tolist()
     positions = [point for point in candidates if is_well_placed(environment, point)][:robots]
     is_compared = [is_well_placed(environment, point) for point in cost.points.tolist()]

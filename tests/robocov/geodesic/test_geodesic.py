@@ -154,7 +154,7 @@ def test_distances_agree_with_brute_force(environment, data):
 @given(maps, st.data())
 def test_the_cost_agrees_with_brute_force(environment, data):
     robots = draw_points(data, environment, 3)
-    cost = CoverageCost(environment, lattice=7)
+    cost = CoverageCost(environment, lattice=7, radius=0.0)
     result = cost(robots)
     is_compared = [brute.is_well_placed(environment.free, point, 8.0) for point in cost.points]
     expected = brute.compute_distances(environment.free, robots, cost.points).min(axis=0)

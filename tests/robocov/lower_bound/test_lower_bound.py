@@ -88,8 +88,9 @@ def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvi
     if environment is None:
         return
     rng = np.random.default_rng(seed)
-    cost = CoverageCost(environment, 8)
-    dual = _Dual.build(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
+    radius = float(rng.choice([1e-6, 0.02]))
+    cost = CoverageCost(environment, 8, radius=radius)
+    dual = _Dual.build(cost, rng.choice(cost.points, 3), radius)
     # With prices for few sites, an error at one of them is not hidden by the slack of the others.
     has_price = rng.random(len(dual.site_numbers)) < rng.choice([0.04, 1.0])
     prices = np.where(has_price, rng.uniform(2.0, 12.0, len(dual.site_numbers)), 0.0)
