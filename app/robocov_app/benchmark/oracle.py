@@ -18,9 +18,9 @@ from scipy.optimize import linear_sum_assignment
 from robocov.arrays import Array, IntArray
 from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
+from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.geodesic_lloyd import GeodesicPlanner
-from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.environment import Environment, find_nearest_inside
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning

@@ -14,23 +14,23 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from robocov.controllers.adaptive import Adaptive
-from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
-from robocov.controllers.exploring_lloyd import ExploringLloyd
-from robocov.controllers.frontier_median import FrontierMedian
+from robocov.controllers.exploration.atlas import Atlas, AtlasShared
+from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
+from robocov.controllers.exploration.frontier_median import FrontierMedian
+from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
+from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.controllers.gains import instantiate_controller
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
-from robocov.controllers.greedy_submodular import GreedySubmodular
 from robocov.controllers.individual import to_team_controller
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import ControllerSource, explain_fault, load_class
 from robocov.controllers.visibility import Visibility
-from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 from robocov.errors import ParameterError, describe_unknown_name, quote, require_type
 
 CONTROLLERS: dict[str, type[Any]] = {

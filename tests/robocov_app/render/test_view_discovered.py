@@ -5,7 +5,7 @@ import pytest
 from drawn_pixels import ONE, measure_error, render_layers
 from drawn_run import SQUARE, build_scene
 
-from robocov.controllers.atlas import Atlas
+from robocov.controllers.exploration.atlas import Atlas
 from robocov.planning.discovered_map import FREE, PRESUMED_WALL, WALL, DiscoveredMap
 from robocov.planning.raster import Raster
 from robocov.team import Team

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, make_controller
-from robocov.controllers.scan_exchange import MAX_REPAIRS, Digest, ScanExchange, _count_sendable
-from robocov.controllers.teammates import TeammateReport
+from robocov.controllers.exploration.scan_exchange import MAX_REPAIRS, Digest, ScanExchange, _count_sendable
+from robocov.controllers.exploration.teammates import TeammateReport
 from robocov.environment import Environment, WallObstacle
 from robocov.observation import Message, Observations
 from robocov.planning.scan_log import NumberedScan

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.localization import Estimates
-from robocov.controllers.scan_exchange import ScanExchange
-from robocov.controllers.teammates import TeammateReport, Teammates
+from robocov.controllers.exploration.localization import Estimates
+from robocov.controllers.exploration.scan_exchange import ScanExchange
+from robocov.controllers.exploration.teammates import TeammateReport, Teammates
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.team import Team

@@ -8,11 +8,11 @@ import pytest
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, get_information, make_controller
-from robocov.controllers.frontier_median import FrontierMedian
-from robocov.controllers.greedy_submodular import GreedySubmodular
-from robocov.controllers.scan_exchange import ScanExchange
-from robocov.controllers.shared_map import Situation, assign_goals
-from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
+from robocov.controllers.exploration.frontier_median import FrontierMedian
+from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
+from robocov.controllers.exploration.scan_exchange import ScanExchange
+from robocov.controllers.exploration.shared_map import Situation, assign_goals
+from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle

@@ -13,9 +13,9 @@ import scipy
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Information
 from robocov.controllers.driving import update_returns
+from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
+from robocov.controllers.exploration.scan_exchange import ScanExchange
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
-from robocov.controllers.scan_exchange import ScanExchange
 from robocov.density import Density
 from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning
@@ -196,12 +196,12 @@ class SharedMapMemory:
 class SharedMapController(BaseController):
     """Base class of controllers in which each robot plans for itself and all robots that it hears.
 
-    Robots scan twice a second, and send each other their scans (`robocov.controllers.scan_exchange`): 542
-    bytes for each scan, and with six robots 81 bytes for a digest of the scans that a robot has. Every
-    `period` seconds, each robot makes a plan on the map of the scans that it has, and follows the shortest
-    route to its own goal in that plan. Robots with the same knowledge make the same plan. A robot that is no
-    longer heard is assumed to be at its goal, and is removed from the plan if it is not heard there. With
-    short communication ranges plans differ, and two robots may move to the same position until they hear each
+    Robots scan twice a second, and send each other their scans (see the module `scan_exchange`): 542 bytes
+    for each scan, and with six robots 81 bytes for a digest of the scans that a robot has. Every `period`
+    seconds, each robot makes a plan on the map of the scans that it has, and follows the shortest route to
+    its own goal in that plan. Robots with the same knowledge make the same plan. A robot that is no longer
+    heard is assumed to be at its goal, and is removed from the plan if it is not heard there. With short
+    communication ranges plans differ, and two robots may move to the same position until they hear each
     other.
     """
 

@@ -6,8 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robocov.controllers.exploration.shared_map import (
+    Candidates,
+    Placement,
+    SharedMapController,
+    Situation,
+    assign_goals,
+)
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import choose_greedily, run_lloyd
 
 

@@ -8,8 +8,14 @@ import numpy as np
 from scipy import ndimage
 
 from robocov.arrays import Array, IntArray
+from robocov.controllers.exploration.shared_map import (
+    Candidates,
+    Placement,
+    SharedMapController,
+    Situation,
+    assign_goals,
+)
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered_map import FREE, UNKNOWN
 

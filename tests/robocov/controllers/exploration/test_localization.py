@@ -11,7 +11,11 @@ from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Perception
 from robocov.controllers import Atlas
-from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
+from robocov.controllers.exploration.localization import (
+    Estimates,
+    assume_closer_neighbors,
+    estimate_positions,
+)
 from robocov.environment import Environment
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planning_cases import REGION, build_map, build_planner
 
-from robocov.controllers.shared_map import (
+from robocov.controllers.exploration.shared_map import (
     MAX_SILENCE_S,
     Group,
     Placement,

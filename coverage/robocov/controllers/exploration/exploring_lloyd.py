@@ -17,8 +17,8 @@ from robocov.controllers.density_exchange import (
     find_possible_senders,
 )
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
+from robocov.controllers.exploration.sightings import Sightings
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.sightings import Sightings
 from robocov.density import Density
 from robocov.observation import Decision, Message, Observations
 from robocov.observation.region import Region
@@ -139,7 +139,7 @@ class ExploringLloyd(BaseController):
 
     *Messages.* Once in each period, a robot sends at most 50 measurements, 4 + 10 k bytes for k of them
     (`robocov.controllers.density_exchange`), and the last known positions of k robots, 4 + 14 k bytes
-    (`robocov.controllers.sightings`).
+    (`robocov.controllers.exploration.sightings`).
 
     Obstacles are not known; robots slide along them as with `Lloyd`. On a map without a density, all robots
     know that the density is the same everywhere, and do not explore.

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.density_exchange import HEADER_BYTES
-from robocov.controllers.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S
+from robocov.controllers.exploration.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S
 from robocov.observation import Message, Observations
 from robocov.team import Team
 

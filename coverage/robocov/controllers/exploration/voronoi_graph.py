@@ -10,8 +10,14 @@ import scipy
 from scipy import ndimage
 
 from robocov.arrays import Array, BoolArray
+from robocov.controllers.exploration.shared_map import (
+    Candidates,
+    Placement,
+    SharedMapController,
+    Situation,
+    assign_goals,
+)
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import apply_best_swap
 from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.voronoi_roadmap import VoronoiRoadmap

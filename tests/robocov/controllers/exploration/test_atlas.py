@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions, Failure
-from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, get_information, make_controller
-from robocov.controllers.atlas import MAX_PLANNING_GROUP
-from robocov.controllers.atlas_memory import AtlasMemory, OwnMotion, PlanBasis, PlannerState, TeamKnowledge
-from robocov.controllers.teammates import Teammates
+from robocov.controllers import Atlas, AtlasShared, Rapf, get_information, make_controller
+from robocov.controllers.exploration import atlas
+from robocov.controllers.exploration.atlas import MAX_PLANNING_GROUP
+from robocov.controllers.exploration.atlas_memory import (
+    AtlasMemory,
+    OwnMotion,
+    PlanBasis,
+    PlannerState,
+    TeamKnowledge,
+)
+from robocov.controllers.exploration.teammates import Teammates
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError

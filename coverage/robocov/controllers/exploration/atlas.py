@@ -11,7 +11,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.atlas_memory import (
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
+from robocov.controllers.driving import update_returns
+from robocov.controllers.exploration.atlas_memory import (
     AtlasMemory,
     JamState,
     OwnMotion,
@@ -21,14 +23,20 @@ from robocov.controllers.atlas_memory import (
     TeamKnowledge,
     TraveledPath,
 )
-from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
-from robocov.controllers.driving import update_returns
+from robocov.controllers.exploration.localization import (
+    Estimates,
+    assume_closer_neighbors,
+    estimate_positions,
+)
+from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
+from robocov.controllers.exploration.scan_exchange import ScanExchange
+from robocov.controllers.exploration.shared_map import (
+    CERTAIN_RANGE_FRACTION,
+    MAX_SILENCE_S,
+    build_unknown_map,
+)
+from robocov.controllers.exploration.teammates import TeammateReport, Teammates, receive_reports
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
-from robocov.controllers.route_following import RouteGains, RouteProgress, follow_routes
-from robocov.controllers.scan_exchange import ScanExchange
-from robocov.controllers.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S, build_unknown_map
-from robocov.controllers.teammates import TeammateReport, Teammates, receive_reports
 from robocov.density import Density
 from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
@@ -766,9 +774,9 @@ class AtlasShared(Atlas):
     viewpoint. A robot that does not hear all others behaves as with `Atlas`. It assumes that robots out of
     range are where one of its neighbors last heard them.
 
-    Messages are those of `robocov.controllers.scan_exchange`, twice a second: 542 bytes for a scan, and with
-    six robots 81 bytes for a digest of the scans that a robot has. With each plan, a robot that is heard by
-    one which does not hear all others also sends a report: 28 bytes for each robot that it knows of.
+    Messages are those of the module `scan_exchange`, twice a second: 542 bytes for a scan, and with six
+    robots 81 bytes for a digest of the scans that a robot has. With each plan, a robot that is heard by one
+    which does not hear all others also sends a report: 28 bytes for each robot that it knows of.
 
     Parameters
     ----------
