@@ -1,7 +1,7 @@
 """Maps of the kind `blocks`: a town, divided by streets into blocks.
 
-The map is divided into convex cells by one cut after another. Each cut is the middle line of a street, and
-the block is the part of a cell that remains when the streets along its edges are removed.
+The map is divided into convex cells by one cut after another. Each cut is the middle line of a street. The
+part of a cell that remains when the streets along its edges are removed is a block.
 """
 
 import math
@@ -13,32 +13,34 @@ from shapely import Polygon
 from shapely.affinity import scale
 
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 
-_TILTS_RAD = (0.0, 0.05, 0.1)
-"""Possible standard deviations of the tilts of the streets of a town."""
+_TILT_DEVIATIONS_RAD = (0.0, 0.05, 0.1)
+"""Possible standard deviations of the tilts of streets; each town has one of them."""
 _MAX_TILT_DEVIATIONS = 1.5
 """Largest tilt of a street, in standard deviations."""
 _MAX_WIDENING_GAPS = 1.2
-"""Largest widening of the first street beyond its smallest width, in gaps."""
+"""Largest widening of the first street beyond its smallest width, as a multiple of the requested gap."""
 _MIN_WIDENING_SHARE = 0.4
-"""Widening of the last streets, and of those along the boundary, relative to that of the first."""
+"""Widening of the narrowest streets, which divide only two blocks or lie along the boundary, relative to the
+widening of the first street."""
 _CHAMFER_PROBABILITY = 0.25
+"""Probability that a corner of a block is cut off by a line."""
 _NOTCH_PROBABILITY = 0.2
-"""Probability that a corner of a block is cut off by a line, or by a notch."""
+"""Probability that a corner of a block is cut out as a parallelogram."""
 _CHAMFER_FRACTIONS = (0.2, 0.45)
 _NOTCH_FRACTIONS = (0.35, 0.6)
 """Smallest and largest fraction of an edge that is cut off; see `Trim`."""
-_MAX_CORNERS = 12
-"""The corner to trim is a random number below this one, modulo the number of corners."""
+_CORNER_CHOICES = 12
+"""Range of the random number that, modulo the number of corners, is the corner to trim."""
 _MAX_UNEVENNESS = 0.25
 """Largest offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
 """Smallest thickness of a block, relative to the side of a square of its area."""
 _MIN_THICK_FRACTION = 0.97
-"""Smallest fraction of a block that must be at least that thick; acute corners are always thinner."""
-_WIDENING_STEPS = 16
-"""Steps of the bisection for the width of the streets."""
+"""Smallest fraction of a block's area that must be at least so thick; acute corners are always thinner."""
+_WIDENING_BISECTIONS = 16
+"""Number of bisections by which the width of the streets is chosen."""
 
 
 class Edge(NamedTuple):
@@ -49,9 +51,9 @@ class Edge(NamedTuple):
     x, y : float, m
         The first corner.
     setback : float, m
-        Smallest distance of the block from the edge.
+        Distance of the block from the edge if streets are as narrow as possible: half of the street's width.
     widening_share : float
-        Increase of that distance, relative to the widening of the first street.
+        Increase of the setback per unit of widening, where the widening is that of the first street.
     """
 
     x: float
@@ -64,6 +66,7 @@ Cell: TypeAlias = list[Edge]
 """A convex polygon, counter-clockwise."""
 
 Point: TypeAlias = tuple[float, float]
+"""A point (x, y) in m, or a vector."""
 
 
 class Trim(NamedTuple):
@@ -85,22 +88,26 @@ class Trim(NamedTuple):
     is_notch: bool
 
 
-def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def build_town(
+    request: MapRequest, corner_disc: DiscStart, rng: np.random.Generator
+) -> list[Obstacle] | None:
     """Build blocks between streets; streets that separate more blocks are wider.
 
     The streets are as wide as the blocked area allows, up to a limit. Then all blocks are scaled down.
 
     Parameters
     ----------
-    request : Request
+    request : MapRequest
+        Parameters of the map.
     corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
+        Source of the streets and of the shapes of corners.
 
     Returns
     -------
     list of Obstacle or None
-        None if the blocks would be too small or too thin.
+        The blocks. None if some would be too small or too thin.
     """
     cells = divide_into_cells(request, rng)
     if cells is None:
@@ -121,14 +128,15 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     # Widen the streets until the blocks take the requested area.
     low = 0.0
     high = feasible_widening
-    for _ in range(_WIDENING_STEPS):
+    for _ in range(_WIDENING_BISECTIONS):
         middle = (low + high) / 2.0
         if _sum_areas(build_blocks(middle)) > request.blocked_area:
             low = middle
         else:
             high = middle
     blocks = build_blocks(low)
-    # These blocks are larger than requested by the rest of the bisection; scaling makes their area exact.
+    # After the last bisection, the blocks are still slightly larger than requested. Scaling makes their total
+    # area exact.
     factor = math.sqrt(request.blocked_area / _sum_areas(blocks))
     blocks = [scale(block, factor, factor, origin="centroid") for block in blocks]
     if not all(_is_thick(block) for block in blocks):
@@ -136,38 +144,41 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     return [PolygonObstacle(request.build_ring(shapely.get_coordinates(block)[:-1])) for block in blocks]
 
 
-def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] | None:
+def divide_into_cells(request: MapRequest, rng: np.random.Generator) -> list[Cell] | None:
     """Divide a map into one cell for each block.
 
     Parameters
     ----------
-    request : Request
+    request : MapRequest
+        Parameters of the map.
     rng : numpy.random.Generator
+        Source of the positions and directions of the streets.
 
     Returns
     -------
     list of Cell or None
-        None if cells would be too small.
+        Cells, with the streets along their edges. None if some would be too small.
     """
-    tilt_deviation = float(rng.choice(_TILTS_RAD))
+    tilt_deviation = float(rng.choice(_TILT_DEVIATIONS_RAD))
     street_width = request.gap_before_rounding
-    # The streets along the boundary lie half outside. Otherwise, the blocks next to them would be smaller.
+    # The middle line of a street along the boundary is half a width away from the boundary.
     half_width = street_width / 2.0
     right = request.width - half_width
     top = request.height - half_width
     outline = [(half_width, half_width), (right, half_width), (right, top), (half_width, top)]
     whole_map = [Edge(x, y, setback=half_width, widening_share=_MIN_WIDENING_SHARE / 2.0) for x, y in outline]
-    # Cells to divide, and the number of blocks in each.
-    waiting = [(whole_map, int(request.count))]
+    # Cells that may have to be divided, and the number of blocks in each.
+    waiting = [(whole_map, int(request.obstacle_count))]
     cells = []
     while waiting:
-        cell, count = waiting.pop()
-        if count == 1:
+        cell, block_count = waiting.pop()
+        if block_count == 1:
             cells.append(cell)
             continue
         # If the number of blocks is odd, either part may get one more.
-        first_count = count // 2 if rng.random() < 0.5 else count - count // 2
-        fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+        first_count = block_count // 2 if rng.random() < 0.5 else block_count - block_count // 2
+        unevenness = rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS)
+        fraction = first_count / block_count + unevenness / block_count
         # `np.ptp` is the difference between maximum and minimum.
         width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
         if max(width, height) < 2.0 * street_width:
@@ -175,11 +186,11 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         street = _Street(
             normal=_draw_normal(rng, tilt_deviation, is_upright=height > width),
             width=street_width,
-            widening_share=_compute_widening_share(count, request.count),
+            widening_share=_compute_widening_share(block_count, request.obstacle_count),
         )
         first, second = _divide_cell(cell, fraction, street)
         waiting.append((first, first_count))
-        waiting.append((second, count - first_count))
+        waiting.append((second, block_count - first_count))
     return cells
 
 
@@ -202,9 +213,10 @@ class _Street(NamedTuple):
 
 
 def _draw_normal(rng: np.random.Generator, tilt_deviation: float, *, is_upright: bool) -> Point:
-    """Draw the normal of a street across a cell that is taller than wide (`is_upright`), or wider than tall.
+    """Draw the normal of a street that divides a cell, with a random tilt.
 
-    Apart from its tilt, the street runs across the longer side of the cell, and its normal along it.
+    Without the tilt, the normal is parallel to the longer side of the cell, so that the street divides this
+    side. `is_upright` says that the longer side is the vertical one.
     """
     deviations = float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
     tilt = tilt_deviation * deviations
@@ -212,25 +224,28 @@ def _draw_normal(rng: np.random.Generator, tilt_deviation: float, *, is_upright:
     return math.cos(angle), math.sin(angle)
 
 
-def _compute_widening_share(count: int, total_count: int) -> float:
-    """Return the widening share of the edges along a street that divides a cell of `count` blocks.
+def _compute_widening_share(block_count: int, total_block_count: int) -> float:
+    """Return the widening share of the edges along a street that divides a cell of `block_count` blocks.
 
-    The first street divides all blocks and is widened most. The share of the others grows with the logarithm
-    of the number of blocks that they divide. Half of a street lies on either side of its middle line.
+    The share grows with the logarithm of the number of blocks. The first street, which divides all blocks,
+    is widened most.
     """
-    rank = math.log(count) / math.log(total_count)
-    return (_MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * rank) / 2.0
+    rank = math.log(block_count) / math.log(total_block_count)
+    street_share = _MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * rank
+    # Half of a street lies on either side of its middle line.
+    return street_share / 2.0
 
 
 def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Cell]:
-    """Divide a convex cell by a street; `fraction` is the share of its extent that the first part gets.
+    """Divide a convex cell by a street; the first part gets the given fraction of the cell.
 
-    The extent is that in the direction of the street's normal. Both parts get a new edge along the middle
-    line of the street, whose setback, half of the street's width, keeps the blocks off the street.
+    The fraction refers to the extent of the cell in the direction of the street's normal, without streets.
+    Both parts get a new edge along the middle line of the street.
     """
     normal_x, normal_y = street.normal
+    # Signed distances of the corners from the origin, in the direction of the normal.
     distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
-    # The extent that is divided excludes the new street, and half of the streets at both ends.
+    # Two widths are subtracted: that of the new street, and half of the width of the street at either end.
     free_extent = max(distances) - min(distances) - 2.0 * street.width
     distance = min(distances) + street.width + fraction * free_extent
     origin = (normal_x * distance, normal_y * distance)
@@ -248,13 +263,15 @@ def cut_cell(
     Parameters
     ----------
     cell : Cell
+        The cell to cut.
     origin : (x, y), m
         A point on the line.
     normal : (x, y)
-        Points to the side that is removed.
+        Vector across the line, towards the side that is removed.
     setback : float, m
+        Setback of the new edge; see `Edge`.
     widening_share : float
-        Setback and widening share of the new edge; see `Edge`.
+        Widening share of the new edge; see `Edge`.
 
     Returns
     -------
@@ -262,24 +279,25 @@ def cut_cell(
         The remaining part; empty if nothing remains.
     """
     # Signed distances of the corners from the line, positive on the side that is removed.
-    heights = [(edge.x - origin[0]) * normal[0] + (edge.y - origin[1]) * normal[1] for edge in cell]
+    distances = [(edge.x - origin[0]) * normal[0] + (edge.y - origin[1]) * normal[1] for edge in cell]
     remaining = []
     for k, edge in enumerate(cell):
         following = cell[(k + 1) % len(cell)]
-        height = heights[k]
-        following_height = heights[(k + 1) % len(cell)]
-        if height <= 0.0:
+        distance = distances[k]
+        following_distance = distances[(k + 1) % len(cell)]
+        if distance <= 0.0:
             remaining.append(edge)
-        # If the edge crosses the line, the point where it does is a new corner.
-        if (height <= 0.0) == (following_height <= 0.0):
+        if (distance <= 0.0) == (following_distance <= 0.0):
             continue
-        fraction = height / (height - following_height)
+        # The edge crosses the line. The crossing is a new corner.
+        fraction = distance / (distance - following_distance)
         x = edge.x + (following.x - edge.x) * fraction
         y = edge.y + (following.y - edge.y) * fraction
-        if height <= 0.0:
-            # The outline crosses the line outwards, so that the new edge starts here.
+        if distance <= 0.0:
+            # The outline enters the side that is removed. The new edge along the line starts here.
             remaining.append(Edge(x, y, setback, widening_share))
         else:
+            # The outline leaves the side that is removed. The rest of the edge starts here.
             remaining.append(edge._replace(x=x, y=y))
     return remaining
 
@@ -290,8 +308,9 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     Parameters
     ----------
     cell : Cell
+        A cell, with the streets along its edges.
     widening : float, m
-        Widening of the first street; see `Edge`.
+        Widening of the first street beyond its smallest width.
 
     Returns
     -------
@@ -310,22 +329,22 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     return block
 
 
-def _find_feasible_widening(cells: list[Cell], request: Request, corner_disc: DiscStart) -> float | None:
-    """Return a widening of the streets that leaves no block too thin, m; None if there is none."""
+def _find_feasible_widening(cells: list[Cell], request: MapRequest, corner_disc: DiscStart) -> float | None:
+    """Find a widening of the first street, m, at which no block is too thin; return None if there is none."""
     widening = _MAX_WIDENING_GAPS * request.gap
     while not all(_is_thick(_build_block(cell, widening, corner_disc, None)) for cell in cells):
         if widening == 0.0:
             return None
-        # Below one rounding step, only streets of the smallest width remain to be tried.
-        widening = widening / 2.0 if widening > request.step else 0.0
+        # After widenings down to one rounding step, try streets of the smallest width.
+        widening = widening / 2.0 if widening > request.rounding_step else 0.0
     return widening
 
 
 def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
-    """Return the block of a cell, outside the square around the start; empty if nothing remains.
+    """Build the block of a cell; return an empty polygon if nothing remains of it.
 
-    The block is the cell without the streets along its edges, which are wider by `widening` than their
-    smallest widths. A trim cuts off one of its corners.
+    The block is the cell without the streets along its edges, whose widths follow from the widening of the
+    first street. It is outside the square around the start disc. A trim cuts off one of its corners.
     """
     block = remove_streets(cell, widening)
     if not block:
@@ -334,7 +353,7 @@ def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim
     low = (x - corner_disc.radius, y - corner_disc.radius)
     high = (x + corner_disc.radius, y + corner_disc.radius)
     if shapely.box(*low, *high).intersects(_to_polygon(block)):
-        # The block ends at the side of the square that leaves the most of it.
+        # Cut the block along one side of the square. Of the four results, take the largest.
         remaining_parts = [
             cut_cell(block, low, (1.0, 0.0)),
             cut_cell(block, low, (0.0, 1.0)),
@@ -353,14 +372,15 @@ def _to_polygon(cell: Cell) -> Polygon:
 
 
 def _trim_block(block: Cell, trim: Trim) -> Polygon:
-    """Cut off the corner of a block, or cut a notch into it; return the whole block if that is not valid."""
+    """Trim a block; return the whole block if the trimmed one is not a valid polygon."""
     points = np.array([(edge.x, edge.y) for edge in block])
     index = trim.corner % len(points)
     corner = points[index]
     start = corner + (points[index - 1] - corner) * trim.before
     end = corner + (points[(index + 1) % len(points)] - corner) * trim.after
-    # The inner corner of a notch is opposite to the corner of the block in a parallelogram.
-    cut = [start, start + end - corner, end] if trim.is_notch else [start, end]
+    # A notch is a parallelogram, in which the inner corner is opposite to the corner of the block.
+    inner_corner = start + end - corner
+    cut = [start, inner_corner, end] if trim.is_notch else [start, end]
     trimmed = Polygon([*points[:index], *cut, *points[index + 1 :]])
     return trimmed if trimmed.is_valid else _to_polygon(block)
 
@@ -368,7 +388,7 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
 def _draw_trims(
     cells: list[Cell], feasible_widening: float, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Trim | None]:
-    """Draw a trim for each block; None for a block without one, or if the trimmed block would be too thin."""
+    """Draw a trim for each block; None if the block stays whole or the trimmed block would be too thin."""
     trims: list[Trim | None] = []
     drawn_trims = [_draw_trim(rng) for _ in cells]
     for cell, trim in zip(cells, drawn_trims, strict=True):
@@ -380,9 +400,9 @@ def _draw_trims(
 
 
 def _draw_trim(rng: np.random.Generator) -> Trim | None:
-    """Draw a chamfer or a notch; None if a block has neither."""
+    """Draw a chamfer or a notch; None for neither."""
     choice = rng.random()
-    corner = int(rng.integers(0, _MAX_CORNERS))
+    corner = int(rng.integers(0, _CORNER_CHOICES))
     if choice < _CHAMFER_PROBABILITY:
         fraction = rng.uniform(*_CHAMFER_FRACTIONS)
         return Trim(corner, before=fraction, after=fraction, is_notch=False)

@@ -1,4 +1,8 @@
-"""Generation of random maps: obstacles of the given kind, checked against the request, and starts."""
+"""Generation of random maps.
+
+The obstacles of a map are built by a function for its kind. A map whose blocked area, gaps or starts do not
+meet the request is discarded, and the next attempt uses other random numbers.
+"""
 
 from __future__ import annotations
 
@@ -29,39 +33,39 @@ from robocov.generator.blocks import build_town
 from robocov.generator.caves import build_cave
 from robocov.generator.mazes import build_maze
 from robocov.generator.polygons import scatter_polygons
-from robocov.generator.request import AREA_TOLERANCE, MAX_SIDE_M, MIN_SIDE_M, Request
+from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE, MAX_SIDE_M, MIN_SIDE_M, MapRequest
 from robocov.generator.rooms import build_building
 from robocov.mapfile.rules import check_rules
 
-Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
-"""Returns obstacles that leave the disc of the start in the corner free; None if the attempt failed."""
+ObstacleBuilder: TypeAlias = Callable[[MapRequest, DiscStart, np.random.Generator], list[Obstacle] | None]
+"""Builds obstacles that do not overlap the start disc in the corner; returns None if an attempt fails."""
 
 _MAX_ATTEMPTS = 40
 """Number of layouts that are tried before the parameters are considered impossible."""
-_MIN_TEAM_DISC_M = 0.6
-"""Radius of a start in which some robots of the default size fit."""
-_DISC_UNITS = 0.25
-"""Radius of the discs, as a multiple of `Request.unit`."""
-_MAX_DISC_SIDES = 0.1
-"""Largest radius of the discs, as a fraction of the shorter side of the map."""
-_MIN_DISC_FRACTION = 0.4
-"""Smallest fraction of that radius that remains if walls are near."""
+_CORNER_DISC_SPACINGS = 0.25
+"""Radius of the start disc in the corner, as a multiple of `MapRequest.mean_spacing`."""
+_MIN_CORNER_DISC_M = 0.6
+"""Smallest radius of this disc on maps that are large enough; some robots of the default size fit in it."""
+_MAX_CORNER_DISC_SIDES = 0.1
+"""Largest radius of this disc, as a fraction of the shorter side of the map."""
+_CORNER_DISC_MARGIN_SIDES = 0.02
+"""Margin between this disc and the boundary, as a fraction of the shorter side."""
 _DISC_SHRINKAGE = 0.9
-"""Factor by which the radius shrinks until the disc fits between walls."""
-_DISC_MARGIN_SIDES = 0.02
-"""Margin between the disc in the corner and the boundary, as a fraction of the shorter side."""
+"""Factor by which the radius of this disc is repeatedly multiplied until the disc fits between walls."""
+_MIN_DISC_FRACTION = 0.4
+"""Smallest radius of a start disc near walls, as a fraction of its radius without walls."""
 _MAX_CENTER_OFFSET_SIDES = 0.3
-"""Largest offset of the other disc from the middle along x and y, as a fraction of the shorter side."""
+"""Largest offset of the center disc from the middle along x and y, as a fraction of the shorter side."""
 _CENTER_CANDIDATES = 41
-"""Number of points along x, and along y, that are compared as centers of that disc."""
+"""Number of points along x, and along y, that are compared as centers of this disc."""
 _CENTER_DISC_FRACTION = 0.8
-"""Largest radius of that disc, as a fraction of the one in the corner."""
+"""Largest radius of this disc, as a fraction of the radius of the corner disc."""
 _CENTER_OFFSET_WEIGHT = 0.2
 """Clearance, m, that outweighs one meter of distance from the middle."""
-_SCORE_DIGITS = 9
+_SCORE_DECIMALS = 9
 """Decimal places to which scores are rounded, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
-"""Rounding error that a measured gap may have."""
+"""Largest rounding error of a measured gap."""
 
 
 @dataclass(frozen=True)
@@ -70,67 +74,68 @@ class MapKind:
 
     Attributes
     ----------
-    layout : callable
-        Builds the obstacles; see `Layout`.
+    build_obstacles : callable
+        Builds the obstacles; see `ObstacleBuilder`.
     description : str
+        What its maps look like, in one line.
     obstacle_name : str
         Name of its obstacles in the plural, such as "rooms".
-    obstacles : int
+    default_obstacle_count : int
         Default number of obstacles.
-    area : float
-        Default blocked fraction of the area.
+    default_blocked_fraction : float
+        Default fraction of the map's area that obstacles block.
     is_approximate : bool
-        Whether maps have only approximately the requested number.
+        Whether the number of obstacles may differ from the requested number.
     """
 
-    layout: Layout
+    build_obstacles: ObstacleBuilder
     description: str
     obstacle_name: str
-    obstacles: int
-    area: float
+    default_obstacle_count: int
+    default_blocked_fraction: float
     is_approximate: bool = False
 
 
 GENERATORS: dict[str, MapKind] = {
     "polygons": MapKind(
-        layout=scatter_polygons,
+        build_obstacles=scatter_polygons,
         description="scattered obstacles: convex polygons, L and U shapes",
         obstacle_name="obstacles",
-        obstacles=6,
-        area=0.2,
+        default_obstacle_count=6,
+        default_blocked_fraction=0.2,
     ),
     "blocks": MapKind(
-        layout=build_town,
+        build_obstacles=build_town,
         description="a town: blocks between streets",
         obstacle_name="blocks",
-        obstacles=12,
-        area=0.4,
+        default_obstacle_count=12,
+        default_blocked_fraction=0.4,
     ),
     "rooms": MapKind(
-        layout=build_building,
+        build_obstacles=build_building,
         description="a building: rooms with doors, and some furniture",
         obstacle_name="rooms",
-        obstacles=6,
-        area=0.12,
+        default_obstacle_count=6,
+        default_blocked_fraction=0.12,
     ),
     "mazes": MapKind(
-        layout=build_maze,
+        build_obstacles=build_maze,
         description="a maze: corridors, some dead ends, some loops",
         obstacle_name="cells",
-        obstacles=36,
-        area=0.12,
+        default_obstacle_count=36,
+        default_blocked_fraction=0.12,
         is_approximate=True,
     ),
     "caves": MapKind(
-        layout=build_cave,
+        build_obstacles=build_cave,
         description="a cave: chambers and tunnels with smooth walls, and pillars",
         obstacle_name="chambers",
-        obstacles=12,
-        area=0.4,
+        default_obstacle_count=12,
+        default_blocked_fraction=0.4,
         is_approximate=True,
     ),
 }
-"""Kinds of generated maps by name, with their default numbers of obstacles and blocked areas."""
+"""Kinds of generated maps by name, with their default numbers of obstacles and blocked fractions."""
 
 
 def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
@@ -146,21 +151,22 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
 ) -> Environment:
     """Generate a random map; the same seed and parameters give the same map.
 
-    Its free space is connected and has no passage narrower than `gap`. The blocked fraction of its area
-    differs from `area` by at most `AREA_TOLERANCE`. Its starts are ``corner``, a disc in one of the corners,
-    ``centre``, a disc near the middle, and ``uniform``. Its `extra` contains the parameters.
+    The free space of the map is connected and has no passage narrower than `gap`. The blocked fraction of the
+    map's area differs from `area` by at most 0.005. The map has three starts: ``corner``, a disc in one of
+    the corners, ``centre``, a disc near the middle, and ``uniform``. Its attribute `extra` contains the
+    parameters.
 
     Parameters
     ----------
     seed : int
-        At least 0.
+        Seed of the random numbers, at least 0.
     kind : str
-        One of `GENERATORS`.
+        Kind of the map: one of the names in `GENERATORS`.
     obstacles : int or None
         Number of obstacles, blocks or rooms; approximate number of cells of a maze or chambers of a cave. The
         default depends on the kind.
     area : float or None
-        Blocked fraction of the map's area. The default depends on the kind.
+        Fraction of the map's area that obstacles block. The default depends on the kind.
     gap : float, m
         Smallest width of a passage.
     side : float, m
@@ -171,6 +177,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     Returns
     -------
     Environment
+        The map, with its starts.
 
     Raises
     ------
@@ -194,9 +201,9 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
     map_kind = GENERATORS[kind]
     side = require_number("side", side, MIN_SIDE_M, MAX_SIDE_M)
-    request = Request(
-        count=map_kind.obstacles if obstacles is None else obstacles,
-        area=map_kind.area if area is None else area,
+    request = MapRequest(
+        obstacle_count=map_kind.default_obstacle_count if obstacles is None else obstacles,
+        blocked_fraction=map_kind.default_blocked_fraction if area is None else area,
         gap=gap,
         width=side if width is None else width,
         height=side if height is None else height,
@@ -204,52 +211,54 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([int(seed), attempt])
         corner_disc = _choose_corner_disc(request, rng)
-        layout_obstacles = map_kind.layout(request, corner_disc, rng)
-        if layout_obstacles is None:
+        built_obstacles = map_kind.build_obstacles(request, corner_disc, rng)
+        if built_obstacles is None:
             continue
-        environment = _build_environment(int(seed), kind, request, layout_obstacles)
-        complete_environment = _add_starts(environment, request, corner_disc)
-        if complete_environment is not None:
-            return complete_environment
+        environment = _build_environment(int(seed), kind, request, built_obstacles)
+        environment_with_starts = _add_starts(environment, request, corner_disc)
+        if environment_with_starts is not None:
+            return environment_with_starts
     raise ParameterError(
-        f"area: found no {request.width:g} x {request.height:g} m layout of {request.count} "
-        f"{map_kind.obstacle_name} with a blocked fraction of {request.area:g} and gaps of "
+        f"area: found no {request.width:g} x {request.height:g} m layout of {request.obstacle_count} "
+        f"{map_kind.obstacle_name} with a blocked fraction of {request.blocked_fraction:g} and gaps of "
         f"{request.gap:g} m. Try another area, a narrower gap or another number of {map_kind.obstacle_name}"
     )
 
 
-def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart:
-    """Return a disc in one of the corners."""
+def _choose_corner_disc(request: MapRequest, rng: np.random.Generator) -> DiscStart:
+    """Choose the start disc in a random corner of the map."""
     is_right, is_top = rng.integers(0, 2, 2).tolist()
     side = min(request.width, request.height)
-    radius = max(_DISC_UNITS * request.unit, _MIN_TEAM_DISC_M)
-    radius = request.round_down(min(_MAX_DISC_SIDES * side, radius))
-    offset = radius + _DISC_MARGIN_SIDES * side
+    radius = max(_CORNER_DISC_SPACINGS * request.mean_spacing, _MIN_CORNER_DISC_M)
+    radius = request.round_down(min(_MAX_CORNER_DISC_SIDES * side, radius))
+    offset = radius + _CORNER_DISC_MARGIN_SIDES * side
     x = request.width - offset if is_right else offset
     y = request.height - offset if is_top else offset
-    return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
+    return DiscStart((round(x, request.decimals), round(y, request.decimals)), radius)
 
 
-def _build_environment(seed: int, kind: str, request: Request, obstacles: list[Obstacle]) -> Environment:
-    """Return the map without starts."""
+def _build_environment(seed: int, kind: str, request: MapRequest, obstacles: list[Obstacle]) -> Environment:
+    """Build a map without starts."""
     width = float(request.width)
     height = float(request.height)
     map_kind = GENERATORS[kind]
     qualifier = "about " if map_kind.is_approximate else ""
+    obstacle_text = f"{qualifier}{request.obstacle_count} {map_kind.obstacle_name}"
     return Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         obstacles=tuple(obstacles),
         description=(
-            f"Generated with seed {seed}: {qualifier}{request.count} {map_kind.obstacle_name}, "
-            f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
+            f"Generated with seed {seed}: {obstacle_text}, "
+            f"{request.blocked_fraction:.3g} of the area blocked, "
+            f"every passage at least {request.gap:g} m wide."
         ),
         extra={
             "generator": {
                 "kind": kind,
                 "seed": seed,
-                "obstacles": int(request.count),
-                "area": float(request.area),
+                "obstacles": int(request.obstacle_count),
+                "area": float(request.blocked_fraction),
                 "gap_m": float(request.gap),
                 "width_m": width,
                 "height_m": height,
@@ -258,8 +267,8 @@ def _build_environment(seed: int, kind: str, request: Request, obstacles: list[O
     )
 
 
-def _add_starts(environment: Environment, request: Request, corner_disc: DiscStart) -> Environment | None:
-    """Return a map with its starts; None if it is not valid, or does not fulfill the request."""
+def _add_starts(environment: Environment, request: MapRequest, corner_disc: DiscStart) -> Environment | None:
+    """Return a map with its starts; None if the map is not valid or does not fulfill the request."""
     try:
         if not _fulfills_request(environment, request):
             return None
@@ -275,7 +284,7 @@ def _add_starts(environment: Environment, request: Request, corner_disc: DiscSta
 
 
 def _choose_starts(
-    environment: Environment, request: Request, corner_disc: DiscStart
+    environment: Environment, request: MapRequest, corner_disc: DiscStart
 ) -> dict[str, DiscStart | UniformStart] | None:
     """Return the starts of a map by name; None if there is not enough space for the discs."""
     start_disc = _shrink_corner_disc(environment, request, corner_disc)
@@ -286,17 +295,18 @@ def _choose_starts(
 
 
 def _shrink_corner_disc(
-    environment: Environment, request: Request, corner_disc: DiscStart
+    environment: Environment, request: MapRequest, corner_disc: DiscStart
 ) -> DiscStart | None:
-    """Return the disc, smaller and nearer to its corner if walls are near; None if it would be too small.
+    """Shrink the corner disc until it fits between walls; return None if it becomes too small.
 
-    The smaller disc keeps its distance from the sides of the map.
+    A smaller disc lies nearer to the corner: its distance from the sides of the map does not change.
     """
     center = np.array(corner_disc.center)
-    outwards = np.sign(center - request.size / 2.0)
+    # Signs of x and y in the direction of the corner.
+    outward_signs = np.sign(center - request.size / 2.0)
     radius = corner_disc.radius
     while radius >= _MIN_DISC_FRACTION * corner_disc.radius:
-        x, y = request.round_points(center + outwards * (corner_disc.radius - radius)).tolist()
+        x, y = request.round_points(center + outward_signs * (corner_disc.radius - radius)).tolist()
         if environment.free.contains(shapely.Point(x, y).buffer(radius)):
             return DiscStart((x, y), radius)
         radius = request.round_down(_DISC_SHRINKAGE * radius)
@@ -304,13 +314,13 @@ def _shrink_corner_disc(
 
 
 def _choose_center_disc(
-    environment: Environment, request: Request, corner_disc: DiscStart
+    environment: Environment, request: MapRequest, corner_disc: DiscStart
 ) -> DiscStart | None:
     """Choose a start disc near the middle of the map, with as much clearance as possible.
 
-    Its center is the point with the best score in a grid of points around the middle. The score of a point is
-    its distance from the nearest wall, at most the maximum radius of the disc, minus a fraction of its
-    distance from the middle. Return None if no point of the grid is free.
+    The center of the disc is the point with the best score in a grid of points around the middle. The score
+    of a point is its clearance, but at most the maximum radius of the disc, minus a fraction of its distance
+    from the middle. Return None if no point of the grid is free.
     """
     max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
     axis_offsets = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
@@ -325,23 +335,23 @@ def _choose_center_disc(
     max_radius = _CENTER_DISC_FRACTION * corner_disc.radius
     distances = np.hypot(offsets[:, 0], offsets[:, 1])
     scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
-    # Scores are rounded, so that rounding errors do not decide between equally good points.
-    best = int(np.round(scores, _SCORE_DIGITS).argmax())
-    # If there is little clearance, the disc overlaps obstacles, and robots start in its free area.
+    best = int(np.round(scores, _SCORE_DECIMALS).argmax())
+    # If there is little clearance, the disc overlaps obstacles. Robots then start in the rest of the disc.
     radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)
     center = (float(points[best, 0]), float(points[best, 1]))
     return DiscStart(center, request.round_down(min(radius, max_radius)))
 
 
-def _fulfills_request(environment: Environment, request: Request) -> bool:
-    """Return whether a map has the blocked area and the gaps that were requested, and is connected."""
+def _fulfills_request(environment: Environment, request: MapRequest) -> bool:
+    """Return whether a map has the requested blocked fraction and gaps, and connected free space."""
     free = environment.free
     blocked_fraction = 1.0 - environment.free_area / environment.area
-    if abs(blocked_fraction - request.area) > AREA_TOLERANCE or len(free.geoms) != 1:
+    if abs(blocked_fraction - request.blocked_fraction) > BLOCKED_FRACTION_TOLERANCE or len(free.geoms) != 1:
         return False
     narrowest = find_narrowest_gap(free)
     if narrowest is not None and narrowest.width < request.gap - _GAP_TOLERANCE_M:
         return False
-    # A disc as wide as the gap must be able to reach every place where it fits.
-    disc_area = free.buffer(-request.gap / 2.0 + _GAP_TOLERANCE_M, quad_segs=16)
-    return isinstance(disc_area, shapely.Polygon)
+    # A disc as wide as the gap must be able to move between all positions where it fits: the area of its
+    # possible centers, which is the free space eroded by its radius, must be connected.
+    center_area = free.buffer(-request.gap / 2.0 + _GAP_TOLERANCE_M, quad_segs=16)
+    return isinstance(center_area, shapely.Polygon)

@@ -8,65 +8,68 @@ import shapely
 
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 
 SHAPE_PROBABILITIES = {"convex": 0.6, "L": 0.2, "U": 0.2}
-"""A U whose opening would be too narrow for the gap becomes an L."""
+"""Probabilities of the shapes of obstacles. A U whose opening would be narrower than the gap becomes an L."""
 
 _MIN_AREA_RATIO = 0.5
 _MAX_AREA_RATIO = 1.5
-"""Smallest and largest area of an obstacle, relative to the mean."""
+"""Range of the areas of obstacles, before they are scaled to the requested total."""
 _MAX_FILLED_FRACTION = 0.7
 """Largest fraction of the map that obstacles fill, together with half of the gap around each of them."""
 _MAX_MOVES = 12
-"""Number of obstacles that are moved to make space for others, before the layout is abandoned."""
+"""Largest number of obstacles that are moved to make space for others before the layout is abandoned."""
 _MAX_OUTLINES = 8
-"""Number of outlines that are tried for one obstacle."""
+"""Largest number of outlines that are tried for one obstacle."""
 _POSITIONS_PER_OUTLINE = 128
-"""Number of positions that are tested for each of these outlines."""
+"""Number of random positions that are tested for each of these outlines."""
 _MAX_REDRAWS = 8
-"""Number of times that a shape is drawn until it is suitable."""
+"""Largest number of times that an outline is drawn until it is suitable."""
 _VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
 """Numbers of vertices of a convex polygon, and their probabilities."""
 _MIN_ANGLE_STEP = 0.4
-"""Smallest angle between consecutive vertices, before all angles are scaled so that they add up to a full
-turn. The largest angle is 1 more."""
+"""Smallest angle between consecutive vertices, where the largest angle is 1 more. Then all angles are scaled
+so that they add up to a full turn."""
 _MAX_STRETCH = 1.7
 """Largest ratio of the axes of the ellipse on which the vertices of a convex polygon lie."""
 _L_WIDTHS = (1.0, 1.5)
+"""Smallest and largest width of an L, relative to its height."""
 _L_THICKNESSES = (0.3, 0.5)
-"""Smallest and largest width of an L, relative to its height, and thickness of its arms, relative to its
-width and height."""
+"""Smallest and largest thickness of the arms of an L, relative to its width and its height."""
 _U_WIDTHS = (1.0, 1.6)
 _U_ARM_WIDTHS = (0.2, 0.3)
 _U_BASE_HEIGHTS = (0.22, 0.35)
 _U_RIGHT_HEIGHTS = (0.7, 1.0)
-"""Smallest and largest dimensions of a U, relative to the height of its left arm."""
+"""Smallest and largest dimensions of a U, relative to the height of its left arm: its width, the widths of
+its arms, the height of the base between the arms, and the height of its right arm."""
 _MIN_ROUNDNESS = 0.52
 """Smallest area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
-_ROUNDING_M = 1e-9
-"""Allowance for rounding errors of distances."""
+_ROUNDING_ERROR_M = 1e-9
+"""Largest rounding error of a distance."""
 
 
 def scatter_polygons(
-    request: Request, corner_disc: DiscStart, rng: np.random.Generator
+    request: MapRequest, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Obstacle] | None:
     """Scatter obstacles that are at least the requested gap from each other and from the boundary.
 
     Parameters
     ----------
-    request : Request
+    request : MapRequest
+        Parameters of the map.
     corner_disc : DiscStart
-        Disc at which robots start; no obstacle overlaps it.
+        Disc that stays free of obstacles.
     rng : numpy.random.Generator
+        Source of the shapes and positions.
 
     Returns
     -------
     list of Obstacle or None
-        None if the obstacles do not fit.
+        The obstacles. None if they do not fit.
     """
-    area_ratios = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.count)
-    # The largest obstacle is placed first.
+    area_ratios = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.obstacle_count)
+    # The largest obstacle is placed first, when there is most space.
     areas = np.sort(area_ratios)[::-1]
     areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
@@ -74,7 +77,7 @@ def scatter_polygons(
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
     shapely.prepare(start_disc)
     names = list(SHAPE_PROBABILITIES)
-    shapes = rng.choice(names, size=request.count, p=list(SHAPE_PROBABILITIES.values()))
+    shapes = rng.choice(names, size=request.obstacle_count, p=list(SHAPE_PROBABILITIES.values()))
     queue = deque(zip(shapes.tolist(), areas.tolist(), strict=True))
     placed: list[tuple[str, float]] = []
     outlines: list[shapely.Polygon] = []
@@ -96,7 +99,7 @@ def scatter_polygons(
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
 
 
-def _are_too_large(areas: Array, request: Request) -> bool:
+def _are_too_large(areas: Array, request: MapRequest) -> bool:
     """Return whether obstacles fill too much of the map even as discs, which need the least space."""
     radii = np.sqrt(areas / np.pi) + request.gap / 2.0
     filled_area = float((np.pi * radii**2).sum())
@@ -105,17 +108,17 @@ def _are_too_large(areas: Array, request: Request) -> bool:
 
 
 def _place_shape(
-    request: Request,
+    request: MapRequest,
     shape: str,
     area: float,
     placed_outlines: Array,
     start_disc: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
-    """Return a random outline of a shape at a free position; None if none is found.
+    """Return a random outline of a shape at a free position; None if no free position is found.
 
-    For each of several outlines, many random positions are tested at once: the outline must keep the gap from
-    the boundary and from the outlines placed before, and must not touch the start disc.
+    Several outlines are drawn, and each is tested at many random positions. At a free position, the outline
+    keeps the gap from the boundary and from the outlines placed before, and does not touch the start disc.
     """
     gap = request.gap
     size = request.size
@@ -131,9 +134,11 @@ def _place_shape(
         candidates = shapely.polygons(request.round_points(centers[:, None] + outline))
         # Lower left and upper right corners of the bounding boxes, (k, 2) m each.
         low, high = np.split(shapely.bounds(candidates), 2, axis=1)
-        is_inside = ((low >= gap - _ROUNDING_M) & (high <= size - gap + _ROUNDING_M)).all(axis=1)
+        min_low = gap - _ROUNDING_ERROR_M
+        max_high = size - gap + _ROUNDING_ERROR_M
+        is_inside = ((low >= min_low) & (high <= max_high)).all(axis=1)
         is_free = shapely.disjoint(candidates, start_disc) & shapely.is_valid(candidates) & is_inside
-        # Measure the distances to the obstacles whose bounding boxes are within the gap.
+        # Measure the distances only to outlines whose bounding boxes are near enough.
         search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
         candidate_indices, placed_indices = tree.query(search_boxes)
         distances = shapely.distance(candidates[candidate_indices], placed_outlines[placed_indices])
@@ -145,10 +150,10 @@ def _place_shape(
     return None
 
 
-def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Generator) -> Array:
-    """Return a random outline of a shape, (k, 2) m.
+def _draw_shape(request: MapRequest, shape: str, area: float, rng: np.random.Generator) -> Array:
+    """Draw a random outline of a shape, (k, 2) m.
 
-    The outline is an L if the arms of a U would be too close to each other.
+    The outline is an L if the opening of a U would be narrower than the gap.
     """
     if shape == "convex":
         return draw_convex_polygon(rng, area)
@@ -160,21 +165,24 @@ def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Genera
 
 
 def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
-    """Draw a convex polygon of 3 to 7 vertices on an ellipse, which is usually not thin.
+    """Draw a random convex polygon that is usually not thin; its 3 to 7 vertices lie on an ellipse.
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the shape and direction.
     area : float, m²
+        Area of the polygon.
 
     Returns
     -------
     (k, 2) array, m
+        Vertices. The bounding box is centered at the origin.
     """
     for _ in range(_MAX_REDRAWS):
         vertex_counts = list(_VERTEX_PROBABILITIES)
-        count = int(rng.choice(vertex_counts, p=list(_VERTEX_PROBABILITIES.values())))
-        angle_steps = _MIN_ANGLE_STEP + rng.random(count)
+        vertex_count = int(rng.choice(vertex_counts, p=list(_VERTEX_PROBABILITIES.values())))
+        angle_steps = _MIN_ANGLE_STEP + rng.random(vertex_count)
         angles = np.cumsum(angle_steps) * (2.0 * np.pi / angle_steps.sum())
         stretch = rng.uniform(1.0, _MAX_STRETCH)
         outline = np.column_stack([stretch * np.cos(angles), np.sin(angles)])
@@ -191,7 +199,9 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the dimensions and direction.
     area : float, m²
+        Area of the L.
 
     Returns
     -------
@@ -215,20 +225,23 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     return _scale_and_rotate(outline, area, rng)
 
 
-def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
+def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> Array | None:
     """Draw a random outline of a U of the given area, in a random direction. The arms may differ in length.
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the dimensions and direction.
     area : float, m²
-    opening : float, m
-        Smallest width of the opening.
+        Area of the U.
+    min_opening : float, m
+        Smallest width of the opening between the arms.
 
     Returns
     -------
     (8, 2) array, m, or None
-        Vertices, around the center of the bounding box. None if all outlines drawn had too narrow an opening.
+        Vertices. The bounding box is centered at the origin. None if the opening was too narrow in every
+        outline that was drawn.
     """
     # All lengths are relative to the height of the left arm until the outline is scaled.
     for _ in range(_MAX_REDRAWS):
@@ -249,14 +262,16 @@ def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array
             ]
         )
         scale = math.sqrt(area / shapely.Polygon(outline).area)
-        if (width - left_width - right_width) * scale >= opening:
+        opening = (width - left_width - right_width) * scale
+        if opening >= min_opening:
             return _scale_and_rotate(outline, area, rng)
     return None
 
 
 def _scale_and_rotate(outline: Array, area: float, rng: np.random.Generator) -> Array:
-    """Return an outline of the given area in a random direction, its bounding box centered at the origin."""
+    """Scale an outline to an area, rotate it at random, and center its bounding box at the origin."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     outline = outline @ rotation * math.sqrt(area / shapely.Polygon(outline).area)
-    return np.asarray(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2.0)
+    box_center = (outline.min(axis=0) + outline.max(axis=0)) / 2.0
+    return np.asarray(outline - box_center)

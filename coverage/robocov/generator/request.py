@@ -13,32 +13,36 @@ from robocov.errors import require_number
 MIN_GAP_M = 0.21
 """Smallest gap that may be requested: robots of the default size fit through it."""
 assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS_M * (1.0 + MIN_START_GAP_RADII)
-AREA_TOLERANCE = 0.005
-"""Largest difference between the blocked fraction of a map's area and the requested one."""
+BLOCKED_FRACTION_TOLERANCE = 0.005
+"""Largest difference between the blocked fraction of a map's area and the requested fraction."""
 MAX_OBSTACLES = 100_000
+"""Largest number of obstacles that may be requested."""
 MIN_SIDE_M = 1.0
 MAX_SIDE_M = 1000.0
-_MIN_AREA = 0.01
-_MAX_AREA = 0.9
+"""Smallest and largest width and height of a map."""
+_MIN_BLOCKED_FRACTION = 0.01
+_MAX_BLOCKED_FRACTION = 0.9
+"""Smallest and largest blocked fraction that may be requested."""
 _MIN_GAPS_PER_SIDE = 3.0
+"""Smallest ratio between the shorter side of a map and the requested gap."""
 _MIN_CENTIMETER_GAP_M = 0.5
-"""Coordinates are rounded to centimeters from this gap on, to millimeters below."""
+"""Smallest gap with coordinates in whole centimeters. With narrower gaps, they are in whole millimeters."""
 _ROUNDING_ALLOWANCE_STEPS = 3.0
 """Rounding steps by which gaps are made wider, because rounding may bring corners nearer to each other."""
 _STEP_TOLERANCE = 1e-9
-"""Fraction of a step by which a length may miss a multiple of it because of rounding."""
+"""Rounding error of a length that is a multiple of the rounding step, as a fraction of the step."""
 
 
 @dataclass(frozen=True)
-class Request:
+class MapRequest:
     """Parameters of a map; see `robocov.generator.generate_map`.
 
     Attributes
     ----------
-    count : int
+    obstacle_count : int
         Number of obstacles, blocks, rooms, cells or chambers, depending on the kind of map.
-    area : float
-        Blocked fraction of the map's area.
+    blocked_fraction : float
+        Fraction of the map's area that obstacles block.
     gap : float, m
         Smallest gap between obstacles.
     width, height : float, m
@@ -50,15 +54,16 @@ class Request:
         If a parameter is out of range.
     """
 
-    count: int
-    area: float
+    obstacle_count: int
+    blocked_fraction: float
     gap: float
     width: float
     height: float
 
     def __post_init__(self) -> None:
-        require_number("obstacles", self.count, 1, MAX_OBSTACLES, whole=True)
-        require_number("area", self.area, _MIN_AREA, _MAX_AREA)
+        # Messages name the parameters of `generate_map`.
+        require_number("obstacles", self.obstacle_count, 1, MAX_OBSTACLES, whole=True)
+        require_number("area", self.blocked_fraction, _MIN_BLOCKED_FRACTION, _MAX_BLOCKED_FRACTION)
         require_number("width", self.width, MIN_SIDE_M, MAX_SIDE_M)
         require_number("height", self.height, MIN_SIDE_M, MAX_SIDE_M)
         require_number("gap", self.gap, MIN_GAP_M, min(self.width, self.height) / _MIN_GAPS_PER_SIDE)
@@ -70,28 +75,28 @@ class Request:
 
     @property
     def blocked_area(self) -> float:
-        """Area to be blocked, m²."""
-        return self.area * self.width * self.height
+        """Area that obstacles block, m²."""
+        return self.blocked_fraction * self.width * self.height
 
     @property
-    def unit(self) -> float:
+    def mean_spacing(self) -> float:
         """Side of the square that each obstacle would get if the map were divided evenly, m."""
-        return math.sqrt(self.width * self.height / self.count)
+        return math.sqrt(self.width * self.height / self.obstacle_count)
 
     @property
-    def digits(self) -> int:
-        """Decimal places of all coordinates: centimeters, or millimeters if gaps are narrow."""
+    def decimals(self) -> int:
+        """Number of decimal places of all coordinates: 2, or 3 if gaps are narrow."""
         return 2 if self.gap >= _MIN_CENTIMETER_GAP_M else 3
 
     @property
-    def step(self) -> float:
-        """Rounding step of coordinates, m."""
-        return 10.0**-self.digits
+    def rounding_step(self) -> float:
+        """Difference between neighboring rounded coordinates, m."""
+        return 10.0**-self.decimals
 
     @property
     def gap_before_rounding(self) -> float:
-        """Width of the gaps between unrounded corners, which leaves at least `gap` after rounding, m."""
-        return self.gap + _ROUNDING_ALLOWANCE_STEPS * self.step
+        """Width of gaps between unrounded corners, m. After rounding, they are at least `gap` wide."""
+        return self.gap + _ROUNDING_ALLOWANCE_STEPS * self.rounding_step
 
     def round_points(self, points: Array) -> Array:
         """Round coordinates to the decimal places of the map.
@@ -103,20 +108,23 @@ class Request:
         Returns
         -------
         array, m
-            Without negative zeros.
+            Rounded coordinates, of the same shape, without negative zeros.
         """
-        return np.round(points, self.digits) + 0.0
+        # Adding 0.0 turns -0.0 into 0.0.
+        return np.round(points, self.decimals) + 0.0
 
     def build_ring(self, points: Array) -> Ring:
-        """Build an outline from points, which are rounded first.
+        """Build the outline of an obstacle from points, which are rounded first.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            Vertices, not rounded.
 
         Returns
         -------
         (k, 2) tuple, m
+            Rounded vertices.
         """
         return tuple((x, y) for x, y in self.round_points(points).tolist())
 
@@ -131,5 +139,7 @@ class Request:
         -------
         float, m
         """
-        # With the tolerance, a multiple of the step does not lose a step to a rounding error.
-        return round(math.floor(length / self.step + _STEP_TOLERANCE) * self.step, self.digits)
+        # With the tolerance, a length that is just below a multiple of the step, because of a rounding error,
+        # is not rounded down to the previous multiple.
+        steps = math.floor(length / self.rounding_step + _STEP_TOLERANCE)
+        return round(steps * self.rounding_step, self.decimals)

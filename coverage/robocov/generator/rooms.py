@@ -15,18 +15,20 @@ from shapely import Polygon
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 
-# A unit is the side of a room of mean area, `Request.unit`. Lengths in gaps are multiples of `Request.gap`.
+# Lengths in spacings are multiples of `MapRequest.mean_spacing`, the side of a square room of mean area.
+# Lengths in gaps are multiples of `MapRequest.gap`.
 _CORRIDOR_PROBABILITY = 0.5
+"""Probability that a building with enough rooms has a corridor."""
 _MIN_CORRIDOR_ROOMS = 5
-"""Smallest number of rooms of a building with a corridor."""
+"""Smallest number of rooms of a building with a corridor, which is one of them."""
 _MIN_CORRIDOR_WIDTH_GAPS = 1.6
 _MAX_CORRIDOR_WIDTH_GAPS = 2.2
 """Smallest and largest width of a corridor."""
 _MIN_CORRIDOR_OFFSET = 0.38
 _MAX_CORRIDOR_OFFSET = 0.62
-"""Minimum and maximum fraction of the remaining space that is to the left of or below a corridor."""
+"""Smallest and largest fraction of the remaining space that is to the left of a corridor, or below it."""
 _MIN_CORRIDOR_DEPTH_GAPS = 3.0
 """Smallest depth of the rooms on either side of a corridor."""
 _MIN_ROOM_SIDE_GAPS = 1.5
@@ -38,38 +40,43 @@ _MAX_DOOR_WIDTH_GAPS = 1.6
 """Smallest and largest width of a door."""
 _LOOP_PROBABILITY = 0.3
 """Probability of a door between rooms that are already connected."""
-_MIN_WALL_PIECE_UNITS = 0.05
+_MIN_WALL_SECTION_SPACINGS = 0.05
 """Smallest length of a wall next to a door."""
 _MIN_WALL_FRACTION = 0.3
-_MAX_WALL_FRACTION = 0.5
+"""Smallest fraction of the blocked area that walls take."""
+_LARGE_ROOM_SIDE_GAPS = 6.0
+_MAX_WALL_FRACTION_OF_LARGE_ROOMS = 0.5
+_SMALL_ROOM_SIDE_GAPS = 3.0
 _MAX_WALL_FRACTION_OF_SMALL_ROOMS = 0.9
-"""Smallest and largest fraction of the blocked area that walls take; small rooms have less furniture."""
-_SMALL_ROOM_SIDE_GAPS = 6.0
-_SMALLEST_ROOM_SIDE_GAPS = 3.0
-"""Sides of the mean room between which the largest fraction rises to that of small rooms."""
-_WALL_LENGTH_UNITS = 1.5
-"""Length of the walls of a room without doors; half of each wall counts for each of its rooms."""
-_MAX_THICKNESS_UNITS = 0.06
+"""Largest fraction of the blocked area that walls take if the mean room has the side of a large room or more,
+or that of a small room or less. In between, it is interpolated. Small rooms have less furniture."""
+_WALL_LENGTH_SPACINGS = 1.5
+"""Mean length of the walls per room, without doors; a wall between two rooms is counted once."""
+_MAX_THICKNESS_SPACINGS = 0.06
+"""Largest thickness of walls."""
 _PIECES_PER_ROOM = 2.2
+"""Mean number of pieces of furniture per room if no piece shrinks."""
 _MIN_PIECE_AREA_RATIO = 0.5
 _MAX_PIECE_AREA_RATIO = 1.5
-"""Smallest and largest area of a piece of furniture, relative to the mean."""
+"""Smallest and largest area of a piece of furniture, relative to the mean area."""
 _CANDIDATES_PER_PIECE = 32
-"""Positions that are compared for one piece of furniture."""
+"""Number of random positions that are tested for one piece of furniture."""
 _MAX_FAILURES = 32
 """Number of consecutive pieces without a free position after which the layout is abandoned."""
 _FAILURE_SHRINKAGE = 0.92
+"""Factor by which the area of a piece is multiplied for each of the consecutive failures before it."""
 _MIN_SHRINKAGE = 0.2
-"""Factor by which a piece shrinks for each consecutive failure before it, and the smallest product."""
+"""Smallest product of these factors."""
 _MAX_FURNITURE_FRACTION = 0.35
 """Largest fraction of the rooms that furniture may fill; more does not fit."""
-_AREA_TOLERANCE = 0.001
-"""Largest difference between the blocked area and the requested one, as a fraction of the map's area."""
+_FRACTION_TOLERANCE = 0.001
+"""Largest difference between the blocked fraction of the map's area and the requested fraction."""
 _PIECE_PROBABILITIES = {"cabinet": 0.5, "table": 0.3, "round table": 0.2}
+"""Probabilities of the kinds of furniture."""
 _CABINET_STRETCH = (1.6, 3.5)
 _TABLE_STRETCH = (1.0, 2.0)
-"""Smallest and largest ratio of the sides of a piece of furniture."""
-_MIN_PIECE_STEPS = 4.0
+"""Smallest and largest ratio of the longer side of a cabinet or table to the shorter one."""
+_MIN_PIECE_ROUNDING_STEPS = 4.0
 """Smallest side of a piece of furniture, in rounding steps."""
 
 
@@ -78,7 +85,10 @@ class Box(NamedTuple):
 
     Attributes
     ----------
-    left, bottom, right, top : float, m
+    left, right : float, m
+        Smallest and largest x.
+    bottom, top : float, m
+        Smallest and largest y.
     """
 
     left: float
@@ -121,31 +131,32 @@ class Box(NamedTuple):
         axis : int
             0 for x, 1 for y.
         low, high : float or None, m
-            The edges of the rectangle by default.
+            The two coordinates. If one is omitted, the rectangle is not cropped on this side.
 
         Returns
         -------
         Box
+            The cropped rectangle.
         """
-        default_low, default_high = self.get_range(axis)
-        new_low = default_low if low is None else low
-        new_high = default_high if high is None else high
+        old_low, old_high = self.get_range(axis)
+        new_low = old_low if low is None else low
+        new_high = old_high if high is None else high
         if axis == 0:
             return self._replace(left=new_low, right=new_high)
         return self._replace(bottom=new_low, top=new_high)
 
 
 class Wall(NamedTuple):
-    """A wall along one of the axes.
+    """A vertical or horizontal wall.
 
     Attributes
     ----------
     axis : int
-        Axis that the wall crosses: 0 for a vertical wall, 1 for a horizontal one.
+        Axis perpendicular to the wall: 0 for a vertical wall, 1 for a horizontal one.
     position : float, m
-        Coordinate of its middle line on that axis.
+        Coordinate of the wall's middle line on this axis.
     start, end : float, m
-        Coordinates of its ends on the other axis.
+        Coordinates of the wall's ends on the other axis.
     """
 
     axis: int
@@ -153,17 +164,20 @@ class Wall(NamedTuple):
     start: float
     end: float
 
-    def build_piece(self, start: float, end: float, thickness: float) -> WallObstacle:
-        """Build a piece of the wall.
+    def build_section(self, start: float, end: float, thickness: float) -> WallObstacle:
+        """Build a section of the wall.
 
         Parameters
         ----------
         start, end : float, m
+            Coordinates of the section's ends along the wall.
         thickness : float, m
+            Thickness of the wall.
 
         Returns
         -------
         WallObstacle
+            The section.
         """
         if self.axis == 0:
             return WallObstacle(((self.position, start), (self.position, end)), thickness)
@@ -176,10 +190,11 @@ class Door(NamedTuple):
     Attributes
     ----------
     wall : Wall
+        Wall that contains the door.
     start, end : float, m
-        Its ends along the wall.
+        Coordinates of the door's ends along the wall.
     rooms : pair of int
-        Indices of the rooms that it connects.
+        Indices of the rooms that the door connects.
     """
 
     wall: Wall
@@ -194,60 +209,67 @@ class FloorPlan:
 
     Attributes
     ----------
-    thickness : float, m
+    wall_thickness : float, m
         Thickness of the walls.
     rooms : list of Box
-        Rooms up to the middle lines of their walls.
+        Rooms, which end at the middle lines of their walls.
     walls : list of Wall
+        Walls between rooms, without the boundary.
     doors : list of Door
+        Openings in these walls.
     corridor : int or None
-        Index of the room that is a corridor.
+        Index of the room that is a corridor; None if no room is.
     """
 
-    thickness: float
+    wall_thickness: float
     rooms: list[Box] = field(default_factory=list)
     walls: list[Wall] = field(default_factory=list)
     doors: list[Door] = field(default_factory=list)
     corridor: int | None = None
 
     def build_walls(self) -> list[WallObstacle]:
-        """Build the pieces of the walls between their doors.
+        """Build the sections of walls between doors.
 
         Returns
         -------
         list of WallObstacle
+            All sections of all walls.
         """
-        openings: defaultdict[Wall, list[float]] = defaultdict(list)
+        # Starts and ends of the doors in each wall, in the order along the wall.
+        door_ends: defaultdict[Wall, list[float]] = defaultdict(list)
         for door in sorted(self.doors):
-            openings[door.wall] += [door.start, door.end]
-        pieces = []
+            door_ends[door.wall] += [door.start, door.end]
+        sections = []
         for wall in self.walls:
-            # Pieces start at the start of the wall and at the ends of doors, and end at the starts of doors
-            # and at the end of the wall.
-            ends = [wall.start, *openings[wall], wall.end]
-            for start, end in zip(ends[::2], ends[1::2], strict=True):
-                pieces.append(wall.build_piece(start, end, self.thickness))
-        return pieces
+            # A section leads from the start of the wall, or the end of a door, to the start of the next door,
+            # or the end of the wall.
+            section_ends = [wall.start, *door_ends[wall], wall.end]
+            for start, end in zip(section_ends[::2], section_ends[1::2], strict=True):
+                sections.append(wall.build_section(start, end, self.wall_thickness))
+        return sections
 
 
 def build_building(
-    request: Request, corner_disc: DiscStart, rng: np.random.Generator
+    request: MapRequest, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Obstacle] | None:
     """Build walls, and furniture that touches walls or is at least the requested gap away from them.
 
     Parameters
     ----------
-    request : Request
+    request : MapRequest
+        Parameters of the map.
     corner_disc : DiscStart
         Disc that stays free of furniture.
     rng : numpy.random.Generator
+        Source of the walls, doors and furniture.
 
     Returns
     -------
     list of Obstacle or None
-        None if rooms would be too small, or the furniture does not fit.
+        The walls, then the furniture. None if rooms would be too small, or the furniture does not fit.
     """
-    plan = draw_floor_plan(request, _draw_thickness(request, rng), rng)
+    wall_thickness = _draw_wall_thickness(request, rng)
+    plan = draw_floor_plan(request, wall_thickness, rng)
     if plan is None:
         return None
     walls: list[Obstacle] = [*plan.build_walls()]
@@ -255,107 +277,116 @@ def build_building(
     wall_area = 0.0
     if walls:
         wall_area = shapely.union_all([wall.polygon for wall in walls]).intersection(map_area).area
-    furniture = _place_furniture(request, corner_disc, plan, request.blocked_area - wall_area, rng)
+    furniture_area = request.blocked_area - wall_area
+    furniture = _place_furniture(request, corner_disc, plan, furniture_area, rng)
     return None if furniture is None else [*walls, *furniture]
 
 
-def _draw_thickness(request: Request, rng: np.random.Generator) -> float:
-    """Return a random thickness of walls, m."""
-    # Interpolate the largest fraction of walls between that of other rooms and that of the smallest ones.
-    room_side_gaps = request.unit / request.gap
-    weight = (_SMALL_ROOM_SIDE_GAPS - room_side_gaps) / (_SMALL_ROOM_SIDE_GAPS - _SMALLEST_ROOM_SIDE_GAPS)
+def _draw_wall_thickness(request: MapRequest, rng: np.random.Generator) -> float:
+    """Draw the thickness of walls, m."""
+    # Interpolate the largest fraction of the blocked area that walls take.
+    room_side_gaps = request.mean_spacing / request.gap
+    weight = (_LARGE_ROOM_SIDE_GAPS - room_side_gaps) / (_LARGE_ROOM_SIDE_GAPS - _SMALL_ROOM_SIDE_GAPS)
     weight = min(max(weight, 0.0), 1.0)
-    max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * weight
+    fraction_increase = _MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION_OF_LARGE_ROOMS
+    max_fraction = _MAX_WALL_FRACTION_OF_LARGE_ROOMS + fraction_increase * weight
     fraction = rng.uniform(_MIN_WALL_FRACTION, max_fraction)
-    # In units, the walls of a mean room block their length times their thickness; the room's area is 1.
-    thickness_units = min(fraction * request.area / _WALL_LENGTH_UNITS, _MAX_THICKNESS_UNITS)
-    # Half of the thickness is rounded, so that the faces of walls have rounded coordinates.
-    half_thickness = thickness_units * request.unit / 2.0
-    return 2.0 * max(request.round_down(half_thickness), request.step)
+    # If lengths are measured in spacings, the area of the map per room is 1, and the blocked area per room is
+    # the length of its walls times their thickness.
+    thickness_spacings = fraction * request.blocked_fraction / _WALL_LENGTH_SPACINGS
+    thickness_spacings = min(thickness_spacings, _MAX_THICKNESS_SPACINGS)
+    # Half of the thickness is rounded, so that the faces of walls have rounded coordinates too.
+    half_thickness = thickness_spacings * request.mean_spacing / 2.0
+    return 2.0 * max(request.round_down(half_thickness), request.rounding_step)
 
 
-def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator) -> FloorPlan | None:
-    """Draw a plan with the requested number of rooms.
+def draw_floor_plan(request: MapRequest, wall_thickness: float, rng: np.random.Generator) -> FloorPlan | None:
+    """Draw a floor plan with the requested number of rooms.
 
     Parameters
     ----------
-    request : Request
-    thickness : float, m
+    request : MapRequest
+        Parameters of the map.
+    wall_thickness : float, m
         Thickness of the walls.
     rng : numpy.random.Generator
+        Source of the walls and doors.
 
     Returns
     -------
     FloorPlan or None
-        None if rooms would be too small, or cannot be connected by doors.
+        The plan. None if rooms would be too small, or cannot be connected by doors.
     """
-    plan = FloorPlan(thickness)
-    # Rectangles to divide, and the number of rooms in each.
-    waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.count))]
-    if request.count >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
-        box, count = waiting[0]
-        waiting = _divide_by_corridor(request, plan, box, count, rng)
+    plan = FloorPlan(wall_thickness)
+    building = Box(0.0, 0.0, float(request.width), float(request.height))
+    room_count = int(request.obstacle_count)
+    # Rectangles that may have to be divided, and the number of rooms in each.
+    waiting = [(building, room_count)]
+    if room_count >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
+        waiting = _divide_by_corridor(request, plan, building, room_count, rng)
     while waiting:
-        box, count = waiting.pop()
-        if count == 1:
+        box, room_count = waiting.pop()
+        if room_count == 1:
             plan.rooms.append(box)
             continue
-        halves = _divide_by_wall(request, plan, box, count, rng)
-        if halves is None:
+        parts = _divide_by_wall(request, plan, box, room_count, rng)
+        if parts is None:
             return None
-        waiting += halves
-    return plan if _add_doors(request, plan, rng) else None
+        waiting += parts
+    are_connected = _add_doors(request, plan, rng)
+    return plan if are_connected else None
 
 
 def _divide_by_wall(
-    request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
+    request: MapRequest, plan: FloorPlan, box: Box, room_count: int, rng: np.random.Generator
 ) -> list[tuple[Box, int]] | None:
     """Divide a rectangle by a wall across its longer side, and add the wall to the plan.
 
-    Each part will contain about half of the `count` rooms, and gets a similar share of the rectangle. Return
+    Each part will contain about half of the rooms, and gets about the same fraction of the rectangle. Return
     the two parts, each with its number of rooms; None if they would be too small.
     """
     width, height = box.sides
-    # The axis that the wall crosses.
+    # The axis perpendicular to the wall.
     axis = 1 if height > width else 0
     # If the number of rooms is odd, either part may get one more.
-    first_count = count // 2 if rng.random() < 0.5 else count - count // 2
-    fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+    first_count = room_count // 2 if rng.random() < 0.5 else room_count - room_count // 2
+    unevenness = rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS)
+    fraction = first_count / room_count + unevenness / room_count
     low, high = box.get_range(axis)
-    min_side = _MIN_ROOM_SIDE_GAPS * request.gap + plan.thickness
+    min_side = _MIN_ROOM_SIDE_GAPS * request.gap + plan.wall_thickness
     min_position = low + min_side
     max_position = high - min_side
     if min_position > max_position:
         return None
     position = min(max(low + fraction * (high - low), min_position), max_position)
-    position = round(position, request.digits)
+    position = round(position, request.decimals)
     plan.walls.append(Wall(axis, position, *box.get_range(1 - axis)))
     return [
         (box.crop(axis, high=position), first_count),
-        (box.crop(axis, low=position), count - first_count),
+        (box.crop(axis, low=position), room_count - first_count),
     ]
 
 
 def _divide_by_corridor(
-    request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
+    request: MapRequest, plan: FloorPlan, box: Box, room_count: int, rng: np.random.Generator
 ) -> list[tuple[Box, int]]:
-    """Add a corridor to the plan along the longer side of a rectangle, between two parts of it.
+    """Divide a building by a corridor along its longer side, and add the corridor to the plan.
 
-    The corridor is itself one of the `count` rooms. Return the two parts, each with its number of rooms; the
-    whole rectangle if a corridor does not fit.
+    The corridor is one of the rooms. Return the two parts on its sides, each with its number of rooms. If a
+    corridor does not fit, return only the whole building.
     """
-    # `axis` is the one that the corridor's walls cross, and `extent` the side of the rectangle along it.
+    # The axis perpendicular to the corridor.
     width, height = box.sides
     axis = 1 if width >= height else 0
     extent = box.sides[axis]
-    corridor_width = (
-        rng.uniform(_MIN_CORRIDOR_WIDTH_GAPS, _MAX_CORRIDOR_WIDTH_GAPS) * request.gap + plan.thickness
-    )
+    width_gaps = rng.uniform(_MIN_CORRIDOR_WIDTH_GAPS, _MAX_CORRIDOR_WIDTH_GAPS)
+    # The distance between the middle lines of the corridor's walls.
+    corridor_width = width_gaps * request.gap + plan.wall_thickness
     offset = (extent - corridor_width) * rng.uniform(_MIN_CORRIDOR_OFFSET, _MAX_CORRIDOR_OFFSET)
-    start = round(offset, request.digits)
-    end = round(offset + corridor_width, request.digits)
+    start = round(offset, request.decimals)
+    end = round(offset + corridor_width, request.decimals)
     if min(start, extent - end) < _MIN_CORRIDOR_DEPTH_GAPS * request.gap:
-        return [(box, count)]
+        return [(box, room_count)]
     wall_range = box.get_range(1 - axis)
     plan.walls.append(Wall(axis, start, *wall_range))
     plan.walls.append(Wall(axis, end, *wall_range))
@@ -363,10 +394,11 @@ def _divide_by_corridor(
     plan.rooms.append(box.crop(axis, low=start, high=end))
     # The other rooms are divided in proportion to the depth of the parts, with at least one in each.
     first_share = start / (extent - corridor_width)
-    first_count = min(max(round((count - 1) * first_share), 1), count - 2)
+    other_count = room_count - 1
+    first_count = min(max(round(other_count * first_share), 1), other_count - 1)
     return [
         (box.crop(axis, high=start), first_count),
-        (box.crop(axis, low=end), count - 1 - first_count),
+        (box.crop(axis, low=end), other_count - first_count),
     ]
 
 
@@ -376,10 +408,12 @@ class _SharedWall(NamedTuple):
     Attributes
     ----------
     wall : Wall
+        The whole wall.
     rooms : pair of int
-        Indices of the rooms on its two sides.
+        Indices of the rooms on the two sides of the wall.
     low, high : float, m
-        Ends of the section; `high` is below `low` if the wall does not separate these rooms.
+        Coordinates of the section's ends along the wall. If the wall does not separate these rooms, `high` is
+        below `low`.
     """
 
     wall: Wall
@@ -388,17 +422,18 @@ class _SharedWall(NamedTuple):
     high: float
 
 
-def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
-    """Add doors until all rooms are connected, and a few more; return whether all rooms are connected.
+def _add_doors(request: MapRequest, plan: FloorPlan, rng: np.random.Generator) -> bool:
+    """Add doors that connect all rooms, and a few more; return whether all rooms could be connected.
 
-    The shared walls are processed in random order, the walls of the corridor before all others. A wall gets a
-    door if the rooms on its two sides are not connected yet, directly or via other rooms. Other walls get a
-    door at random, which closes a loop of rooms. A piece of wall remains on both sides of each door.
+    The walls between rooms are processed in random order, the walls of the corridor before all others. A wall
+    gets a door if the two rooms are not connected yet, directly or through other rooms. Some of the other
+    walls, chosen at random, get a door too. A section of the wall remains on both sides of each door.
     """
     room_groups = DisjointSet(range(len(plan.rooms)))
-    min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
+    min_section = _MIN_WALL_SECTION_SPACINGS * request.mean_spacing + plan.wall_thickness / 2.0
     shared_walls = _find_shared_walls(plan)
-    # Random numbers for each wall: its place in the order, whether it closes a loop, and where the door is.
+    # Random numbers of each wall. They decide the order of the walls, whether a wall between connected rooms
+    # gets a door, and the position of the door.
     order_keys, loop_draws, relative_positions = rng.random((3, len(shared_walls)))
     widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(shared_walls))
 
@@ -408,27 +443,28 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
 
     for k in sorted(range(len(shared_walls)), key=compute_sort_key):
         shared_wall = shared_walls[k]
-        max_width = shared_wall.high - shared_wall.low - 2.0 * min_piece
+        max_width = shared_wall.high - shared_wall.low - 2.0 * min_section
         width = request.round_down(min(float(widths[k]), max_width))
-        is_unneeded = room_groups.connected(*shared_wall.rooms) and loop_draws[k] > _LOOP_PROBABILITY
-        if width < request.gap + request.step or is_unneeded:
+        if width < request.gap + request.rounding_step:
+            continue
+        if room_groups.connected(*shared_wall.rooms) and loop_draws[k] > _LOOP_PROBABILITY:
             continue
         free_length = max_width - width
-        start = shared_wall.low + min_piece + free_length * float(relative_positions[k])
-        start = round(start, request.digits)
-        end = round(start + width, request.digits)
+        start = shared_wall.low + min_section + free_length * float(relative_positions[k])
+        start = round(start, request.decimals)
+        end = round(start + width, request.decimals)
         plan.doors.append(Door(shared_wall.wall, start, end, shared_wall.rooms))
         room_groups.merge(*shared_wall.rooms)
     return room_groups.n_subsets == 1
 
 
 def _find_shared_walls(plan: FloorPlan) -> list[_SharedWall]:
-    """Return the section of each wall between each pair of rooms on its two sides.
+    """Find the section of each wall between each pair of rooms on its two sides.
 
-    `axis` is the axis that a wall crosses. A room on its lower side ends at the position of the wall on this
-    axis, and a room on its upper side begins there.
+    The first room of a pair ends, and the second one begins, at the position of the wall on the axis
+    perpendicular to it.
     """
-    # The rooms that begin, and those that end, at each coordinate on each axis.
+    # Rooms by the axis and the coordinate at which they begin, and at which they end.
     rooms_by_low: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     rooms_by_high: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     for index, room in enumerate(plan.rooms):
@@ -450,83 +486,95 @@ def _find_shared_walls(plan: FloorPlan) -> list[_SharedWall]:
 
 
 def _place_furniture(
-    request: Request, corner_disc: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
+    request: MapRequest, corner_disc: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
-    """Return furniture that blocks the given area, m²; None if it does not fit.
+    """Place furniture that blocks the given area, m²; return None if it does not fit.
 
-    Pieces of random size are placed at random, one after another, until their areas add up to the given one.
-    After a piece that does not fit, smaller ones are tried.
+    Pieces of random size are placed at random, one after another, until the sum of their areas is near enough
+    to the given area. After a piece that does not fit, smaller ones are tried.
     """
-    min_area = _AREA_TOLERANCE * request.width * request.height
-    if area < -min_area:
+    max_area_error = _FRACTION_TOLERANCE * request.width * request.height
+    if area < -max_area_error:
+        # The walls alone block more than requested.
         return None
-    inner_rooms = [_find_inner_room(request, room, plan.thickness) for room in plan.rooms]
+    inner_rooms = [_shrink_to_wall_faces(request, room, plan.wall_thickness) for room in plan.rooms]
     room_areas = np.array([room.area for room in inner_rooms])
     if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
-    # The polygons of the doors and of the furniture in each room. More furniture must keep the gap from them.
+    # The polygons of the doors and of the furniture in each room. Further furniture must keep the gap from
+    # these polygons.
     occupied = _list_door_openings(plan)
-    # A room is drawn with a probability that is proportional to its area. Dividing by the last sum makes the
-    # largest cumulative probability exactly 1; because of rounding, it might be a little less.
+    # A room is drawn with a probability that is proportional to its area. Because of rounding errors, the
+    # last cumulative sum may differ a little from 1. Dividing by it makes the last cumulative probability
+    # exactly 1.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
     cumulative_probabilities = cumulative_areas / cumulative_areas[-1]
     mean_piece_area = area / (_PIECES_PER_ROOM * len(inner_rooms))
-    failures = 0
+    failure_count = 0
     furniture: list[Obstacle] = []
-    # `area` is the area that is still to be blocked.
-    while area > min_area:
+    remaining_area = area
+    while remaining_area > max_area_error:
         room = int(np.searchsorted(cumulative_probabilities, rng.random(), side="right"))
-        shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failures)
+        shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failure_count)
         area_ratio = rng.uniform(_MIN_PIECE_AREA_RATIO, _MAX_PIECE_AREA_RATIO)
-        piece = _draw_piece(request, min(area, mean_piece_area * area_ratio * shrinkage), rng)
+        piece_area = min(remaining_area, mean_piece_area * area_ratio * shrinkage)
+        piece = _draw_piece(request, piece_area, rng)
         obstacle = _place_piece(request, piece, inner_rooms[room], occupied[room], start_disc, rng)
         if obstacle is None:
-            failures += 1
-            if failures == _MAX_FAILURES:
+            failure_count += 1
+            if failure_count == _MAX_FAILURES:
                 return None
         else:
-            failures = 0
+            failure_count = 0
             occupied[room].append(obstacle.polygon)
             furniture.append(obstacle)
-            area -= obstacle.polygon.area
+            remaining_area -= obstacle.polygon.area
     return furniture
 
 
 def _list_door_openings(plan: FloorPlan) -> list[list[Polygon]]:
-    """List the openings of the doors of each room; that of a door is listed for both of its rooms."""
+    """List the door openings of each room. A door opening belongs to both of its rooms."""
     openings: list[list[Polygon]] = [[] for _ in plan.rooms]
     for door in plan.doors:
-        opening = door.wall.build_piece(door.start, door.end, plan.thickness)
+        opening = door.wall.build_section(door.start, door.end, plan.wall_thickness)
         for room in door.rooms:
             openings[room].append(opening.polygon)
     return openings
 
 
-def _find_inner_room(request: Request, room: Box, thickness: float) -> Box:
-    """Return the part of a room between the faces of its walls; the boundary has no thickness."""
-    half = thickness / 2.0
-    left = room.left if room.left == 0.0 else room.left + half
-    bottom = room.bottom if room.bottom == 0.0 else room.bottom + half
-    right = room.right if room.right == request.width else room.right - half
-    top = room.top if room.top == request.height else room.top - half
-    return Box(*(round(float(edge), request.digits) for edge in (left, bottom, right, top)))
+def _shrink_to_wall_faces(request: MapRequest, room: Box, thickness: float) -> Box:
+    """Return the part of a room between the faces of its walls. The boundary has no thickness."""
+    half_thickness = thickness / 2.0
+    left = room.left if room.left == 0.0 else room.left + half_thickness
+    bottom = room.bottom if room.bottom == 0.0 else room.bottom + half_thickness
+    right = room.right if room.right == request.width else room.right - half_thickness
+    top = room.top if room.top == request.height else room.top - half_thickness
+    return Box(*(round(float(edge), request.decimals) for edge in (left, bottom, right, top)))
 
 
-class _Piece(NamedTuple):
-    """A piece of furniture: its kind, and the sides of its bounding box, (2,) m."""
+class _FurniturePiece(NamedTuple):
+    """A piece of furniture.
+
+    Attributes
+    ----------
+    kind : str
+        A key of `_PIECE_PROBABILITIES`.
+    size : (2,) array, m
+        Width and height of the bounding box.
+    """
 
     kind: str
     size: Array
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a circle."""
+        """Whether the piece is a circle."""
         return self.kind == "round table"
 
 
-def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Piece:
-    """Return a random piece of furniture of about the given area, m²."""
+def _draw_piece(request: MapRequest, area: float, rng: np.random.Generator) -> _FurniturePiece:
+    """Draw a random piece of furniture of about the given area, m²."""
     kind = str(rng.choice(list(_PIECE_PROBABILITIES), p=list(_PIECE_PROBABILITIES.values())))
     min_stretch, max_stretch = _CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH
     stretch = rng.uniform(min_stretch, max_stretch)
@@ -535,20 +583,21 @@ def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Pie
     size = np.array([length, depth] if rng.random() < 0.5 else [depth, length])
     if kind == "round table":
         size = np.full(2, 2.0 * math.sqrt(area / math.pi))
-    return _Piece(kind, np.maximum(request.round_points(size), _MIN_PIECE_STEPS * request.step))
+    min_side = _MIN_PIECE_ROUNDING_STEPS * request.rounding_step
+    return _FurniturePiece(kind, np.maximum(request.round_points(size), min_side))
 
 
-def _sample_piece_corners(
-    request: Request, piece: _Piece, room: Box, rng: np.random.Generator
+def _draw_piece_corners(
+    request: MapRequest, piece: _FurniturePiece, room: Box, rng: np.random.Generator
 ) -> Array | None:
-    """Sample positions of a piece in a room where its gap to each wall is zero or at least the requested one.
+    """Draw positions of a piece in a room at which the piece touches each wall or keeps the gap from it.
 
     A cabinet stands against a wall with its longer side. A round table touches no wall.
 
     Returns
     -------
     (k, 2) array or None, m
-        Lower left corners; None if the piece is larger than the room.
+        Lower left corners of the piece's bounding box. None if the piece is larger than the room.
     """
     room_low = np.array([room.left, room.bottom])
     room_high = np.array([room.right, room.top])
@@ -557,43 +606,43 @@ def _sample_piece_corners(
         return None
     offsets = rng.random((_CANDIDATES_PER_PIECE, 2)) * free_size
     if piece.kind == "cabinet":
-        # Its longer side stands against one of the two walls.
+        # The axis perpendicular to the longer side, on which the cabinet stands at either end of the room.
         axis = 1 if piece.size[0] > piece.size[1] else 0
         offsets[:, axis] = free_size[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
     corners = request.round_points(offsets + room_low)
     gaps_to_walls = np.column_stack([corners - room_low, room_high - corners - piece.size])
     is_valid = gaps_to_walls >= request.gap
     if not piece.is_round:
-        # Pieces may also touch a wall, except for round tables, which would touch it in a single point.
-        is_touching = gaps_to_walls < request.step / 2.0
+        # A round table would touch a wall in a single point. All other pieces may touch walls.
+        is_touching = gaps_to_walls < request.rounding_step / 2.0
         is_valid |= is_touching
     return corners[is_valid.all(axis=1)]
 
 
 def _place_piece(
-    request: Request,
-    piece: _Piece,
+    request: MapRequest,
+    piece: _FurniturePiece,
     room: Box,
     occupied: list[Polygon],
     start_disc: Polygon,
     rng: np.random.Generator,
 ) -> CircleObstacle | PolygonObstacle | None:
-    """Return a piece of furniture at the first free one of several random positions in a room.
+    """Place a piece of furniture at a random position in a room; return None if no free position is found.
 
-    A position is free if the piece does not touch the start disc, and keeps the gap from the other pieces and
-    from doors, whose polygons are `occupied`. None if no position is free.
+    Several positions are tested. A position is free if the piece does not touch the start disc and keeps the
+    gap from doors and from the other pieces, whose polygons are `occupied`.
     """
     # Lower left corners, upper right corners and centers of the piece at all positions, (k, 2) m each.
-    lower_left = _sample_piece_corners(request, piece, room, rng)
+    lower_left = _draw_piece_corners(request, piece, room, rng)
     if lower_left is None:
         return None
     upper_right = request.round_points(lower_left + piece.size)
     centers = request.round_points(lower_left + piece.size / 2.0)
-    # Distances to a circle are measured from its center, and must be larger by its radius.
+    # The distance of a round piece is that of its center, which must be larger by the radius.
     if piece.is_round:
         shapes = shapely.points(centers)
-        # Rounding moves the center by up to half a step.
-        radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0)
+        # Rounding moves the center by up to half a step. The radius is made smaller by the same length.
+        radius = request.round_down(piece.size[0] / 2.0 - request.rounding_step / 2.0)
     else:
         shapes = shapely.box(*lower_left.T, *upper_right.T)
         radius = 0.0

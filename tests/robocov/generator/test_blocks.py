@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robocov.generator import blocks
 from robocov.generator.blocks import Edge, cut_cell, divide_into_cells, remove_streets
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 
 
 def build_polygon(cell):
@@ -62,7 +62,7 @@ def test_a_cut_divides_a_cell(seed, angle):
 
 @given(st.integers(0, 2**32), st.integers(2, 25))
 def test_the_narrowest_streets_are_as_wide_as_the_gap(seed, count):
-    request = Request(count, 0.3, 0.5, 14.0, 11.0)
+    request = MapRequest(count, 0.3, 0.5, 14.0, 11.0)
     cells = divide_into_cells(request, np.random.default_rng(seed))
     assume(cells is not None)
     assert len(cells) == count
@@ -73,7 +73,7 @@ def test_the_narrowest_streets_are_as_wide_as_the_gap(seed, count):
 
 
 def test_streets_that_separate_more_blocks_are_wider():
-    request = Request(16, 0.3, 0.4, 20.0, 20.0)
+    request = MapRequest(16, 0.3, 0.4, 20.0, 20.0)
     cells = divide_into_cells(request, np.random.default_rng(1))
     assert cells is not None
     shares = np.array([edge.widening_share for cell in cells for edge in cell])

@@ -16,12 +16,12 @@ from robocov.arrays import Array
 from robocov.environment import Gap, PolygonObstacle, find_narrowest_gap
 from robocov.generator import generate_map
 from robocov.generator.caves import (
+    build_gap_tunnel,
     build_tunnels,
-    build_window_tunnel,
     draw_random_field,
     extract_area_below_zero,
 )
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 
 SEEDS = range(10)
 
@@ -109,20 +109,20 @@ def test_tunnels_join_all_parts_without_loops(
     assert union.geom_type == "Polygon"
 
 
-def test_a_tunnel_leads_through_a_window_from_part_to_part() -> None:
-    # Two parallel lines that are dilated by 1 meet in a window.
+def test_a_tunnel_leads_through_a_narrow_gap_from_part_to_part() -> None:
+    # Two parallel lines that are dilated by 1 meet in a narrow gap.
     core = shapely.union_all([LineString([(0, 0), (0, 4)]), LineString([(1.8, 0), (1.8, 4)])])
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    line = shapely.get_coordinates(build_window_tunnel(gap, core, 1.0))
+    line = shapely.get_coordinates(build_gap_tunnel(gap, core, 1.0))
     np.testing.assert_allclose(line[line[:, 0].argsort()], [[0.0, 1.95], [0.9, 1.95], [1.8, 1.95]])
 
 
-def test_a_window_without_rock_on_one_side_is_widened() -> None:
+def test_a_gap_without_a_part_of_the_core_on_one_side_is_widened() -> None:
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    assert build_window_tunnel(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
+    assert build_gap_tunnel(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
 
 
-REQUEST = Request(9, 0.4, 0.6, 12.0, 9.0)
+REQUEST = MapRequest(9, 0.4, 0.6, 12.0, 9.0)
 
 
 def extract_area_below(function: Callable[[Array, Array], Array], level: float) -> BaseGeometry:

@@ -17,7 +17,7 @@ from robocov import generator
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
 from robocov.generator import GENERATORS, generate_map
-from robocov.generator.request import AREA_TOLERANCE
+from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov.mapfile.check import check_map
 
@@ -87,7 +87,7 @@ def test_maps_have_the_requested_properties(request_parameters):
 
     solid = shapely.union_all([obstacle.polygon for obstacle in environment.obstacles]) & boundary
     area = request_parameters["area"]
-    assert solid.area / boundary.area == pytest.approx(area, abs=AREA_TOLERANCE + 1e-6)
+    assert solid.area / boundary.area == pytest.approx(area, abs=BLOCKED_FRACTION_TOLERANCE + 1e-6)
 
     # A disc as wide as the gap can move everywhere and around every obstacle.
     (free,) = environment.free.geoms
@@ -329,7 +329,7 @@ def test_layouts_of_registered_kinds_are_checked(layout, area, is_valid, monkeyp
         numbers.append(rng.random())
         return layout
 
-    custom_kind = replace(GENERATORS["polygons"], layout=build_layout, obstacle_name="blocks")
+    custom_kind = replace(GENERATORS["polygons"], build_obstacles=build_layout, obstacle_name="blocks")
     monkeypatch.setitem(generator.GENERATORS, "custom", custom_kind)
     if is_valid:
         environment = generate_map(0, kind="custom", area=area)

@@ -13,7 +13,7 @@ from shapely import Point
 
 from robocov.environment import Environment, WallObstacle, find_narrowest_gap
 from robocov.generator import generate_map
-from robocov.generator.mazes import find_inner_walls, grow_passages, trace_trails
+from robocov.generator.mazes import find_inner_walls, grow_passages, trace_polylines
 
 
 def count_components(count: int, pairs: list[tuple[int, int]]) -> int:
@@ -52,10 +52,10 @@ def build_forest(pieces: set) -> set:
     return forest
 
 
-def split_into_pieces(trail: list[tuple[int, int]]) -> list[tuple]:
-    """Return the pieces of walls between adjacent posts along a trail."""
+def split_into_pieces(polyline: list[tuple[int, int]]) -> list[tuple]:
+    """Return the pieces of walls between adjacent posts along a polyline."""
     pieces = []
-    for (x, y), (u, v) in itertools.pairwise(trail):
+    for (x, y), (u, v) in itertools.pairwise(polyline):
         assert (x == u) != (y == v)
         steps = max(abs(u - x), abs(v - y))
         line = [(x + (u - x) * k // steps, y + (v - y) * k // steps) for k in range(steps + 1)]
@@ -65,16 +65,16 @@ def split_into_pieces(trail: list[tuple[int, int]]) -> list[tuple]:
 
 @settings(max_examples=60)
 @given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
-def test_trails_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
+def test_polylines_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
     forest = build_forest({((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn})
     pieces = []
     walls = np.zeros((7, 7, 2), dtype=bool)
     for (x, y), (u, _) in forest:
         walls[x, y, u - x] = True
-    for trail in trace_trails(walls):
-        pieces += split_into_pieces(trail)
+    for polyline in trace_polylines(walls):
+        pieces += split_into_pieces(polyline)
         # There is a bend at every post between the ends.
-        for a, b, c in zip(trail, trail[1:], trail[2:], strict=False):
+        for a, b, c in zip(polyline, polyline[1:], polyline[2:], strict=False):
             assert (b[0] - a[0]) * (c[1] - b[1]) != (b[1] - a[1]) * (c[0] - b[0])
     assert len(pieces) == len(set(pieces))
     assert set(pieces) == forest

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robocov.generator.request import Request
+from robocov.generator.request import MapRequest
 from robocov.generator.rooms import draw_floor_plan
 
 THICKNESS = 0.1
@@ -24,7 +24,7 @@ def list_rooms_reached_from_the_first(plan):
 
 @given(st.integers(0, 2**32), st.integers(1, 30), st.floats(0.3, 0.8), st.sampled_from([10, 15.5, 24.0]))
 def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
-    request = Request(count, 0.1, gap, width, 12.0)
+    request = MapRequest(count, 0.1, gap, width, 12.0)
     plan = draw_floor_plan(request, THICKNESS, np.random.default_rng(seed))
     assume(plan is not None)
     rooms = [shapely.box(*room) for room in plan.rooms]
@@ -39,7 +39,7 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     solid = shapely.union_all([wall.polygon for wall in plan.build_walls()])
     for door in plan.doors:
         assert door.end - door.start >= gap
-        opening = door.wall.build_piece(door.start, door.end, THICKNESS).polygon
+        opening = door.wall.build_section(door.start, door.end, THICKNESS).polygon
         assert opening.area == pytest.approx((door.end - door.start) * THICKNESS)
         assert opening.intersection(solid).area < 1e-9
         # Half of the opening lies in each of the two rooms.
@@ -48,14 +48,14 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
         assert opening.intersection(rooms[second]).area == pytest.approx(opening.area / 2)
     # Only doors connect the rooms.
     openings = [
-        door.wall.build_piece(door.start, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors
+        door.wall.build_section(door.start, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors
     ]
     closed = shapely.box(0, 0, width, 12) - shapely.union_all([solid.buffer(1e-9), *openings])
     assert len(shapely.get_parts(closed)) == count
 
 
 def test_about_half_of_the_plans_have_a_corridor():
-    request = Request(8, 0.1, 0.6, 12.0, 10.0)
+    request = MapRequest(8, 0.1, 0.6, 12.0, 10.0)
     plans = [draw_floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
     has_corridor = [
         any(room.sides[0] == 12.0 and room.sides[1] < 1.6 for room in plan.rooms)
@@ -67,4 +67,4 @@ def test_about_half_of_the_plans_have_a_corridor():
 
 
 def test_there_is_no_plan_if_rooms_would_be_too_small():
-    assert draw_floor_plan(Request(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
+    assert draw_floor_plan(MapRequest(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
