@@ -150,8 +150,8 @@ class Adaptive(BaseController):
             projections=np.zeros((robot_count, function_count)),
             measurements=np.full((robot_count, len(lattice.squares)), np.nan),
             has_new_measurements=np.zeros(robot_count, dtype=bool),
-            parameter_exchange=ParameterExchange.create_empty(robot_count),
-            measurement_exchange=MeasurementExchange.create_empty(robot_count, len(lattice.squares)),
+            parameter_exchange=ParameterExchange.build_empty(robot_count),
+            measurement_exchange=MeasurementExchange.build_empty(robot_count, len(lattice.squares)),
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:

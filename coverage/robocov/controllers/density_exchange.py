@@ -50,8 +50,8 @@ class ParameterExchange:
     is_unsent: BoolArray
 
     @classmethod
-    def create_empty(cls, robot_count: int) -> ParameterExchange:
-        """Create the exchange of robots that have not received anything."""
+    def build_empty(cls, robot_count: int) -> ParameterExchange:
+        """Build the exchange of robots that have not received anything."""
         return cls(received=({},) * robot_count, is_unsent=np.zeros(robot_count, dtype=bool))
 
     def receive(self, seen: Observations) -> ParameterExchange:
@@ -143,8 +143,8 @@ class MeasurementExchange:
     allowances: IntArray
 
     @classmethod
-    def create_empty(cls, robot_count: int, square_count: int) -> MeasurementExchange:
-        """Create the exchange of robots that have not sent anything."""
+    def build_empty(cls, robot_count: int, square_count: int) -> MeasurementExchange:
+        """Build the exchange of robots that have not sent anything."""
         return cls(
             sent_times=np.full((robot_count, square_count), -np.inf),
             allowances=np.zeros(robot_count, dtype=np.intp),

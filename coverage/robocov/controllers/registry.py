@@ -18,7 +18,8 @@ from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
-from robocov.controllers.exploration.atlas import Atlas, AtlasShared
+from robocov.controllers.exploration.atlas import Atlas
+from robocov.controllers.exploration.atlas_shared import AtlasShared
 from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
 from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular

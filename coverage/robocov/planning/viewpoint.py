@@ -1,6 +1,7 @@
 """Viewpoints from which a robot can see the unknown parts of its own cell."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,23 @@ _ADDED_LENGTH_M = 1.0
 """Length that is added to paths, so that very short ones do not outweigh the expected cost."""
 
 
+class _Candidates(NamedTuple):
+    """The cells next to b frontier cells: one on each of their four sides, in the order of `SIDES`."""
+
+    rows: IntArray
+    """(b, 4) Row in the window."""
+    columns: IntArray
+    """(b, 4) Column in the window."""
+
+
 def find_viewpoint(
     planner: GridPlanner,
     cell_distances: Array,
     path_lengths: Array,
-    min_stake: float,
+    min_cost: float,
     previous_viewpoints: Sequence[Array],
 ) -> Array | None:
-    """Find the most worthwhile viewpoint from which a robot can look into an unknown patch of its own cell.
+    """Find the best viewpoint from which a robot can look into an unknown patch of its own cell.
 
     An unknown patch is a connected area of cells of the map that the robot has not seen.
 
@@ -32,7 +42,7 @@ def find_viewpoint(
         Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
     path_lengths : (m,) array, m
         Distances from the robot to all nodes.
-    min_stake : float
+    min_cost : float
         Only patches with a larger expected cost (see Notes) are worth a visit. The unit is that of the
         expected cost: cells times meters.
     previous_viewpoints : sequence of (2,) arrays, m
@@ -53,31 +63,25 @@ def find_viewpoint(
     """
     frontier = planner.frontier
     frontier_costs = _compute_patch_costs(planner, cell_distances)[frontier.patches]
-    is_worth_visiting = frontier_costs > min_stake
+    is_worth_visiting = frontier_costs > min_cost
     if not is_worth_visiting.any():
         return None
     # The frontier consists of the unknown cells that have a free one on at least one of their four sides. The
-    # cells on these sides, (b, 4), are possible viewpoints if they are marked in `frontier.is_side_free`.
+    # cells on these sides are possible viewpoints if they are marked in `frontier.is_side_free`.
     rows_up, columns_right = np.array(SIDES).T
-    side_rows = frontier.rows[is_worth_visiting, None] + rows_up
-    side_columns = frontier.columns[is_worth_visiting, None] + columns_right
-    lengths = _get_path_lengths(planner, path_lengths, side_rows, side_columns)
+    candidates = _Candidates(
+        rows=frontier.rows[is_worth_visiting, None] + rows_up,
+        columns=frontier.columns[is_worth_visiting, None] + columns_right,
+    )
+    lengths = _get_path_lengths(planner, path_lengths, candidates)
     cost_per_length = frontier_costs[is_worth_visiting, None] / (_ADDED_LENGTH_M + lengths)
     values = frontier.is_side_free[is_worth_visiting] * cost_per_length
-    # Rows and columns are counted from the first cell of the window. The same unit is used for positions.
-    window = planner.window
-    raster = planner.known_map.raster
-    first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
-    previous_cells = (np.array(previous_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
-    min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
-    for previous_column, previous_row in previous_cells:
-        squared_distances = (previous_column - side_columns) ** 2 + (previous_row - side_rows) ** 2
-        values[squared_distances < min_distance**2] = 0.0
+    _exclude_visited(values, planner, candidates, previous_viewpoints)
     best = values.argmax()
     if not values.flat[best] > 0.0:
         return None
-    cell = np.array([side_columns.flat[best], side_rows.flat[best]])
-    return np.asarray(first_center + cell * raster.cell_size)
+    cell = np.array([candidates.columns.flat[best], candidates.rows.flat[best]])
+    return np.asarray(_compute_first_center(planner) + cell * planner.known_map.raster.cell_size)
 
 
 def _compute_patch_costs(planner: GridPlanner, cell_distances: Array) -> Array:
@@ -89,9 +93,29 @@ def _compute_patch_costs(planner: GridPlanner, cell_distances: Array) -> Array:
     return np.asarray(np.bincount(unknown.patches, costs, minlength=label_count))
 
 
-def _get_path_lengths(planner: GridPlanner, path_lengths: Array, rows: IntArray, columns: IntArray) -> Array:
-    """Return the lengths of the paths, (m,) by node, to the nodes of cells in the given rows and columns."""
+def _get_path_lengths(planner: GridPlanner, path_lengths: Array, candidates: _Candidates) -> Array:
+    """Return the length of the path to each candidate, (b, 4) m, from the lengths to all nodes, (m,) m."""
     window = planner.window
-    nodes = rows // window.stride * window.columns + columns // window.stride
+    nodes = candidates.rows // window.stride * window.columns + candidates.columns // window.stride
     # A cell beyond the window is not free: its node does not matter, but must exist.
     return np.asarray(path_lengths[np.clip(nodes, 0, len(path_lengths) - 1)])
+
+
+def _exclude_visited(
+    values: Array, planner: GridPlanner, candidates: _Candidates, previous_viewpoints: Sequence[Array]
+) -> None:
+    """Set the values, (b, 4), of all candidates close to a previous viewpoint to zero."""
+    cell_size = planner.known_map.raster.cell_size
+    # Positions are expressed in cells, like the rows and columns of the candidates.
+    offsets = np.array(previous_viewpoints).reshape(-1, 2) - _compute_first_center(planner)
+    min_distance = _MIN_VIEWPOINT_DISTANCE_M / cell_size
+    for column, row in offsets / cell_size:
+        squared_distances = (column - candidates.columns) ** 2 + (row - candidates.rows) ** 2
+        values[squared_distances < min_distance**2] = 0.0
+
+
+def _compute_first_center(planner: GridPlanner) -> Array:
+    """Return the center of the first cell of the window, in row 0 and column 0, (2,) m."""
+    window = planner.window
+    raster = planner.known_map.raster
+    return raster.compute_centers(np.array(window.first_row), np.array(window.first_column))

@@ -50,7 +50,7 @@ def list_sizes(messages: MessageLists) -> list[list[int]]:
 
 def test_the_newest_parameters_of_each_neighbor_are_averaged() -> None:
     own = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
-    exchange = ParameterExchange.create_empty(3)
+    exchange = ParameterExchange.build_empty(3)
     np.testing.assert_array_equal(exchange.compute_means(own), own)
     old = ReceivedMessage(1, np.array([10.0, 10.0]))
     new = ReceivedMessage(1, np.array([20.0, 30.0]))
@@ -62,7 +62,7 @@ def test_the_newest_parameters_of_each_neighbor_are_averaged() -> None:
 
 
 def test_parameters_of_silent_robots_are_forgotten() -> None:
-    exchange = ParameterExchange.create_empty(3)
+    exchange = ParameterExchange.build_empty(3)
     far = ReceivedMessage(2, np.array([40.0]))
     near = ReceivedMessage(1, np.array([20.0]))
     exchange = exchange.receive(observe([(far, near), (), ()]))
@@ -73,7 +73,7 @@ def test_parameters_of_silent_robots_are_forgotten() -> None:
 @pytest.mark.parametrize("count", [4, 64])
 def test_parameters_are_sent_once_in_a_period(count: int) -> None:
     parameters = np.ones((3, count))
-    exchange = ParameterExchange.create_empty(3)
+    exchange = ParameterExchange.build_empty(3)
     assert exchange.send(observe(), parameters)[1] == ()
     exchange = exchange.start_period()
     exchange, messages = exchange.send(observe(send_limits=np.array([0.0, 1.0, np.inf])), parameters)
@@ -92,7 +92,7 @@ def list_sent_squares(messages: MessageLists) -> list[int]:
 def test_new_measurements_are_sent_first_and_old_ones_again() -> None:
     measurements = np.full((3, 400), np.nan)
     measurements[0, :120] = 1.0
-    exchange = MeasurementExchange.create_empty(3, 400)
+    exchange = MeasurementExchange.build_empty(3, 400)
     sent = []
     for period in range(3):
         exchange = exchange.start_period(measurements)
@@ -110,7 +110,7 @@ def test_new_measurements_are_sent_first_and_old_ones_again() -> None:
 def test_measurements_are_split_by_the_send_limits(limit: float, count: int) -> None:
     measurements = np.full((3, 9), np.nan)
     measurements[1, :5] = 1.0
-    exchange = MeasurementExchange.create_empty(3, 9).start_period(measurements)
+    exchange = MeasurementExchange.build_empty(3, 9).start_period(measurements)
     waiting, messages = exchange.send(observe(send_limits=np.zeros(3)), measurements)
     assert list_sizes(messages) == [[], [], []]
     sent = []

@@ -1,13 +1,24 @@
 """Controllers that explore: they build a map of the region while they cover it.
 
-- `atlas`: `Atlas`, in which each robot plans on its own map, and `AtlasShared`, with a common map
-- `frontier_median`, `greedy_submodular`, `voronoi_graph`: other planners on a common map
-- `exploring_lloyd`: Lloyd's algorithm for a density that is measured on the way
-- `shared_map`: the base of the controllers with a common map, their groups and plans
-- `scan_exchange`: the messages from which robots with a common map build it
+Controllers:
+
+- `atlas`: `Atlas`, in which each robot plans on its own map
+- `atlas_shared`: `AtlasShared`, the same with maps that the robots share
+- `frontier_median`, `greedy_submodular`, `voronoi_graph`: other planners on shared maps
+- `exploring_lloyd`: Lloyd's algorithm for a density that robots measure while they move
+
+Parts of `Atlas`:
+
+- `atlas_memory`: data that robots remember from one plan to the next
+- `team_knowledge`, `teammates`: knowledge of a robot about the others
+- `team_goals`: goals for all robots of the team
+- `jams`, `staggering`: robots that block each other, and times that differ from robot to robot
+- `localization`: positions estimated from noisy or late measurements
+
+Parts of several controllers:
+
+- `shared_map`: the base class of controllers with shared maps
+- `scan_exchange`: the messages from which robots build a shared map
 - `sightings`: messages with the last known positions of robots
-- `teammates`: what a robot with its own map assumes about the others
-- `localization`: estimated positions from noisy measurements
-- `atlas_memory`: what robots with `Atlas` remember from one plan to the next
 - `route_following`: forces along planned routes
 """

@@ -1,6 +1,7 @@
-"""Memory of the robots with the controller `Atlas`: their knowledge of the team, and their last plans.
+"""Memory of robots with the controllers `Atlas` and `AtlasShared`: knowledge of the team, and last plans.
 
-All objects are immutable; a plan that changes is replaced. Simulations can therefore share them.
+No object is changed after it is built: a robot that makes a new plan replaces the old one. Copies of a
+simulation can therefore share these objects.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ class TeamKnowledge:
     teammates: Teammates
     """The robots that it takes into account."""
     encountered: frozenset[int] = frozenset()
-    """Robots that it has heard, or that others have reported to it, except for failed ones."""
+    """Indices of the robots that it has heard, or that others have reported to it, except for failed ones."""
     loss_times: Mapping[int, float] = field(default_factory=dict)
-    """Times at which it lost robots, because they had failed or were missing, s. Never changed in place."""
+    """Time at which each lost robot was found to have failed or to be missing, s, by its index."""
 
 
 @dataclass(frozen=True, eq=False)
 class TraveledPath:
-    """Path of one robot since its start, or since the last change of the team or the walls."""
+    """Path of one robot since the start, or since the last change of the team or the walls."""
 
     start_time: float = 0.0
     """Time at which the path begins, s."""
@@ -40,50 +41,51 @@ class TraveledPath:
     viewpoint_length: float = 0.0
     """Length of the parts of the path that led to viewpoints, m."""
     viewpoints: tuple[Array, ...] = ()
-    """(2,) m each, viewpoints that it has reached."""
+    """Viewpoints that the robot has reached, (2,) m each."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlanBasis:
-    """Knowledge of a robot when it made its last plan."""
+    """The map and the positions on which a robot based its last plan."""
 
     known_map: DiscoveredMap
     planner: GridPlanner
     """Planner of the robot's own goal and its routes."""
     robots: IntArray
-    """(k,) Numbers of the robots that it knew of, its own first."""
+    """(k,) Indices of the robots that it knew of, its own first."""
     positions: Array
     """(k, 2) m, positions of these robots."""
     is_quiet: bool
-    """True if all others were at rest."""
+    """Whether all others were at rest or out of contact."""
 
 
 @dataclass(frozen=True, eq=False)
 class TeamGoals:
-    """Goals of several robots in the last plan of one of them."""
+    """Goals of a robot and of others in the robot's last plan."""
 
     planner: GridPlanner
+    """Planner on which the goals were found."""
     robots: IntArray
-    """(p,) Numbers of the robots with goals in the plan, its own first."""
+    """(p,) Indices of the robots with goals in the plan, its own first."""
     goals: Array
     """(p, 2) m, goals of these robots."""
 
 
 @dataclass(frozen=True, eq=False)
 class OwnMotion:
-    """Motion of a robot by its last plan."""
+    """Motion of a robot according to its last plan."""
 
     goal: Array
     """(2,) m, its own goal."""
     viewpoint: Array | None = None
-    """(2,) m, the point where it first looks around."""
+    """(2,) m, the point to which it moves first, to look around. None: it moves straight to its goal."""
     is_idle: bool = False
-    """True if the next plan may be skipped as long as nothing changes."""
+    """Whether the next plan may be skipped as long as nothing changes."""
 
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """State of a robot that is stuck among others, and moves away from them for a while."""
+    """How long a robot has been stuck among others, and until when it moves away from them."""
 
     stuck_plans: int = 0
     """Number of consecutive plans during which it has been stuck."""
@@ -93,17 +95,21 @@ class JamState:
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
-    """Memory of one robot for its plans."""
+    """Memory of one robot."""
 
     known_map: DiscoveredMap
+    """The map that it has discovered; with shared maps, the map when it last planned."""
     next_plan_time: float
     """Time of the next plan, s."""
     knowledge: TeamKnowledge
+    """What it knows of the others."""
     path: TraveledPath = TraveledPath()
     basis: PlanBasis | None = None
-    """Knowledge for the last plan; like the goals and the motion, None before the first plan."""
+    """What its last plan is based on; None before the first plan."""
     team_goals: TeamGoals | None = None
+    """Result of the first stage of its last plan; None before the first plan."""
     motion: OwnMotion | None = None
+    """Result of the later stages of its last plan; None before the first plan."""
     jam: JamState = JamState()
 
     def __deepcopy__(self, memo: object) -> PlannerState:
@@ -112,25 +118,24 @@ class PlannerState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtlasMemory:
-    """Memory of the robots."""
+    """Memory of all robots of a team. Row or entry i belongs to robot i alone."""
 
     team: Team
-    """A robot knows its own limits."""
+    """The robots. Each robot knows only its own body and limits."""
     states: tuple[PlannerState, ...]
     """State of each robot."""
     routes: tuple[Array, ...]
-    """Waypoints of each robot, (w, 2) m, the last one the goal."""
-    legs: IntArray
-    """(n,) Index of the waypoint that each robot heads for."""
+    """Waypoints of each robot, (w, 2) m. The last one is its goal."""
+    waypoint_indices: IntArray
+    """(n,) Index, in its route, of the waypoint that each robot heads for."""
+    exchange: ScanExchange | None
+    """The scans that robots with shared maps exchange; None if they share nothing."""
+    reports: tuple[Mapping[int, TeammateReport], ...]
+    """For each robot, the newest report from each sender that has arrived since the robot's last plan."""
     returns: Array | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     estimates: Estimates | None = None
-    """Position estimates, if robots know positions of others by messages."""
-    exchange: ScanExchange | None = None
-    """The scans that robots with shared maps exchange; None if they share nothing."""
-    reports: tuple[Mapping[int, TeammateReport], ...] = ()
-    """The newest report from each other robot since the last plan of each robot, by sender. Never changed in
-    place."""
+    """Position estimates, if robots know the positions of others only from messages."""
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:

@@ -177,8 +177,8 @@ class ExploringLloyd(BaseController):
             team=team,
             grid=grid,
             measurements=np.full((robot_count, square_count), np.nan),
-            measurement_exchange=MeasurementExchange.create_empty(robot_count, square_count),
-            sightings=Sightings.create_empty(robot_count),
+            measurement_exchange=MeasurementExchange.build_empty(robot_count, square_count),
+            sightings=Sightings.build_empty(robot_count),
             is_report_due=np.zeros(robot_count, dtype=bool),
             viewpoints=np.full(robot_count, -1),
         )

@@ -46,12 +46,12 @@ class RouteProgress(NamedTuple):
 
     routes: Sequence[Array]
     """Waypoints of each robot, (w, 2) m each; the last one is the goal."""
-    legs: IntArray
+    waypoint_indices: IntArray
     """(n,) Index of the waypoint that each robot heads for."""
 
     def get_waypoints(self) -> Array:
         """Return the waypoint that each robot heads for, (n, 2) m."""
-        return np.array([route[leg] for route, leg in zip(self.routes, self.legs, strict=True)])
+        return np.array([route[leg] for route, leg in zip(self.routes, self.waypoint_indices, strict=True)])
 
 
 class RouteGains(NamedTuple):
@@ -70,7 +70,7 @@ class RouteCommand(NamedTuple):
     """(n, 2) N"""
     goals: Array
     """(n, 2) m, ends of the routes."""
-    legs: IntArray
+    waypoint_indices: IntArray
     """(n,) Index of the waypoint that each robot heads for now."""
 
 
@@ -93,7 +93,7 @@ def follow_routes(
     -------
     RouteCommand
     """
-    progress = _advance_legs(progress, seen.positions)
+    progress = _advance_waypoints(progress, seen.positions)
     desired = _compute_desired_velocities(seen, team, progress, gains.k_prop)
     # Turning must not use up the acceleration that is needed for braking.
     max_change = _STEERING_FRACTION * team.max_acceleration * gains.response_time
@@ -112,20 +112,20 @@ def follow_routes(
     return RouteCommand(
         forces=compute_drive_forces(velocities, seen, team, gains.response_time),
         goals=np.array([route[-1] for route in progress.routes]),
-        legs=progress.legs,
+        waypoint_indices=progress.waypoint_indices,
     )
 
 
-def _get_last_legs(progress: RouteProgress) -> IntArray:
+def _get_last_indices(progress: RouteProgress) -> IntArray:
     """Return the index of the last waypoint of each route, the goal, (n,)."""
     return np.array([len(route) - 1 for route in progress.routes])
 
 
-def _advance_legs(progress: RouteProgress, positions: Array) -> RouteProgress:
+def _advance_waypoints(progress: RouteProgress, positions: Array) -> RouteProgress:
     """Return the progress after robots that have reached a waypoint head for the next one."""
     is_reached = np.hypot(*(progress.get_waypoints() - positions).T) < _WAYPOINT_RADIUS_M
-    has_next = progress.legs < _get_last_legs(progress)
-    return progress._replace(legs=progress.legs + (has_next & is_reached))
+    has_next = progress.waypoint_indices < _get_last_indices(progress)
+    return progress._replace(waypoint_indices=progress.waypoint_indices + (has_next & is_reached))
 
 
 def _compute_desired_velocities(
@@ -136,7 +136,7 @@ def _compute_desired_velocities(
     speed_limit = _compute_speed_limits(seen, team)
     to_waypoint = compute_approach_velocities(offsets, math.inf, speed_limit)
     to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
-    is_on_last_leg = progress.legs == _get_last_legs(progress)
+    is_on_last_leg = progress.waypoint_indices == _get_last_indices(progress)
     return np.where(is_on_last_leg[:, None], to_goal, to_waypoint)
 
 

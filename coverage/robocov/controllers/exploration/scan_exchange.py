@@ -1,17 +1,17 @@
 """The exchange of scans by messages, from which each robot builds its map.
 
-Robots send three kinds of messages, all of them to every robot in communication range:
+Robots send three kinds of messages, each to all robots in communication range:
 
 - *Scans* (`NumberedScan`). A robot sends each of its own scans once, when it takes it: 542 bytes for 240
   rays.
-- *Digests* (`Digest`). With each scan, a robot sends which scans it has, and whom it hears: 8 bytes, and 12
-  bytes and 1 bit for each robot of the team.
-- *Repairs*. A robot sends scans again, also those of third robots, that are missing in the digest of another
-  one: at most `MAX_REPAIRS` for each scan that it takes.
+- *Digests* (`Digest`). With each scan, a robot sends a list of the scans that it has and of the robots that
+  it hears: 8 bytes, and 12 bytes and 1 bit for each robot of the team.
+- *Repairs*. A robot sends scans that are missing in the digest of another robot again, also those that it
+  has received from third robots: at most `MAX_REPAIRS` for each scan that it takes.
 
-Lost messages are thus repaired, scans reach robots out of range over several hops, and robots that meet again
-exchange what they have missed. A robot never sends more than the conditions allow; what cannot be sent before
-the next scan is dropped, and repaired later.
+In this way, lost scans are sent again, scans reach robots out of range over several hops, and robots that
+meet again exchange the scans that they have missed. A robot never sends more than the conditions allow.
+Messages that cannot be sent before the next scan are dropped; their scans are sent later as repairs.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ MAX_REPAIRS = 16
 """Maximum number of scans that a robot sends again for each scan that it takes."""
 
 _TIME_BYTES = 8
+"""Size of the time of a digest."""
 _INVENTORY_BYTES = 12
-"""Size of the number of the first missing scan of a robot, and of the bits for 64 later ones."""
+"""Size of the inventory of one robot's scans: 4 bytes for the first missing one, 8 for 64 later ones."""
 _MAX_REPAIR_MEMORY_S = 30.0
-"""Time for which a robot remembers what it has sent again."""
+"""Time for which a robot remembers which scans it has sent again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +49,7 @@ class Digest:
     time : float, s
         Time at which it was sent.
     inventory : Inventory
+        The scans that the robot has.
     is_heard : (n,) bool array
         Whether the robot hears each of the others.
     """
@@ -84,13 +86,13 @@ class RobotExchange:
 
     log: ScanLog
     own_scan: NumberedScan | None = None
-    """Its newest scan, which enters the log one step later, like those of others at the earliest."""
+    """Its newest scan. It enters the log in the next step, when scans of others arrive at the earliest."""
     own_inventory: Inventory | None = None
     """The inventory in its newest digest."""
     digests: Mapping[int, ReceivedDigest] = field(default_factory=dict)
-    """The newest digest of each robot from which one has arrived. Never changed in place."""
+    """The newest digest that has arrived from each robot, by its index. Never changed in place."""
     repair_times: Mapping[tuple[int, int], float] = field(default_factory=dict)
-    """Times at which it sent scans again, by the numbers of robot and round. Never changed in place."""
+    """Times at which it last sent scans again, s, by robot and round. Never changed in place."""
     outgoing: tuple[Message, ...] = ()
     """Messages that it has not been able to send yet."""
 
@@ -100,11 +102,12 @@ class RobotExchange:
 
 @dataclass(frozen=True, eq=False)
 class ScanExchange:
-    """The exchange of scans in a team. Immutable; entry i belongs to robot i alone.
+    """The exchange of scans in a team. Immutable.
 
     Attributes
     ----------
     robots : tuple of RobotExchange
+        State of each robot. Entry i depends only on what robot i knows.
     round_count : int
         Number of scans that each robot has taken.
     """
@@ -113,10 +116,10 @@ class ScanExchange:
     round_count: int = 0
 
     @classmethod
-    def start(
+    def build_empty(
         cls, unknown_map: DiscoveredMap, robot_count: int, robot_radii: Sequence[float | None]
     ) -> ScanExchange:
-        """Return the exchange of robots that have no scans yet.
+        """Build the exchange of robots that have no scans yet.
 
         Parameters
         ----------
@@ -124,8 +127,8 @@ class ScanExchange:
         robot_count : int
             Number of robots n.
         robot_radii : sequence of float or None, m
-            The radius within which each robot takes cells around the positions in scans to be free; None if
-            it does not.
+            Radius around the position of each scan within which robot i marks the cells of its map as free.
+            None: it marks only the cells that rays pass through.
 
         Returns
         -------
@@ -176,13 +179,14 @@ class ScanExchange:
         return replace(self, robots=tuple(states))
 
     def update_maps(self, robots: Sequence[int]) -> ScanExchange:
-        """Return the exchange with the maps of all scans that some robots have.
+        """Return the exchange in which the maps of some robots contain all scans that these robots have.
 
-        Robots with equal maps share one object, so that what is computed from it is computed only once.
+        Robots with equal maps share one map object, so that results computed from it can be shared as well.
 
         Parameters
         ----------
         robots : sequence of int
+            Indices of the robots.
 
         Returns
         -------
@@ -204,7 +208,7 @@ class ScanExchange:
         return replace(self, robots=tuple(states))
 
     def add_scans(self, seen: Observations, scans: Scans) -> ScanExchange:
-        """Return the exchange with a new scan of each robot, and the messages that go with it.
+        """Return the exchange with a new scan of each robot, and with the messages to send after it.
 
         Parameters
         ----------
@@ -227,7 +231,7 @@ class ScanExchange:
         return ScanExchange(tuple(states), self.round_count + 1)
 
     def add_message(self, robot: int, message: Message) -> ScanExchange:
-        """Return the exchange with a message of another kind that a robot sends before all others.
+        """Return the exchange with a message of another kind, which a robot sends before all others.
 
         Parameters
         ----------
@@ -241,12 +245,12 @@ class ScanExchange:
         """
         kind = type(message.payload)
         state = self.robots[robot]
-        others = [each for each in state.outgoing if not isinstance(each.payload, kind)]
+        others = [waiting for waiting in state.outgoing if not isinstance(waiting.payload, kind)]
         states = list(self.robots)
         states[robot] = replace(state, outgoing=(message, *others))
         return replace(self, robots=tuple(states))
 
-    def hear_all(self, robot: int, neighbors: Sequence[int]) -> bool:
+    def neighbors_hear_all(self, robot: int, neighbors: Sequence[int]) -> bool:
         """Return whether each neighbor of a robot hears all others, according to its newest digest.
 
         Parameters
@@ -266,7 +270,7 @@ class ScanExchange:
         )
 
     def send(self, seen: Observations) -> tuple[ScanExchange, tuple[tuple[Message, ...], ...]]:
-        """Send as many of the messages as each robot may send in a step.
+        """Take from each robot's outgoing messages those that it can send in this step.
 
         Parameters
         ----------
@@ -306,7 +310,10 @@ def _add_digests(state: RobotExchange, seen: Observations, robot: int) -> RobotE
 def _prepare_messages(
     state: RobotExchange, seen: Observations, robot: int, own_scan: NumberedScan
 ) -> RobotExchange:
-    """Return the state of a robot with the messages that go with a new scan; they replace earlier ones."""
+    """Return the state of a robot with the messages to send after a new scan: scan, digest and repairs.
+
+    They replace the messages of these kinds that have not been sent yet.
+    """
     neighbors = seen.neighbors.list_neighbors(robot).tolist()
     is_heard = np.zeros(len(seen.positions), dtype=bool)
     is_heard[neighbors] = True
@@ -317,14 +324,14 @@ def _prepare_messages(
         min_time = seen.time - _MAX_REPAIR_MEMORY_S
         repair_times = {key: time for key, time in repair_times.items() if time >= min_time}
         repair_times.update(dict.fromkeys(((scan.robot, scan.number) for scan in repairs), seen.time))
-    waiting = [each for each in state.outgoing if not isinstance(each.payload, NumberedScan | Digest)]
-    outgoing = [*waiting, Message(own_scan, own_scan.size), Message(digest, digest.size)]
+    others = [message for message in state.outgoing if not isinstance(message.payload, NumberedScan | Digest)]
+    outgoing = [*others, Message(own_scan, own_scan.size), Message(digest, digest.size)]
     outgoing += [Message(scan, scan.size) for scan in repairs]
     return replace(state, own_inventory=digest.inventory, outgoing=tuple(outgoing), repair_times=repair_times)
 
 
 def _choose_repairs(state: RobotExchange, robot: int, neighbors: Sequence[int]) -> list[NumberedScan]:
-    """Choose the scans that a robot sends again, because others need them: the oldest ones first."""
+    """Choose the scans that a robot sends again because neighbors lack them: the oldest ones first."""
     log = state.log
     chosen: dict[tuple[int, int], NumberedScan] = {}
     for neighbor in neighbors:
@@ -333,7 +340,8 @@ def _choose_repairs(state: RobotExchange, robot: int, neighbors: Sequence[int]) 
             continue
         inventory = received.digest.inventory
         if inventory.equals(state.own_inventory):
-            # The neighbor lacked nothing, and what this robot has received since then is too new.
+            # The neighbor had the same scans. Those that this robot has received since then are too new for
+            # the digest.
             continue
         is_missing = inventory.find_missing(log.is_present)
         for number, owner in np.argwhere(is_missing).tolist():
@@ -344,16 +352,19 @@ def _choose_repairs(state: RobotExchange, robot: int, neighbors: Sequence[int]) 
 
 
 def _needs_repair(scan: NumberedScan, state: RobotExchange, received: ReceivedDigest) -> bool:
-    """Return whether a scan missing in a digest was lost: it was sent early enough to be in the digest."""
+    """Return whether a scan that is missing in a digest was lost.
+
+    If it was sent too late to be in the digest, it may still arrive.
+    """
     sent_time = state.repair_times.get((scan.robot, scan.number), scan.time)
     return sent_time + received.delay <= received.digest.time + TIME_TOLERANCE_S
 
 
 def _is_responsible(scan: NumberedScan, state: RobotExchange, robot: int, received: ReceivedDigest) -> bool:
-    """Return whether a robot is the one that sends a scan again to the sender of a digest.
+    """Return whether it is up to a robot to send a scan again to the sender of a digest.
 
-    Of the robots that the sender hears and that have the scan, as far as known, it is the owner of the scan,
-    or else the next one by number.
+    Only one robot should do so. Candidates are the robots that the sender hears and that have the scan, as
+    far as `robot` knows. The owner of the scan comes first, then the robots with the next higher indices.
     """
     robot_count = len(received.digest.is_heard)
     for step in range(robot_count):
@@ -366,7 +377,7 @@ def _is_responsible(scan: NumberedScan, state: RobotExchange, robot: int, receiv
 
 
 def _has_scan(candidate: int, scan: NumberedScan, state: RobotExchange) -> bool:
-    """Return whether another robot has a scan, as far as known: its own, or one in its newest digest."""
+    """Return whether a candidate is known to have a scan: its own, or one in its newest digest."""
     if candidate == scan.robot:
         return True
     received = state.digests.get(candidate)
@@ -374,7 +385,10 @@ def _has_scan(candidate: int, scan: NumberedScan, state: RobotExchange) -> bool:
 
 
 def _count_sendable(messages: Sequence[Message], limit: float) -> int:
-    """Return the number of messages that may be sent; one that is larger than the limit is sent alone."""
+    """Return how many of the first messages fit into a limit, in bytes.
+
+    A first message that is larger than the limit can be sent alone.
+    """
     if limit <= 0.0:
         return 0
     total = 0

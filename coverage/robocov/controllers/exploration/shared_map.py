@@ -1,4 +1,4 @@
-"""Base class of controllers that plan for the team on maps that robots within range share."""
+"""Base class of controllers in which robots share their maps and plan for the whole team."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MIN_CELL_SIZE_M = 0.05
 MAX_MAP_CELLS = 1_000_000
 """Maximum number of cells of a map."""
 MAX_SILENCE_S = 5.0
-"""Time after which a silent robot that would be heard at its assumed position is missing."""
+"""Time for which a robot must be silent to count as missing, if it would be heard at its assumed position."""
 CERTAIN_RANGE_FRACTION = 0.8
 """Fraction of the communication range within which a robot would certainly be heard."""
 
@@ -44,22 +44,22 @@ class Group(NamedTuple):
     """The k robots that a robot plans for: itself and those that it hears or has heard."""
 
     robots: IntArray
-    """(k,) Their numbers, ascending."""
+    """(k,) Indices of the robots, ascending."""
     positions: Array
     """(k, 2) m, their known or assumed positions."""
     heard_times: Array
-    """(k,) s, when they were last heard."""
+    """(k,) s, times at which they were last heard."""
 
 
 class Placement(NamedTuple):
     """Goals of a group of robots."""
 
     goals: Array
-    """(k, 2) m"""
+    """(k, 2) m, in the order of the robots of the group."""
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
     inspected_targets: Array = np.empty((0, 2))
-    """(m, 2) m, targets that need no further visit."""
+    """(m, 2) m, targets that need no further visit, for a controller that looks at unknown space."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ class Plan:
     """The group when the plan was made."""
     placement: Placement
     known_map: DiscoveredMap
-    """The map that it was made on."""
+    """The map for which it was made."""
     planner: GridPlanner
     density: Density | None
 
@@ -79,26 +79,34 @@ class Plan:
 
 
 class Situation(NamedTuple):
-    """Situation of a robot that plans for k robots, itself and those that it has heard."""
+    """Situation of a robot that plans for k robots: itself and those that it has heard."""
 
     positions: Array
-    """(k, 2) m, their known or assumed positions."""
+    """(k, 2) m, known or assumed positions of the robots."""
     previous_goals: Array
-    """(k, 2) m, their goals in the last plan; nan for robots without one."""
+    """(k, 2) m, goals of the robots in the last plan; nan for robots without one."""
     previous_plan: Plan | None
     known_map: DiscoveredMap
     planner: GridPlanner
     density: Density | None
     sensing_range: float
-    """m"""
+    """Sensing range of the robot that plans, m."""
 
-    def compute_weights(self, cells: BoolArray) -> Array:
-        """Compute the weights of the nodes, (m,), for cells of the map, (rows, columns).
+    def compute_weights(self, is_counted: BoolArray) -> Array:
+        """Compute the weights of the nodes of the planner.
 
-        A weight is the number of these cells that the node represents, times the density. It is 0 for a node
-        that no robot can reach.
+        Parameters
+        ----------
+        is_counted : (rows, columns) bool array
+            Which cells of the map count.
+
+        Returns
+        -------
+        (m,) array
+            Number of counted cells that each node represents, times the density. 0 for nodes that no robot
+            can reach.
         """
-        weights = self.planner.sum_by_node(self.planner.window.crop(cells, fill=False))
+        weights = self.planner.sum_by_node(self.planner.window.crop(is_counted, fill=False))
         weights = weights * np.isfinite(self.planner.compute_distances_from(self.positions))
         if self.density is not None and not self.density.is_uniform:
             weights = weights * self.density.evaluate(self.planner.nodes)
@@ -106,16 +114,29 @@ class Situation(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Candidate positions of a plan, with the table of `robocov.k_median`."""
+    """Candidate positions for the goals of a plan, with a table of distances for `robocov.k_median`."""
 
     positions: Array
     """(c, 2) m"""
     table: Array
-    """(m, c) Weighted distances from the m nodes to cover."""
+    """(m, c) Weighted distances from the m nodes that count in the cost to the candidates."""
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Build candidates at the reachable ones of the given nodes, from the weights of all nodes."""
+        """Build a candidate at each of the given nodes that has a weight, which robots can reach.
+
+        Parameters
+        ----------
+        situation : Situation
+        weights : (m,) array
+            Weights of all nodes, from `Situation.compute_weights`.
+        nodes : (c,) int array
+            Nodes at which there may be candidates.
+
+        Returns
+        -------
+        Candidates
+        """
         targets = np.flatnonzero(weights > 0.0)
         nodes = nodes[weights[nodes] > 0.0]
         distances = situation.planner.compute_distance_table(nodes)[:, targets]
@@ -123,17 +144,41 @@ class Candidates(NamedTuple):
         return cls(positions=situation.planner.nodes[nodes], table=np.ascontiguousarray(table))
 
     def compute_cost(self, chosen: IntArray) -> float:
-        """Compute the coverage cost of some candidates."""
+        """Compute the coverage cost with a robot at each of the chosen candidates, (k,)."""
         return float(self.table[:, chosen].min(axis=1).sum())
 
     def find_nearest(self, positions: Array) -> IntArray:
-        """Assign a different candidate to each of (k, 2) positions, by least squares; return (k,) indices."""
+        """Assign a different candidate to each position so that the sum of squared distances is minimal.
+
+        Parameters
+        ----------
+        positions : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) int array
+            Indices of candidates.
+        """
         squared_distances = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
         _, candidates = scipy.optimize.linear_sum_assignment(squared_distances)
         return np.asarray(candidates, dtype=np.intp)
 
     def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
-        """Return positions, (k, 2) m, refined from candidates by Lloyd's iteration on all nodes near them."""
+        """Improve positions at candidates by Lloyd's iteration on all nodes near them.
+
+        Parameters
+        ----------
+        situation : Situation
+        weights : (m,) array
+            Weights of all nodes, from `Situation.compute_weights`.
+        chosen : (k,) int array
+            Indices of candidates.
+
+        Returns
+        -------
+        (k, 2) array, m
+            Positions of nodes.
+        """
         planner = situation.planner
         positions = self.positions[chosen]
         # Candidates are farther apart than nodes.
@@ -145,7 +190,7 @@ class Candidates(NamedTuple):
 
 
 def assign_goals(situation: Situation, goals: Array) -> Array:
-    """Assign goals to robots such that the sum of the squared path lengths is minimal.
+    """Assign goals to robots so that the sum of the squared path lengths is minimal.
 
     The assignment stays the same while robots move along straight paths.
 
@@ -170,25 +215,26 @@ def assign_goals(situation: Situation, goals: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMapMemory:
-    """Memory of the robots."""
+    """Memory of all robots of a team. Row or entry i belongs to robot i alone."""
 
     team: Team
-    """A robot knows its own limits."""
+    """The robots. Each robot knows only its own body and limits."""
     exchange: ScanExchange
     """The scans of each robot, its own and those that have arrived from others, and their map."""
     plans: tuple[Plan | None, ...]
+    """The last plan of each robot; None before the first one."""
     routes: tuple[Array, ...]
-    """Waypoints of each robot, (w, 2) m, the last one the goal."""
-    legs: IntArray
-    """(n,) Index of the waypoint that each robot heads for."""
+    """Waypoints of each robot, (w, 2) m. The last one is its goal."""
+    waypoint_indices: IntArray
+    """(n,) Index, in its route, of the waypoint that each robot heads for."""
     next_plan_time: float = -math.inf
-    """s"""
+    """Time at which all robots plan next, s."""
     returns: Array | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:
-        """The map of each robot when it last planned: its own discoveries and those of others."""
+        """The map of each robot when it last planned, from its own scans and those of others."""
         return self.exchange.maps
 
 
@@ -225,10 +271,10 @@ class SharedMapController(BaseController):
         n = len(team)
         return SharedMapMemory(
             team=team,
-            exchange=ScanExchange.start(build_unknown_map(region), n, robot_radii=[None] * n),
+            exchange=ScanExchange.build_empty(build_unknown_map(region), n, robot_radii=[None] * n),
             plans=(None,) * n,
             routes=(),
-            legs=np.zeros(n, dtype=np.intp),
+            waypoint_indices=np.zeros(n, dtype=np.intp),
         )
 
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
@@ -247,7 +293,7 @@ class SharedMapController(BaseController):
         command = follow_routes(
             seen,
             memory.team,
-            RouteProgress(routes, memory.legs),
+            RouteProgress(routes, memory.waypoint_indices),
             returns,
             RouteGains(self.k_prop, self.response_time),
         )
@@ -255,7 +301,9 @@ class SharedMapController(BaseController):
             forces=command.forces,
             goals=command.goals,
             terms={"attraction": command.forces},
-            memory=replace(memory, exchange=exchange, legs=command.legs, returns=returns),
+            memory=replace(
+                memory, exchange=exchange, waypoint_indices=command.waypoint_indices, returns=returns
+            ),
             messages=messages,
         )
 
@@ -270,7 +318,7 @@ class SharedMapController(BaseController):
             memory,
             plans=plans,
             routes=tuple(routes),
-            legs=np.zeros_like(memory.legs),
+            waypoint_indices=np.zeros_like(memory.waypoint_indices),
             next_plan_time=seen.time + self.period,
         )
 
@@ -301,7 +349,10 @@ class SharedMapController(BaseController):
         radius: float,
         sensing_range: float,
     ) -> Plan:
-        """Return the plan of a robot; its radius and sensing range are in m."""
+        """Return the plan of a robot with a radius and a sensing range in m, for its group.
+
+        A final plan that is still valid is returned with the present positions of the group.
+        """
         if previous_plan is not None and _is_still_valid(previous_plan, known_map, seen.density, group):
             return replace(previous_plan, group=group)
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
@@ -351,7 +402,11 @@ def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | Non
 
 
 def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, robot: int) -> Group:
-    """Return the group of a robot: itself, those that it hears, and those assumed to be at their goals."""
+    """Return the group of a robot: itself, the robots that it hears, and some that it no longer hears.
+
+    A robot that is no longer heard is assumed to be at its goal in the previous plan. It stays in the group
+    unless it has been silent for long although it would certainly be heard there.
+    """
     position = seen.positions[robot : robot + 1]
     robots = np.append(seen.neighbors.list_neighbors(robot), robot)
     positions = np.vstack([seen.get_neighbor_positions(robot), position])
@@ -362,9 +417,10 @@ def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, rob
         distance = np.sqrt(((goals - position) ** 2).sum(axis=1))
         is_silent = seen.time - previous.heard_times > MAX_SILENCE_S
         is_close = distance < CERTAIN_RANGE_FRACTION * team.communication_range[robot]
-        is_expected = ~(np.isin(previous.robots, robots) | (is_silent & is_close))
-        robots = np.concatenate([robots, previous.robots[is_expected]])
-        positions = np.vstack([positions, goals[is_expected]])
-        heard_times = np.concatenate([heard_times, previous.heard_times[is_expected]])
+        is_heard = np.isin(previous.robots, robots)
+        is_assumed = ~(is_heard | (is_silent & is_close))
+        robots = np.concatenate([robots, previous.robots[is_assumed]])
+        positions = np.vstack([positions, goals[is_assumed]])
+        heard_times = np.concatenate([heard_times, previous.heard_times[is_assumed]])
     order = np.argsort(robots)
     return Group(robots=robots[order], positions=positions[order], heard_times=heard_times[order])

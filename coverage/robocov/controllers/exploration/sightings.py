@@ -1,4 +1,4 @@
-"""Last known positions of all robots of a team, which robots pass on to each other by messages."""
+"""Last known positions of all robots of a team, which robots pass on to each other in messages."""
 
 from __future__ import annotations
 
@@ -14,51 +14,53 @@ from robocov.observation import Message, Observations
 from robocov.team import Team
 
 SIGHTING_BYTES = 14
-"""Size of a sighting: 2 bytes for the number of the robot, 4 for its time, 8 for its position."""
+"""Size of the last known position of one robot: 2 bytes for its index, 4 for the time, 8 for the position."""
 
 
-class SightingList(NamedTuple):
-    """Content of a message with the k robots that the sender knows of."""
+class SightingReport(NamedTuple):
+    """Content of a message about the k robots that the sender knows of."""
 
     robots: IntArray
-    """(k,) Numbers of the robots."""
+    """(k,) Indices of the robots."""
     positions: Array
     """(k, 2) m, their last known positions; nan for lost robots."""
     times: Array
-    """(k,) s, the times of these positions."""
+    """(k,) s, times at which they were there, or were found to be lost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:
-    """Last known position of each robot, as known to each robot. Immutable.
+    """What each robot knows of the last positions of all robots. Immutable.
 
-    A robot that is not heard where it was last seen is lost. From then on its position is nan. Robots pass
-    this on like any other position, until there is a newer sighting.
+    A robot is lost if it has been silent for long although it would certainly be heard at its last known
+    position. Its position is nan from then on. Robots pass this on like any other position, until there is a
+    newer one.
 
     Attributes
     ----------
     positions : (n, n, 2) array, m
-        Row i contains what robot i knows; nan for lost and unknown robots.
+        Entry (i, j) is the last position of robot j that robot i knows; nan if j is lost or unknown to i.
     times : (n, n) array, s
-        When the robots were at these positions; -inf for unknown robots.
+        Time at which robot j was there, or was found to be lost; -inf if j is unknown to i.
     """
 
     positions: Array
     times: Array
 
     @classmethod
-    def create_empty(cls, robot_count: int) -> Sightings:
-        """Create the sightings of robots that know of no other robot."""
+    def build_empty(cls, robot_count: int) -> Sightings:
+        """Build the sightings of robots that know of no other robot."""
         shape = (robot_count, robot_count)
         return cls(positions=np.full((*shape, 2), np.nan), times=np.full(shape, -np.inf))
 
     def update(self, seen: Observations, team: Team) -> Sightings:
-        """Return the sightings, updated with the robots heard in this step and without the lost ones.
+        """Return the sightings after a step: with the robots that are heard now, and without the lost ones.
 
         Parameters
         ----------
         seen : Observations
         team : Team
+            For the communication range of each robot.
 
         Returns
         -------
@@ -79,7 +81,7 @@ class Sightings:
         return replace(self, positions=positions, times=times)
 
     def receive(self, seen: Observations) -> Sightings:
-        """Return the sightings, updated with the newer ones that the robots receive in this step."""
+        """Return the sightings with the newer ones in the messages that arrive in this step."""
         if not seen.messages:
             return self
         positions = self.positions.copy()
@@ -87,31 +89,31 @@ class Sightings:
         for robot in range(len(times)):
             for message in seen.get_messages(robot):
                 content = message.payload
-                if isinstance(content, SightingList):
+                if isinstance(content, SightingReport):
                     is_newer = content.times > times[robot, content.robots]
-                    updated = content.robots[is_newer]
-                    positions[robot, updated] = content.positions[is_newer]
-                    times[robot, updated] = content.times[is_newer]
+                    others = content.robots[is_newer]
+                    positions[robot, others] = content.positions[is_newer]
+                    times[robot, others] = content.times[is_newer]
         return replace(self, positions=positions, times=times)
 
     def build_message(self, robot: int) -> Message:
-        """Build the message with which a robot reports all robots that it knows of, except itself."""
+        """Build the message in which a robot reports all robots that it knows of, except itself."""
         known = np.flatnonzero(np.isfinite(self.times[robot]))
         known = known[known != robot]
-        content = SightingList(
+        content = SightingReport(
             robots=known, positions=self.positions[robot, known], times=self.times[robot, known]
         )
         return Message(content, HEADER_BYTES + SIGHTING_BYTES * len(known))
 
     def list_pairs(self) -> tuple[IntArray, Array]:
-        """List the pairs of a robot and another one whose position it knows.
+        """List all pairs of a robot and another robot whose position it knows.
 
         Returns
         -------
         robots : (m,) int array
-            The robot in each pair, ascending.
+            Index of the first robot of each pair, ascending.
         positions : (m, 2) array, m
-            The position of the other one.
+            Last position of the second robot that the first one knows.
         """
         is_known = np.isfinite(self.positions[:, :, 0])
         np.fill_diagonal(is_known, val=False)

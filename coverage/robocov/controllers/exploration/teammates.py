@@ -1,4 +1,4 @@
-"""Knowledge of one robot about the others: positions, last contacts, and times at rest."""
+"""What one robot knows about each of the others: position, time of the last message, and time at rest."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from robocov.observation import Observations
 REST_RADIUS_M = 0.1
 """A robot is at rest while it stays within this distance of one point."""
 REPORT_BYTES = 28
-"""Size of the number of a robot, its position, and the time at which it was last heard."""
+"""Size of a report about one robot: its index, its position, and the time at which it was last heard."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TeammateReport:
-    """Report of a robot to its neighbors about k others. Immutable.
+    """Message in which a robot reports k other robots to its neighbors. Immutable.
 
     Attributes
     ----------
     robots : (k,) int array
-        Their numbers, ascending.
+        Indices of the reported robots, ascending.
     positions : (k, 2) array, m
         Their known or assumed positions.
     heard_times : (k,) array, s
@@ -46,17 +46,17 @@ class Teammates(NamedTuple):
     """Knowledge of a robot about k others."""
 
     robots: IntArray
-    """(k,) Their numbers, ascending."""
+    """(k,) Indices of the others, ascending."""
     positions: Array
     """(k, 2) m, their known or assumed positions."""
     heard_times: Array
-    """(k,) s, when they were last heard."""
+    """(k,) s, times at which they were last heard."""
     heard_distances: Array
-    """(k,) m, their distances then."""
+    """(k,) m, their distances from the robot at these times; infinite if it knows them only from reports."""
     rest_times: Array
-    """(k,) s, the time since which they have been within `REST_RADIUS_M` of `rest_positions`."""
+    """(k,) s, times since which they have been within `REST_RADIUS_M` of `rest_positions`."""
     rest_positions: Array
-    """(k, 2) m"""
+    """(k, 2) m, positions near which they have been since then."""
 
     @classmethod
     def build_empty(cls) -> Teammates:
@@ -73,16 +73,22 @@ class Teammates(NamedTuple):
     def add_observation(
         self, robots: IntArray, positions: Array, own_position: Array, time: float, is_lost: BoolArray
     ) -> Teammates:
-        """Add the positions of robots that are heard now.
+        """Return the knowledge after the robots that are heard now are added, and lost ones removed.
 
         Parameters
         ----------
         robots : (m,) int array
+            Indices of the robots that are heard.
         positions : (m, 2) array, m
+            Positions of these robots.
         own_position : (2,) array, m
         time : float, s
         is_lost : (k,) bool array
             Whether each robot known so far has failed or is missing. It is removed unless it is heard now.
+
+        Returns
+        -------
+        Teammates
         """
         now = np.full(len(robots), time)
         observed = Teammates(
@@ -98,6 +104,7 @@ class Teammates(NamedTuple):
             *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))
         )
         updated = joined._select(np.argsort(joined.robots))
+        # Robots that are still close to where they came to rest keep the position and the time of that.
         _, rows, previous_rows = np.intersect1d(
             updated.robots, self.robots, assume_unique=True, return_indices=True
         )
@@ -116,16 +123,20 @@ class Teammates(NamedTuple):
     def add_reports(
         self, reports: Sequence[TeammateReport], robot: int, loss_times: Mapping[int, float]
     ) -> Teammates:
-        """Add reports of other robots that are more recent than the robot's own knowledge.
+        """Return the knowledge with the reports of others, where these are more recent.
 
         Parameters
         ----------
         reports : sequence of TeammateReport
             Of several reports with the same time, the first one counts.
         robot : int
-            The robot itself; reports about it are ignored.
+            Index of the robot itself; reports about it are ignored.
         loss_times : mapping of int to float, s
             Times at which the robot lost others. Only later reports about these count.
+
+        Returns
+        -------
+        Teammates
         """
         sources: list[Sequence[Array | IntArray]] = [self]
         before_start = -1.0
@@ -139,17 +150,17 @@ class Teammates(NamedTuple):
                 robots=report.robots,
                 positions=report.positions,
                 heard_times=report.heard_times,
-                # It may never have been in range: its silence does not mean that it has failed.
+                # A robot that was never in range has not failed if it is silent.
                 heard_distances=np.full(len(is_new), math.inf),
                 rest_times=report.heard_times,
                 rest_positions=report.positions,
             )
             sources.append(reported._select(np.flatnonzero(is_new)))
         merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
-        # By robot, the most recent first. The sort is stable.
+        # Keep the most recent row of each robot, or the first one of several. The sort is stable.
         order = np.lexsort((-merged.heard_times, merged.robots))
-        _, first = np.unique(merged.robots[order], return_index=True)
-        return merged._select(order[first])
+        _, first_rows = np.unique(merged.robots[order], return_index=True)
+        return merged._select(order[first_rows])
 
     def _select(self, rows: IntArray) -> Teammates:
         """Return the knowledge about some of the robots, in the given order."""
@@ -164,11 +175,12 @@ def receive_reports(seen: Observations, robot: int) -> dict[int, TeammateReport]
     ----------
     seen : Observations
     robot : int
+        Index of the receiver.
 
     Returns
     -------
     dict of int to TeammateReport
-        By the number of the sender.
+        Reports by the index of the sender.
     """
     return {
         message.sender: message.payload

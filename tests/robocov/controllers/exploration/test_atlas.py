@@ -10,8 +10,7 @@ import pytest
 
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, get_information, make_controller
-from robocov.controllers.exploration import atlas
-from robocov.controllers.exploration.atlas import MAX_PLANNING_GROUP
+from robocov.controllers.exploration import atlas, team_goals
 from robocov.controllers.exploration.atlas_memory import (
     AtlasMemory,
     OwnMotion,
@@ -19,6 +18,7 @@ from robocov.controllers.exploration.atlas_memory import (
     PlannerState,
     TeamKnowledge,
 )
+from robocov.controllers.exploration.team_knowledge import MAX_PLANNING_GROUP, update_knowledge
 from robocov.controllers.exploration.teammates import Teammates
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
@@ -132,14 +132,14 @@ def test_decisions_do_not_change_earlier_memories() -> None:
         simulation.step()
     memory: AtlasMemory = simulation.memory
     assert memory.returns is not None
-    legs = memory.legs.copy()
+    indices = memory.waypoint_indices.copy()
     returns = memory.returns.copy()
     map_states = [known_map.state.copy() for known_map in memory.maps]
     restarted = simulation.with_memory(memory)
     for _ in range(40):
         simulation.step()
         restarted.step()
-    np.testing.assert_array_equal(memory.legs, legs)
+    np.testing.assert_array_equal(memory.waypoint_indices, indices)
     np.testing.assert_array_equal(memory.returns, returns)
     np.testing.assert_array_equal([known_map.state for known_map in memory.maps], map_states)
     assert simulation.positions.tobytes() == restarted.positions.tobytes()
@@ -277,8 +277,10 @@ def test_robots_that_meet_pass_each_other_on_the_left() -> None:
         states = tuple(
             replace(state, next_plan_time=math.inf, basis=build_basis(state)) for state in memory.states
         )
-        legs = np.zeros(2, dtype=np.intp)
-        simulation = simulation.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
+        indices = np.zeros(2, dtype=np.intp)
+        simulation = simulation.with_memory(
+            replace(memory, states=states, routes=tuple(goals), waypoint_indices=indices)
+        )
         simulation.step()
         offset = simulation.positions[0] - simulation.positions[1]
         assert np.hypot(*offset) > 0.23
@@ -456,7 +458,7 @@ def test_copies_of_memories_share_immutable_parts() -> None:
     copy = deepcopy(memory)
     assert len(memory.maps) == 3
     assert all(state is copied for state, copied in zip(memory.states, copy.states, strict=True))
-    assert copy.legs is not memory.legs
+    assert copy.waypoint_indices is not memory.waypoint_indices
 
 
 def test_at_the_start_all_cells_are_unknown() -> None:
@@ -466,13 +468,13 @@ def test_at_the_start_all_cells_are_unknown() -> None:
 
 def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> None:
     plan_times: list[float] = []
-    place_team = atlas.place_team
+    place_team = team_goals.place_team
 
     def count_plan(*args: Any, **kwargs: Any) -> Any:
         plan_times.append(simulation.time)
         return place_team(*args, **kwargs)
 
-    monkeypatch.setattr(atlas, "place_team", count_plan)
+    monkeypatch.setattr(team_goals, "place_team", count_plan)
     simulation = build_simulation(AtlasShared)
     run_until(simulation, 3.0)
     assert len(plan_times) == len(set(plan_times)) == 3
@@ -518,9 +520,9 @@ def test_a_robot_is_missed_only_after_a_while() -> None:
         rest_times=np.zeros(1),
         rest_positions=assumed_position,
     )
-    state = replace(Atlas().begin(ROOMS.region, team).states[0], knowledge=TeamKnowledge(teammates))
     for time, expected in ((1.0, [1]), (4.9, [1]), (5.1, [])):
-        later = atlas._update_knowledge(state, replace(observations, time=time), team, 0, [])
+        seen = replace(observations, time=time)
+        later = update_knowledge(TeamKnowledge(teammates), None, seen, team, 0, [])
         assert later.teammates.robots.tolist() == expected
 
 

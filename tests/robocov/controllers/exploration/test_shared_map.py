@@ -222,7 +222,7 @@ def test_a_final_plan_is_computed_again_for_another_density() -> None:
         np.array([[1.0, 1.0]]), np.zeros((1, 2)), Neighbors(1), np.full((1, 2), np.nan), ROOMS.region
     )
     known_map = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, dtype=np.uint8))
-    exchange = ScanExchange.start(known_map, 1, robot_radii=[None])
+    exchange = ScanExchange.build_empty(known_map, 1, robot_radii=[None])
     memory = replace(controller.begin(ROOMS.region, Team.homogeneous(1)), exchange=exchange)
     blind = Scans(np.zeros((1, 8)), np.zeros((1, 8), dtype=bool))
     memory = controller.decide(replace(seen, scans=blind), memory).memory
