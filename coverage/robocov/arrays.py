@@ -27,6 +27,7 @@ def freeze(values: object) -> Array:
     Parameters
     ----------
     values : array_like
+        Numbers, of any shape.
 
     Returns
     -------

@@ -22,8 +22,8 @@ class DrawingBackend(Protocol):
     Attributes
     ----------
     plot_environment, plot_record, plot_history, plot_result, plot_comparison : callable
-        ``plot_...(item, axes=None, **options)`` draws an item on axes and returns them. If the axes are None,
-        it draws on a page of its own, and returns the axes of that page.
+        ``plot_...(item, axes=None, **options)`` draws an item on axes and returns the axes. If `axes` is
+        None, the item is drawn on a new page.
     render_environment_html, render_record_html, render_comparison_html : callable
         Return the HTML, a str, that a notebook displays for an item.
     render_environment_png, render_record_png, render_comparison_png : callable
@@ -47,10 +47,10 @@ class DrawingBackend(Protocol):
 
 
 class Drawable:
-    """An object that backends draw, and that notebooks display if the backend has an image of it."""
+    """Base class of objects that a backend can draw, and that notebooks display as an image."""
 
     _drawing_name: ClassVar[str]
-    """Name of the class as it appears in the names of a backend's functions."""
+    """Name of the class in the names of a backend's functions, such as "record" in ``plot_record``."""
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
         """Plot the object on axes, or on a page with a title, a scale bar or a legend.
@@ -58,8 +58,8 @@ class Drawable:
         Parameters
         ----------
         axes : matplotlib.axes.Axes or None
-            By default the axes of a new page; the page is ``axes.figure``. A comparison always has a page of
-            its own, with one panel for each run.
+            Axes to draw on; by default those of a new page, which is ``axes.figure``. A comparison is always
+            drawn on a new page, with one panel for each run.
         backend : str or None
             Name of a drawing backend, see `robocov.drawing`; ``matplotlib`` by default.
         **options
@@ -82,7 +82,7 @@ class Drawable:
         Returns
         -------
         matplotlib.axes.Axes
-            Or what another backend returns.
+            The axes with the drawing. Another backend may return something else.
 
         Raises
         ------
@@ -98,13 +98,13 @@ class Drawable:
     def _repr_png_(self) -> Any:
         return self._draw_for_notebook("png")
 
-    def _draw_for_notebook(self, form: str) -> Any:
-        """Return the drawing in the given form; None without one, so that notebooks show the repr."""
+    def _draw_for_notebook(self, format_name: str) -> Any:
+        """Return the drawing as "html" or "png". If it is None, the notebook displays the repr."""
         try:
             backend = load_drawing_backend()
         except RobocovError:
             return None
-        draw = getattr(backend, f"render_{self._drawing_name}_{form}", None)
+        draw = getattr(backend, f"render_{self._drawing_name}_{format_name}", None)
         return None if draw is None else draw(self)
 
 
@@ -160,7 +160,8 @@ def load_drawing_backend(name: str | None = None) -> DrawingBackend:
     Parameters
     ----------
     name : str or None
-        `DEFAULT_BACKEND` by default.
+        Name of the backend's entry point. By default `DEFAULT_BACKEND` or, if that is not installed, the
+        first by name.
 
     Returns
     -------

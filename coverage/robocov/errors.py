@@ -100,6 +100,7 @@ class Issue(NamedTuple):
         Parameters
         ----------
         path : tuple of str and int
+            Path of the value that is wrong or missing.
         message : str
             Description of the issue.
         at_key : bool
@@ -262,6 +263,7 @@ def quote(value: object) -> str:
     Parameters
     ----------
     value : object
+        The value to show; a failing `repr` is replaced by the name of its type.
 
     Returns
     -------
@@ -285,6 +287,7 @@ def quote_json(value: object) -> str:
     Parameters
     ----------
     value : object
+        The value to show. Parts that JSON cannot represent appear as their `repr`.
 
     Returns
     -------
@@ -314,7 +317,7 @@ def to_one_line(text: object) -> str:
 
 
 def describe_error(error: Exception) -> str:
-    """Return the reason for an error on one line, without the file name that the operating system adds.
+    """Return the message of an error on one line, without the file name that Python adds to an `OSError`.
 
     Parameters
     ----------
@@ -371,8 +374,9 @@ def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
     Parameters
     ----------
     value : object
+        The value to test.
     kind : type
-        Class from `numbers`.
+        Kind of number, such as `numbers.Integral`.
 
     Returns
     -------
@@ -396,9 +400,11 @@ def require_number(
     name : str
         Name of the parameter in the message.
     value : object
+        The value to check.
     minimum, maximum : float
         Limits of the range, inclusive.
     unit : str
+        Unit of the limits in the message.
     whole : bool
         Whether only whole numbers are accepted.
 
@@ -434,10 +440,11 @@ def to_floats(
     name : str
         Name of the parameter in the message.
     values : array_like
+        The numbers to convert.
     expected : str
         Description of the numbers in the message.
     error_type : type
-        Type of the error.
+        Class of the error to raise.
 
     Returns
     -------
@@ -473,7 +480,9 @@ def require_type(name: str, value: object, kind: type, expected: str) -> None:
     name : str
         Name of the parameter in the message.
     value : object
+        The value to check.
     kind : type
+        The required type.
     expected : str
         Description of the type in the message.
 
@@ -492,11 +501,12 @@ def _describe_mismatch(name: str, value: object, expected: str) -> str:
 
 
 def summarize_names(names: Sequence[str]) -> str:
-    """List the first three names and the number of the others.
+    """Join the first three names, and add the number of the others.
 
     Parameters
     ----------
     names : sequence of str
+        At least one name.
 
     Returns
     -------
@@ -518,8 +528,9 @@ def format_count(count: int, noun: str) -> str:
     Parameters
     ----------
     count : int
+        Number of items.
     noun : str
-        Singular; the plural ends in s.
+        Singular noun, whose plural ends in s.
 
     Returns
     -------
@@ -541,7 +552,9 @@ def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     kind : str
         Kind of the item, such as "controller".
     name : str
+        The unknown name.
     known : iterable of str
+        The known names.
 
     Returns
     -------

@@ -44,13 +44,14 @@ KINEMATICS = (POINT, UNICYCLE)
 
 
 class TeamParameter(NamedTuple):
-    """Range of one parameter of a robot, and its names in files.
+    """Range and unit of a parameter of a robot, and its name in files.
 
     Attributes
     ----------
     minimum, maximum : float
         Range of finite values.
     unit : str
+        Unit of the values, as it appears in messages.
     json_key : str
         Name in ``run.json``, with the unit.
     may_be_infinite : bool
@@ -69,7 +70,7 @@ class TeamParameter(NamedTuple):
         Parameters
         ----------
         infinity : str
-            Text for no limit.
+            Description of an infinite value.
 
         Returns
         -------
@@ -95,14 +96,14 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 """Units of the parameters."""
 
 _POINT_ROBOT_VALUES = {"track_width": DEFAULT_TRACK_WIDTH_M, "turning_rate": DEFAULT_TURNING_RATE_RAD_S}
-"""Parameters that matter only for unicycles, with their values in a team of points."""
+"""Parameters that only unicycles use, with their values for point robots."""
 
 _MISSING = "missing"
 """Used in place of a value that is missing in JSON. Like any text, it is not valid for a parameter."""
 
 
 def _build_default_column() -> Array:
-    """Return a placeholder for a column of default values, because the number of robots is not known yet."""
+    """Return an empty array, which `Team.__post_init__` replaces with the default value for each robot."""
     return np.zeros(0)
 
 
@@ -168,13 +169,13 @@ class Team:
     turning_rate: Array = field(default_factory=_build_default_column)
 
     def __post_init__(self) -> None:
-        size = np.atleast_1d(np.asarray(self.radius)).shape[0]
+        robot_count = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name in PARAMETERS:
             floats = to_floats(f"team.{name}", getattr(self, name), "a number for each robot")
             values = freeze(np.atleast_1d(floats))
             if name in _POINT_ROBOT_VALUES and len(values) == 0:
-                values = freeze(np.full(size, _POINT_ROBOT_VALUES[name]))
-            _check_column(name, values, size)
+                values = freeze(np.full(robot_count, _POINT_ROBOT_VALUES[name]))
+            _check_column(name, values, robot_count)
             object.__setattr__(self, name, values)
 
     def __reduce__(self) -> tuple[type[Team], tuple[Array, ...]]:
@@ -220,12 +221,6 @@ class Team:
         ParameterError
             If a value is out of range.
         """
-        if kinematics not in (None, *KINEMATICS):
-            raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
-        if kinematics == UNICYCLE and not track_width:
-            track_width = DEFAULT_TRACK_PER_RADIUS * radius
-        elif kinematics == POINT:
-            track_width = 0.0
         if not is_number(n, Integral) or n < 1:
             raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")
         values: dict[str, float] = {
@@ -236,7 +231,7 @@ class Team:
             "viscosity": viscosity,
             "sensing_range": sensing_range,
             "communication_range": communication_range,
-            "track_width": track_width,
+            "track_width": _choose_track_width(kinematics, track_width, radius),
             "turning_rate": turning_rate,
         }
         columns = {
@@ -251,7 +246,7 @@ class Team:
         Parameters
         ----------
         teams : sequence of Team
-            At least one.
+            The teams to join, at least one.
 
         Returns
         -------
@@ -268,7 +263,7 @@ class Team:
 
     @property
     def has_mixed_speeds(self) -> bool:
-        """Whether some robots are faster than others, so that the nearest may not arrive first."""
+        """Whether the robots differ in maximum speed, so that the nearest one may not arrive first."""
         return bool((self.max_speed != self.max_speed[0]).any())
 
     @property
@@ -282,13 +277,13 @@ class Team:
         return np.asarray(self.track_width > 0.0)
 
     def _list_relevant_parameters(self) -> list[str]:
-        """Return the parameters that matter: a team of points has neither wheels nor a turning rate."""
+        """Return the parameters that this team uses: point robots have neither wheels nor a turning rate."""
         if self.is_unicycle.any():
             return list(PARAMETERS)
         return [name for name in PARAMETERS if name not in _POINT_ROBOT_VALUES]
 
     def __getitem__(self, robots: slice | IntArray) -> Team:
-        """Return some of the robots as a team."""
+        """Return the team of the selected robots."""
         return Team(**{name: getattr(self, name)[robots] for name in PARAMETERS})
 
     def __len__(self) -> int:
@@ -310,23 +305,24 @@ class Team:
         Returns
         -------
         dict
-            None means no limit, and a value that all robots share is written once.
+            The number of robots, and for each parameter either a list with a value for each robot, or the
+            value that all robots share. An infinite range is None.
         """
-        data: dict[str, Any] = {"robots": len(self)}
+        document: dict[str, Any] = {"robots": len(self)}
         for name in self._list_relevant_parameters():
             values = [None if np.isinf(value) else float(value) for value in getattr(self, name)]
             is_shared = len(set(values)) == 1
-            data[PARAMETERS[name].json_key] = values[0] if is_shared else values
-        return data
+            document[PARAMETERS[name].json_key] = values[0] if is_shared else values
+        return document
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Team:
+    def from_dict(cls, document: Mapping[str, Any]) -> Team:
         """Build a team from the result of `to_dict`.
 
         Parameters
         ----------
-        data : mapping
-            As `to_dict` returns it.
+        document : mapping
+            JSON object in the format of `to_dict`.
 
         Returns
         -------
@@ -337,18 +333,29 @@ class Team:
         ParameterError
             If a value is missing or out of range. The message names its key.
         """
-        n = data.get("robots")
-        if not is_number(n, int) or not 1 <= n <= MAX_ROBOTS:
-            raise _build_json_error(data, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
-        columns = {name: _read_column(data, name, n) for name in PARAMETERS}
+        robot_count = document.get("robots")
+        if not is_number(robot_count, int) or not 1 <= robot_count <= MAX_ROBOTS:
+            raise _build_json_error(document, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
+        columns = {name: _read_column(document, name, robot_count) for name in PARAMETERS}
         return cls(**columns)
 
 
-def _check_column(name: str, values: Array, size: int) -> None:
+def _choose_track_width(kinematics: str | None, track_width: float, radius: float) -> float:
+    """Return the track width of robots with the given kinematics, m; None keeps `track_width`."""
+    if kinematics not in (None, *KINEMATICS):
+        raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
+    if kinematics == POINT:
+        return 0.0
+    if kinematics == UNICYCLE and not track_width:
+        return DEFAULT_TRACK_PER_RADIUS * radius
+    return track_width
+
+
+def _check_column(name: str, values: Array, robot_count: int) -> None:
     """Raise a ParameterError unless there is one value in range for each robot."""
-    if values.shape != (size,):
-        shape = quote(values.shape)
-        raise ParameterError(f"team.{name}: expected a value for each of {size} robots, got shape {shape}")
+    if values.shape != (robot_count,):
+        expected = f"a value for each of {robot_count} robots"
+        raise ParameterError(f"team.{name}: expected {expected}, got shape {quote(values.shape)}")
     parameter = PARAMETERS[name]
     is_valid = (values >= parameter.minimum) & (values <= parameter.maximum)
     if parameter.may_be_infinite:
@@ -360,15 +367,15 @@ def _check_column(name: str, values: Array, size: int) -> None:
         )
 
 
-def _read_column(data: Mapping[str, Any], name: str, n: int) -> Array:
-    """Return the values of a parameter for n robots from JSON, which contains a list or one shared value."""
+def _read_column(document: Mapping[str, Any], name: str, robot_count: int) -> Array:
+    """Return the values of a parameter, (n,). JSON contains a value for each robot, or one for all."""
     parameter = PARAMETERS[name]
-    value = data.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, _MISSING))
-    values = value if isinstance(value, list) else [value] * n
-    is_valid = len(values) == n and all(_is_valid_json(parameter, entry) for entry in values)
+    value = document.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, _MISSING))
+    values = value if isinstance(value, list) else [value] * robot_count
+    is_valid = len(values) == robot_count and all(_is_valid_json(parameter, entry) for entry in values)
     if not is_valid:
-        expected = f"{parameter.describe(infinity='null')}, or one for each of {n} robots"
-        raise _build_json_error(data, parameter.json_key, expected)
+        expected = f"{parameter.describe(infinity='null')}, or one for each of {robot_count} robots"
+        raise _build_json_error(document, parameter.json_key, expected)
     return np.array([np.inf if entry is None else entry for entry in values], dtype=float)
 
 
@@ -378,6 +385,6 @@ def _is_valid_json(parameter: TeamParameter, value: object) -> bool:
     return is_number(value) and bool(parameter.minimum <= value <= parameter.maximum)
 
 
-def _build_json_error(data: Mapping[str, Any], key: str, expected: str) -> ParameterError:
-    got = quote_json(data[key]) if key in data else "nothing"
+def _build_json_error(document: Mapping[str, Any], key: str, expected: str) -> ParameterError:
+    got = quote_json(document[key]) if key in document else "nothing"
     return ParameterError(f"team.{key}: expected {expected}, got {got}")

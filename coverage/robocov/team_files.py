@@ -37,6 +37,7 @@ TeamDefaults: TypeAlias = Mapping[str, float | str | None]
 _NO_LIMIT = "null"
 """Value for an unlimited range in TOML, which has no null."""
 _GROUP_KEYS = ["count", "kinematics", *PARAMETERS]
+"""Keys that a group may contain."""
 
 
 def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
@@ -100,7 +101,7 @@ def build_team(groups: object, path: JsonPath, defaults: TeamDefaults | None = N
     Parameters
     ----------
     groups : object
-        Expected to be a list of tables.
+        The value of the key; expected to be a list of tables, one for each group.
     path : tuple of str and int
         Path of the groups in their file; messages begin with it.
     defaults : mapping or None
@@ -134,7 +135,7 @@ def build_team(groups: object, path: JsonPath, defaults: TeamDefaults | None = N
 
 
 def _build_group(group: object, path: JsonPath, defaults: TeamDefaults) -> Team:
-    """Build the team of one group."""
+    """Build the team of one group, whose path is used in messages."""
     if not isinstance(group, dict):
         raise InputError(f"{format_path(path)}: expected a table, got {quote(group)}")
     for key in group:
@@ -177,9 +178,9 @@ def _read_value(name: str, value: object, key: str) -> float | None:
         return None
     if not is_number(value):
         raise InputError(f"{key}: expected a number, got {quote(value)}")
-    single: dict[str, Any] = {name: value}
+    parameters: dict[str, Any] = {name: value}
     try:
-        Team.homogeneous(1, **single)
+        Team.homogeneous(1, **parameters)  # Checks the range.
     except ParameterError as error:
         _, _, explanation = str(error).partition(": ")
         raise InputError(f"{key}: {explanation}") from None

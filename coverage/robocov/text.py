@@ -24,8 +24,9 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
     Parameters
     ----------
     text : str
+        Text of any origin.
     single_line : bool
-        Also escape tabs and line feeds.
+        Whether to escape tabs and line feeds as well.
 
     Returns
     -------
@@ -53,8 +54,9 @@ def remove_controls(text: str, *, single_line: bool = False) -> str:
     Parameters
     ----------
     text : str
+        Text of any origin.
     single_line : bool
-        Also remove tabs and line feeds.
+        Whether to remove tabs and line feeds as well.
 
     Returns
     -------
@@ -73,4 +75,5 @@ def remove_controls(text: str, *, single_line: bool = False) -> str:
 
 
 def _escape_match(match: re.Match[str]) -> str:
+    r"""Return the escape of a character, such as ``\x1b``."""
     return ascii(match[0])[1:-1]

@@ -112,7 +112,7 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
             terms={name: term[robots] for name, term in decision.terms.items()},
             **_select_rows(decision, ("forces", "goals"), robots),
         ),
-        None if snapshot.truth is None else snapshot.truth[robots],
+        None if snapshot.true_positions is None else snapshot.true_positions[robots],
     )
 
 

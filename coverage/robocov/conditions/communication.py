@@ -3,19 +3,20 @@
 There are two kinds of messages. Both are sent to all robots in communication range, at the rate of the
 conditions. For each receiver independently, a message is either lost or arrives after the latency.
 
-- *Positions.* Each robot sends its own estimate of its position. A robot remembers the newest position from
-  each other robot. If none arrives for `Conditions.forget_after`, it forgets that robot.
-- *Messages of the controller* (`robocov.observation.Message`): all else that robots know of each other, such
-  as maps. The controller returns them with its decision, at the end of a step; they arrive in the next step
-  at the earliest. A long message is sent in packets of at most `MAX_PACKET_BYTES`. It is lost as soon as one
-  of its packets is lost.
+- *Positions.* Each robot sends its own estimate of its position. A robot remembers the newest position that
+  it received from each other robot. If none arrives for `Conditions.forget_after`, it forgets that robot.
+- *Controller messages* (`robocov.observation.Message`) contain anything else that robots tell each other,
+  such as maps. The controller returns them with its decision, at the end of a step, and they arrive in the
+  next step at the earliest. A long message is sent in packets of at most `MAX_PACKET_BYTES`; the message is
+  lost if any of its packets is lost.
 
-The bandwidth limits the bytes per second that a robot sends. Excess messages wait in a queue at the sender,
-in order. A position does not wait in this queue: it is sent next, or replaced by a newer one. While messages
-wait, positions and messages take turns.
+The bandwidth limits the bytes per second that each robot sends, by a token bucket: a robot earns credits at
+the rate of the bandwidth, and pays with them for what it sends. Controller messages for which there are no
+credits wait in a queue at the sender, in order. A position does not wait in this queue: it is sent next, or
+replaced by a newer one. While controller messages wait, the robot sends them and its position alternately.
 
-The state of the communication is an `Inbox`: messages that have arrived, are in flight or wait. It is part
-of the state of a simulation, so a copy continues with the same messages.
+The state of the communication is an `Inbox`, which contains the messages that have arrived, are in flight or
+wait. It is part of the state of a simulation, so that a copy continues with the same messages.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ NEVER = -1
 POSITION_BYTES = 20
 """Size of a message with the number and the position of a robot."""
 MAX_PACKET_BYTES = 1400
-"""Maximum size of a packet: about that of a frame of a wireless network."""
+"""Maximum size of a packet: about the payload of a frame in a wireless network."""
 _MIN_SEND_LIMIT_BYTES = 1.0
-"""Lower limit of the bytes that a robot may send when its turn comes, so that it can send at all."""
+"""Minimum send limit of a robot whose queue is empty, so that a robot without credits can queue a message."""
 
 
 class Broadcast(NamedTuple):
-    """The messages that all robots sent in one step.
+    """The positions that all robots sent in one step.
 
     Attributes
     ----------
@@ -63,15 +64,16 @@ class Broadcast(NamedTuple):
 
 
 class Transmission(NamedTuple):
-    """A message of a controller in flight.
+    """A controller message in flight.
 
     Attributes
     ----------
     arrival_step : int
-        Number of the step, from time zero, in which it arrives.
+        Number of the step, from time zero, in which the message arrives.
     message : ReceivedMessage
+        The message as its receivers will see it.
     is_received : (n,) bool array
-        Whether each robot receives it.
+        Whether each robot receives the message.
     """
 
     arrival_step: int
@@ -81,14 +83,14 @@ class Transmission(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outbox:
-    """Messages that wait at the senders because the bandwidth is limited. Immutable.
+    """Controller messages that wait at the senders because the bandwidth or the rate is limited. Immutable.
 
     Attributes
     ----------
     queues : tuple of tuple of Message
-        The messages of each robot that wait, in order.
+        The waiting messages of each robot, in order.
     credits : (n,) array, bytes
-        Bytes that each robot may send now; negative after a message that was larger.
+        Bytes that each robot may send now; negative after a message that was larger than the credits.
     sent_position : (n,) bool array
         Whether the last transmission of each robot was its position.
     """
@@ -98,19 +100,23 @@ class Outbox:
     sent_position: BoolArray
 
     @classmethod
-    def create_empty(cls, count: int) -> Outbox:
+    def create_empty(cls, robot_count: int) -> Outbox:
         """Create the outbox of robots that have not sent any message.
 
         Parameters
         ----------
-        count : int
+        robot_count : int
             Number of robots n.
 
         Returns
         -------
         Outbox
         """
-        return cls(queues=((),) * count, credits=np.zeros(count), sent_position=np.zeros(count, dtype=bool))
+        return cls(
+            queues=((),) * robot_count,
+            credits=np.zeros(robot_count),
+            sent_position=np.zeros(robot_count, dtype=bool),
+        )
 
     def append(self, messages: Sequence[Sequence[Message]], working: BoolArray) -> Outbox:
         """Return the outbox with new messages at the ends of the queues.
@@ -120,7 +126,7 @@ class Outbox:
         messages : sequence of sequence of Message
             New messages of each robot; empty if there are none.
         working : (n,) bool array
-            Mask of the robots that work. The queues of the others are emptied.
+            Mask of the robots that work. The queues of the other robots are emptied.
 
         Returns
         -------
@@ -137,21 +143,21 @@ class Outbox:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inbox:
-    """Messages received, messages in flight and messages that wait. Immutable; replaced in each step.
+    """Messages that were received, are in flight or wait to be sent. Immutable; replaced in each step.
 
     Attributes
     ----------
     sent_steps, arrival_steps : (n, n) int array
-        Numbers of the steps in which the newest message from the column's robot to the row's robot was sent
-        and arrived; `NEVER` if there is none.
+        Numbers of the steps in which the newest position that the row's robot has received from the column's
+        robot was sent and arrived; `NEVER` if it has received none.
     positions : (n, n, 2) array, m
-        Positions in these messages.
+        These newest positions, by receiver and sender.
     in_flight : tuple of Broadcast
-        Positions, in the order in which they arrive.
+        Positions in flight, in the order in which they arrive.
     transmissions : tuple of Transmission
-        Messages of the controller, in the order in which they arrive.
+        Controller messages in flight, in the order in which they arrive.
     outbox : Outbox
-        Messages of the controller that wait.
+        Controller messages that wait to be sent.
     """
 
     sent_steps: IntArray
@@ -162,44 +168,44 @@ class Inbox:
     outbox: Outbox
 
     @classmethod
-    def create_empty(cls, count: int) -> Inbox:
+    def create_empty(cls, robot_count: int) -> Inbox:
         """Create the inbox of robots that have not received any message.
 
         Parameters
         ----------
-        count : int
+        robot_count : int
             Number of robots n.
 
         Returns
         -------
         Inbox
         """
-        never = np.full((count, count), NEVER, dtype=np.intp)
+        never = np.full((robot_count, robot_count), NEVER, dtype=np.intp)
         return cls(
             sent_steps=never,
             arrival_steps=never.copy(),
-            positions=np.zeros((count, count, 2)),
+            positions=np.zeros((robot_count, robot_count, 2)),
             in_flight=(),
             transmissions=(),
-            outbox=Outbox.create_empty(count),
+            outbox=Outbox.create_empty(robot_count),
         )
 
     @property
     def has_messages(self) -> bool:
-        """Whether messages of the controller are in flight or wait."""
+        """Whether controller messages are in flight or wait to be sent."""
         return bool(self.transmissions) or any(self.outbox.queues)
 
     def drop_messages(self) -> Inbox:
-        """Return the inbox without the messages of the controller, which another one would not understand."""
+        """Return the inbox without controller messages, for a controller that would not understand them."""
         if not self.has_messages:
             return self
         outbox = Outbox.create_empty(len(self.positions))
         return replace(self, transmissions=(), outbox=outbox)
 
     def select_robots(self, rows: IntArray) -> Inbox:
-        """Return the inbox of a team of m robots, some of this team and some new.
+        """Return the inbox of another team of m robots, some of which are robots of this team.
 
-        Messages of the controller are dropped, because its memory is that of this team.
+        Controller messages are dropped, because the memory of a controller belongs to a whole team.
 
         Parameters
         ----------
@@ -210,8 +216,8 @@ class Inbox:
         -------
         Inbox
         """
-        # A pair is new if either of its robots is; no message has been sent between the two. The row of a new
-        # robot in this team does not matter.
+        # A pair is new if one of its robots is new. No message has been sent between the two. Any row of this
+        # team can stand for a new robot, because its values are then replaced.
         is_new = np.asarray(rows) < 0
         is_new_pair = is_new[:, None] | is_new
         old_rows = np.maximum(rows, 0)
@@ -239,6 +245,7 @@ class Radio:
     Parameters
     ----------
     conditions : Conditions
+        Loss, latency, rate and bandwidth of messages.
     ranges : (n,) array, m
         Communication ranges of the robots.
     dt : float, s
@@ -258,7 +265,7 @@ class Radio:
     def exchange_positions(
         self, inbox: Inbox, step: int, reported_positions: Array, true_positions: Array, working: BoolArray
     ) -> Inbox:
-        """Send and deliver the positions of one step.
+        """Send the positions of the robots, and deliver the positions that arrive in this step.
 
         Parameters
         ----------
@@ -276,11 +283,12 @@ class Radio:
         Returns
         -------
         Inbox
+            Messages after the positions were exchanged.
         """
         if self._is_sending(step):
             is_received = self._find_receivers(step, true_positions, working)
             if self._period_bytes is not None:
-                inbox, is_sender = self._pay_for_positions(inbox)
+                inbox, is_sender = self._allocate_bandwidth_to_positions(inbox)
                 is_received &= is_sender
             broadcast = Broadcast(
                 sent_step=step,
@@ -293,8 +301,8 @@ class Radio:
 
     @staticmethod
     def _deliver_positions(inbox: Inbox, step: int) -> Inbox:
-        """Return the inbox after the positions that are due in a step have arrived."""
-        # Messages are in flight in the order in which they arrive, so those that are due come first.
+        """Return the inbox after the positions that arrive in a step were delivered."""
+        # Messages in flight are in the order of their arrival, so those that are due come first.
         due = [broadcast for broadcast in inbox.in_flight if broadcast.arrival_step <= step]
         if len(due) == 0:
             return inbox
@@ -317,43 +325,48 @@ class Radio:
     def receive_messages(
         self, inbox: Inbox | None, step: int, observations: Observations
     ) -> tuple[Inbox | None, Observations]:
-        """Deliver the messages of the controller that arrive in a step.
+        """Deliver the controller messages that arrive in a step.
 
         Parameters
         ----------
         inbox : Inbox or None
-            After the positions of the step were exchanged; None if nothing is in flight and nothing waits.
+            Messages after the positions of the step were exchanged. None if no message is in flight or waits.
         step : int
             Index of the step, from 0 at time zero.
         observations : Observations
+            Observations of the step without controller messages.
 
         Returns
         -------
         inbox : Inbox or None
-            The same without these messages. None if it is empty and communication is ideal.
+            The inbox without the delivered messages. None if no message is in flight or waits, and
+            communication is ideal.
         observations : Observations
-            The same with these messages, and with the size of those that the robots can send.
+            The observations with the delivered messages and the send limits.
         """
-        limits = self._compute_send_limits(inbox, step, len(observations.positions))
+        send_limits = self._compute_send_limits(inbox, step, len(observations.positions))
         due = []
         if inbox is not None:
-            due = [message for message in inbox.transmissions if message.arrival_step <= step]
+            due = [transmission for transmission in inbox.transmissions if transmission.arrival_step <= step]
             inbox = replace(inbox, transmissions=inbox.transmissions[len(due) :])
             if not (inbox.has_messages or self._conditions.uses_messages):
                 inbox = None
-        if not due and limits is None:
+        if not due and send_limits is None:
             return inbox, observations
         received: list[list[ReceivedMessage]] = [[] for _ in observations.positions]
         for transmission in due:
             for robot in np.flatnonzero(transmission.is_received).tolist():
                 received[robot].append(transmission.message)
         messages = tuple(map(tuple, received)) if due else ()
-        return inbox, replace(observations, messages=messages, send_limits=limits)
+        return inbox, replace(observations, messages=messages, send_limits=send_limits)
 
-    def _compute_send_limits(self, inbox: Inbox | None, step: int, count: int) -> Array | None:
-        """Compute the size of the messages that each of n robots can send in a step, (n,) bytes or None."""
+    def _compute_send_limits(self, inbox: Inbox | None, step: int, robot_count: int) -> Array | None:
+        """Compute the total size of the messages that each robot can send in a step, (n,) bytes.
+
+        None means unlimited.
+        """
         if not self._is_sending(step):
-            return np.zeros(count)
+            return np.zeros(robot_count)
         if self._period_bytes is None or inbox is None:
             return None
         is_waiting = np.array([len(queue) > 0 for queue in inbox.outbox.queues])
@@ -368,16 +381,17 @@ class Radio:
         true_positions: Array,
         working: BoolArray,
     ) -> tuple[Inbox | None, int]:
-        """Send messages of a controller at the end of a step, as far as the conditions allow.
+        """Send controller messages at the end of a step, as far as the conditions allow.
 
         Parameters
         ----------
         inbox : Inbox or None
-            Messages after the observations of the step; None if no message is in flight or queued.
+            Messages after the observations of the step; None if no message is in flight or waits.
         step : int
             Index of the step, from 0 at time zero.
         messages : sequence of sequence of Message
-            New messages of each robot; empty if there are none. Robots that do not work send nothing.
+            New messages of each robot; empty if there are none. Messages of robots that do not work are
+            dropped.
         true_positions : (n, 2) array, m
             True positions, which determine which robots are in range.
         working : (n,) bool array
@@ -386,9 +400,9 @@ class Radio:
         Returns
         -------
         inbox : Inbox or None
-            None if it was None, and no messages were sent.
+            Messages after the step. None if it was None, and there are no new messages.
         sent_bytes : int
-            Size of the messages that were sent in this step.
+            Total size of the messages that were sent in this step, without those that wait.
         """
         if inbox is None and not any(messages):
             return None, 0
@@ -410,15 +424,16 @@ class Radio:
         inbox = replace(inbox, transmissions=(*inbox.transmissions, *transmissions), outbox=outbox)
         return inbox, sent_bytes
 
-    def _pay_for_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
+    def _allocate_bandwidth_to_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
         """Add the bytes of one sending period to the credits, and subtract the positions that are sent.
 
-        A robot cannot save more than the bytes of one period. It does not send its position if that was what
-        it sent last and messages wait, because the two take turns.
+        The credits of a robot never exceed the bytes of one period. A robot whose last transmission was its
+        position does not send it again while messages wait.
 
         Returns
         -------
         inbox : Inbox
+            The inbox with the new credits.
         is_sender : (n,) bool array
             Mask of the robots that send their positions now.
         """
@@ -432,7 +447,15 @@ class Radio:
         return replace(inbox, outbox=Outbox(outbox.queues, available, sent_position)), is_sender
 
     def _take_from_queues(self, outbox: Outbox) -> tuple[Outbox, list[tuple[Message, ...]]]:
-        """Take the messages that leave now from the queues, in order."""
+        """Remove the messages that are sent now from the queues.
+
+        Returns
+        -------
+        outbox : Outbox
+            The outbox without these messages.
+        departing : list of tuple of Message
+            The removed messages of each robot, in order.
+        """
         if self._period_bytes is None:
             return replace(outbox, queues=((),) * len(outbox.queues)), list(outbox.queues)
         available = outbox.credits.copy()
@@ -440,7 +463,7 @@ class Radio:
         queues = []
         departing = []
         for robot, queue in enumerate(outbox.queues):
-            # A message is sent as soon as there is any credit, which it may overdraw.
+            # A message is sent as soon as there are any credits, which it may overdraw.
             count = 0
             while count < len(queue) and available[robot] > 0.0:
                 available[robot] -= queue[count].size
@@ -454,10 +477,11 @@ class Radio:
     def _transmit(
         self, sender: int, messages: Sequence[Message], step: int, is_linked: BoolArray
     ) -> list[Transmission]:
-        """Send the messages of one robot; `is_linked`, (n,) bool, is the mask of the robots in range."""
+        """Send the messages of one robot to the robots in range, whose mask is `is_linked`, (n,) bool."""
         arrival_step = step + max(1, self._latency_steps)
         is_received = np.broadcast_to(is_linked, (len(messages), len(is_linked)))
         if self._conditions.loss:
+            # A message arrives only if all of its packets arrive.
             packet_counts = np.array([math.ceil(message.size / MAX_PACKET_BYTES) for message in messages])
             arrival_probabilities = (1.0 - self._conditions.loss) ** packet_counts
             rng = create_generator(self._conditions.seed, MESSAGE_LOSS_STREAM, step, sender)
@@ -468,11 +492,12 @@ class Radio:
         ]
 
     def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbors, Array, Array]:
-        """Read the newest message that each working robot has from every robot that it has not forgotten.
+        """Return the newest positions that working robots have received and have not forgotten.
 
         Parameters
         ----------
         inbox : Inbox
+            Messages after the positions of the step were exchanged.
         step : int
             Index of the step, from 0 at time zero.
         working : (n,) bool array
@@ -481,11 +506,11 @@ class Radio:
         Returns
         -------
         neighbors : Neighbors
-            The robots from which each robot has such a message.
+            The graph that links each robot to the robots whose positions it knows.
         positions : (m, 2) array, m
-            Positions in the messages, in the order of ``neighbors.indices``.
+            The known positions, in the order of ``neighbors.indices``.
         ages : (m,) array, s
-            Times since the messages were sent.
+            Times since these positions were sent.
         """
         silence = (step - inbox.arrival_steps) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
@@ -495,7 +520,7 @@ class Radio:
         return neighbors, inbox.positions[robot, neighbor], np.asarray(ages)
 
     def _is_sending(self, step: int) -> bool:
-        """Return whether messages are sent in a step: at time zero, and whenever a period has passed."""
+        """Return whether messages are sent in a step: at time zero, and once in each period of the rate."""
         rate = self._conditions.message_rate
         if rate is None:
             return True
@@ -505,7 +530,7 @@ class Radio:
         return periods > previous_periods
 
     def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
-        """Find the receivers of each robot's message, an (n, n) mask of receivers by senders."""
+        """Find the receivers of each robot's position, as an (n, n) mask of receivers by senders."""
         links = Neighbors.from_ranges(positions, self._ranges).restrict_to_working(working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)

@@ -20,15 +20,18 @@ TIME_TOLERANCE_S = 1e-9
 
 
 class ConditionParameter(NamedTuple):
-    """Range of a condition that is a number, and its name in files.
+    """Range and unit of a condition that is a number, and its name in files.
 
     Attributes
     ----------
     minimum, maximum : float
+        Range of values.
     unit : str
+        Unit of the values, as it appears in messages; empty for numbers without unit.
     json_key : str
         Name in ``run.json``, with the unit.
     may_be_null : bool
+        Whether the value may be None, which means no limit.
     """
 
     minimum: float
@@ -48,18 +51,18 @@ PARAMETERS: dict[str, ConditionParameter] = {
     "sensing_noise": ConditionParameter(0.0, 1e3, "m", "sensing_noise_m"),
     "failure_rate": ConditionParameter(0.0, 1e3, "1/s", "failure_rate_per_s"),
 }
-"""The conditions that are numbers."""
+"""The conditions that are numbers, by name."""
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 """Units of the conditions that are numbers."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Imperfections and changes during a run, with the seed of its random numbers.
+    """Imperfections and changes during a run, with the seed of their random numbers.
 
-    Communication is ideal unless there is message loss, delay, a message rate, a bandwidth or localization
-    noise. With
-    ideal communication, the others forget a robot as soon as it fails, otherwise after `forget_after`.
+    Communication is ideal unless there is message loss, a delay, a message rate, a bandwidth or localization
+    noise. When a robot fails, the others forget it at once if communication is ideal, and otherwise after
+    `forget_after`.
 
     Attributes
     ----------
@@ -72,18 +75,19 @@ class Conditions:
     bandwidth : float or None, B/s
         Bytes per second that each robot can send. Messages beyond that wait in a queue. None: unlimited.
     forget_after : float, s
-        Time without messages after which a robot is no longer assumed to be at its last reported position.
+        Time without a message from a robot after which the others forget its position.
     position_noise : float, m
         Standard deviation of the localization noise in x and in y, white over the control steps. A robot acts
         on the noisy position and broadcasts it; the physics continues from the true one.
     sensing_noise : float, m
         Standard deviation of the noise of the range sensor.
     failure_rate : float, 1/s
-        Failures per second of each working robot. Lifetimes are exponentially distributed.
+        Rate of random failures of each working robot. Lifetimes are exponentially distributed.
     failures : tuple of Failure
-        At most one per robot; also accepted as ``(robot, time)``.
+        Robots that fail at a given time, at most once each; also accepted as ``(robot, time)``.
     joins : tuple of Join
-        At most one per robot; also accepted as ``(robot, time)`` or ``(robot, time, place)``.
+        Robots that join during the run, at most once each; also accepted as ``(robot, time)`` or
+        ``(robot, time, position)``.
     seed : int
         Seed of the random numbers.
 
@@ -179,13 +183,13 @@ class Conditions:
         remaining = replace(self, failure_rate=0.0, failures=(), joins=())
         return None if remaining.is_ideal else remaining
 
-    def check_team(self, count: int) -> None:
-        """Check that the events are possible for a team.
+    def check_team(self, robot_count: int) -> None:
+        """Check that the failures and joins are possible in a team.
 
         Parameters
         ----------
-        count : int
-            Number of robots.
+        robot_count : int
+            Number of robots of the team.
 
         Raises
         ------
@@ -198,21 +202,21 @@ class Conditions:
         }
         for name, robots in robots_by_event.items():
             for k, robot in enumerate(robots):
-                if robot > count:
+                if robot > robot_count:
                     raise ParameterError(
-                        f"conditions.{name}[{k}]: expected a robot from 1 to {count}, got robot {robot}"
+                        f"conditions.{name}[{k}]: expected a robot from 1 to {robot_count}, got robot {robot}"
                     )
-        if len(self.joins) == count and min(join.time for join in self.joins) > 0.0:
+        if len(self.joins) == robot_count and min(join.time for join in self.joins) > 0.0:
             raise ParameterError(
                 "conditions.joins: expected at least one robot from the start, got all robots joining later"
             )
 
-    def compute_working_periods(self, count: int) -> tuple[Array, Array]:
+    def compute_working_periods(self, robot_count: int) -> tuple[Array, Array]:
         """Compute the times at which each robot starts and stops working.
 
         Parameters
         ----------
-        count : int
+        robot_count : int
             Number of robots n.
 
         Returns
@@ -221,63 +225,69 @@ class Conditions:
             `starts` is -inf for robots that are present from the start; `stops` is inf for robots that do not
             fail.
         """
-        starts = np.full(count, -np.inf)
-        stops = np.full(count, np.inf)
+        starts = np.full(robot_count, -np.inf)
+        stops = np.full(robot_count, np.inf)
         for join in self.joins:
             starts[join.robot - 1] = join.time
         if self.failure_rate:
             rng = create_generator(self.seed, FAILURE_STREAM)
-            stops = np.maximum(starts, 0.0) + rng.exponential(1.0 / self.failure_rate, size=count)
+            stops = np.maximum(starts, 0.0) + rng.exponential(1.0 / self.failure_rate, size=robot_count)
         for failure in self.failures:
             stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
         return starts, stops
 
-    def find_working(self, time: float | Array, count: int) -> BoolArray:
+    def find_working(self, time: float | Array, robot_count: int) -> BoolArray:
         """Find the robots that are present and have not failed.
 
         Parameters
         ----------
-        time : float or (...) array, s
-        count : int
+        time : float or (k,) array, s
+            Simulation time, or several.
+        robot_count : int
             Number of robots n.
 
         Returns
         -------
-        (..., n) bool array
+        (n,) or (k, n) bool array
+            Mask of the robots, at each time.
         """
-        return self.find_present(time, count) & ~self.find_failed(time, count)
+        return self.find_present(time, robot_count) & ~self.find_failed(time, robot_count)
 
-    def find_failed(self, time: float | Array, count: int) -> BoolArray:
+    def find_failed(self, time: float | Array, robot_count: int) -> BoolArray:
         """Find the robots that have failed.
 
         Parameters
         ----------
         time : float or (k,) array, s
-        count : int
+            Simulation time, or several.
+        robot_count : int
             Number of robots n.
 
         Returns
         -------
         (n,) or (k, n) bool array
+            Mask of the robots, at each time.
         """
-        _, stops = self.compute_working_periods(count)
+        _, stops = self.compute_working_periods(robot_count)
         # The last axis is that of the robots.
         return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
-    def find_present(self, time: float | Array, count: int) -> BoolArray:
-        """Find the robots that are present, working or failed.
+    def find_present(self, time: float | Array, robot_count: int) -> BoolArray:
+        """Find the robots that have joined the team, including those that have failed since.
 
         Parameters
         ----------
         time : float or (k,) array, s
-        count : int
+            Simulation time, or several.
+        robot_count : int
             Number of robots n.
 
         Returns
         -------
         (n,) or (k, n) bool array
+            Mask of the robots, at each time.
         """
-        starts, _ = self.compute_working_periods(count)
+        starts, _ = self.compute_working_periods(robot_count)
         # The last axis is that of the robots.
         return np.asarray(starts <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
@@ -288,32 +298,32 @@ class Conditions:
         -------
         dict
         """
-        data: dict[str, Any] = {
+        document: dict[str, Any] = {
             parameter.json_key: getattr(self, name) for name, parameter in PARAMETERS.items()
         }
         if self.bandwidth is None:
-            # Files from before there was a bandwidth stay the same when they are written again.
-            del data[PARAMETERS["bandwidth"].json_key]
-        data["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
-        data["joins"] = [
+            # Files that were written before there was a bandwidth stay the same when they are written again.
+            del document[PARAMETERS["bandwidth"].json_key]
+        document["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
+        document["joins"] = [
             {
                 "robot": join.robot,
                 "time_s": join.time,
-                "place_m": None if join.place is None else list(join.place),
+                "place_m": None if join.position is None else list(join.position),
             }
             for join in self.joins
         ]
-        data["seed"] = int(self.seed)
-        return data
+        document["seed"] = int(self.seed)
+        return document
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Conditions:
+    def from_dict(cls, document: Mapping[str, Any]) -> Conditions:
         """Build conditions from the result of `to_dict`.
 
         Parameters
         ----------
-        data : mapping
-            In the format of `to_dict`.
+        document : mapping
+            JSON object in the format of `to_dict`.
 
         Returns
         -------
@@ -326,12 +336,12 @@ class Conditions:
         """
         try:
             # Files of earlier versions have no bandwidth.
-            data = {PARAMETERS["bandwidth"].json_key: None, **data}
-            numbers = {name: data[parameter.json_key] for name, parameter in PARAMETERS.items()}
-            failures = [(failure["robot"], failure["time_s"]) for failure in data["failures"]]
-            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in data["joins"]]
+            document = {PARAMETERS["bandwidth"].json_key: None, **document}
+            numbers = {name: document[parameter.json_key] for name, parameter in PARAMETERS.items()}
+            failures = [(failure["robot"], failure["time_s"]) for failure in document["failures"]]
+            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in document["joins"]]
             arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
-            return cls(**arguments, seed=data["seed"])
+            return cls(**arguments, seed=document["seed"])
         except (KeyError, TypeError) as error:
             raise ParameterError(f"conditions: cannot be read ({error!r})") from error
 

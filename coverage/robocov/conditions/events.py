@@ -57,9 +57,9 @@ class Join(NamedTuple):
         Number of the robot, from 1.
     time : float, s
         Simulation time of the arrival.
-    place : (x, y) or None, m
-        Requested position; the robot joins at the nearest one where it fits. By default, the
-        position at which it would have started.
+    position : (x, y) or None, m
+        Requested position. The robot joins at the nearest position that is free. By default, the position at
+        which it would have started.
 
     See Also
     --------
@@ -69,19 +69,19 @@ class Join(NamedTuple):
     Examples
     --------
     >>> import robocov as rc
-    >>> conditions = rc.Conditions(joins=(rc.Join(robot=3, time=5.0, place=(2.0, 1.0)),))
+    >>> conditions = rc.Conditions(joins=(rc.Join(robot=3, time=5.0, position=(2.0, 1.0)),))
     >>> conditions.find_working(4.0, 3)
     array([ True,  True, False])
     """
 
     robot: int
     time: float
-    place: tuple[float, float] | None = None
+    position: tuple[float, float] | None = None
 
     def __str__(self) -> str:
-        if self.place is None:
+        if self.position is None:
             return f"{self.robot}@{self.time:g}"
-        x, y = self.place
+        x, y = self.position
         return f"{self.robot}@{self.time:g}:{x:g},{y:g}"
 
 
@@ -93,19 +93,20 @@ class JoinedRobot(NamedTuple):
     robot : int
         Number of the robot, from 1.
     time : float, s
-    place, requested : (x, y), m
+        Simulation time at which it joined.
+    position, requested_position : (x, y), m
         Position at which it joined, and the position that was requested.
     """
 
     robot: int
     time: float
-    place: tuple[float, float]
-    requested: tuple[float, float]
+    position: tuple[float, float]
+    requested_position: tuple[float, float]
 
     @property
     def offset(self) -> float:
         """Distance from the requested position, m; above 0 if a wall or another robot was too close to it."""
-        return math.dist(self.place, self.requested)
+        return math.dist(self.position, self.requested_position)
 
 
 Event = TypeVar("Event", bound=Failure | Join)
@@ -118,6 +119,7 @@ def parse_event(kind: type[Event], text: str) -> Event:
     Parameters
     ----------
     kind : Failure or Join
+        The class of the event.
     text : str
         ``3@20`` for robot 3 after 20 s; a join may have a position, as in ``5@30:2.5,1``.
 
@@ -141,8 +143,8 @@ def parse_event(kind: type[Event], text: str) -> Event:
         raise ParameterError(f"expected {form}, got {quote(text)}")
     robot = int(match[1])
     time = float(match[2])
-    optional_place = [] if match[3] is None else [(float(match[3]), float(match[4]))]
-    return kind(robot, time, *optional_place)
+    optional_position = [] if match[3] is None else [(float(match[3]), float(match[4]))]
+    return kind(robot, time, *optional_position)
 
 
 def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[Event, ...]:
@@ -153,7 +155,9 @@ def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[E
     name : str
         "failures" or "joins", used in error messages.
     kind : Failure or Join
-    values : iterable of (robot, time) or (robot, time, place)
+        The class of the events.
+    values : iterable of (robot, time) or (robot, time, position)
+        The values of each event, as a tuple or list.
 
     Returns
     -------
@@ -176,23 +180,26 @@ def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[E
 
 
 def _build_event(path: str, kind: type[Event], value: Any) -> Event:
-    """Build a failure or a join from a tuple."""
+    """Build a failure or a join from a tuple, and check its values. Messages begin with the path."""
     try:
-        robot, time, *optional_place = value
-        kind(robot, time, *optional_place)  # Fails if there are too many values.
+        robot, time, *optional_position = value
+        kind(robot, time, *optional_position)  # Fails if there are too many values.
     except (TypeError, ValueError):
         raise ParameterError(f"{path}: expected a robot and a time, got {quote(value)}") from None
     if not is_number(robot, Integral) or robot < 1:
         raise ParameterError(f"{path}: expected the number of a robot, from 1, got {quote(robot)}")
     if not is_number(time) or not 0.0 <= time <= MAX_TIME_S:
         raise ParameterError(f"{path}: expected a time from 0 to {MAX_TIME_S:g} s, got {quote(time)}")
-    optional_place = [None if place is None else _build_place(path, place) for place in optional_place]
-    return kind(int(robot), float(time), *optional_place)
+    checked_position = [
+        None if position is None else _check_position(path, position) for position in optional_position
+    ]
+    return kind(int(robot), float(time), *checked_position)
 
 
-def _build_place(path: str, value: Any) -> tuple[float, float]:
+def _check_position(path: str, value: Any) -> tuple[float, float]:
+    """Return x and y of a position, or raise a ParameterError unless they are finite numbers."""
     with suppress(TypeError, ValueError):
         x, y = value
         if all(is_number(coordinate) and math.isfinite(coordinate) for coordinate in (x, y)):
             return float(x), float(y)
-    raise ParameterError(f"{path}: expected a place [x, y] in meters, got {quote(value)}")
+    raise ParameterError(f"{path}: expected a position [x, y] in meters, got {quote(value)}")

@@ -1,4 +1,4 @@
-"""Imperfect perception: noisy observations, and messages in place of ideal communication."""
+"""Imperfect perception: noisy observations, and positions known only from messages."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from robocov.observation import Decision, Observations, Scans
 from robocov.team import Team
 
 MIN_MEASURED_DISTANCE_M = 1e-3
-"""Shortest distance that a noisy range sensor measures."""
+"""Minimum distance that a noisy range sensor measures."""
 
 
 class Perception:
-    """Turns the true state into the observations of the robots. Only robot i knows row i.
+    """Computes the observations of robots under given conditions. Only robot i knows row i.
 
     Parameters
     ----------
     conditions : Conditions
+        The noise of the sensors, and the limits of the communication.
     team : Team
-        n robots.
+        The n robots.
     dt : float, s
         Control period.
     """
@@ -37,7 +38,7 @@ class Perception:
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
         self._conditions = conditions
         self._dt = dt
-        self._count = len(team)
+        self._robot_count = len(team)
         self._radio = Radio(conditions, team.communication_range, dt)
 
     def create_inbox(self) -> Inbox | None:
@@ -48,17 +49,17 @@ class Perception:
         Inbox or None
             None if communication is ideal.
         """
-        return Inbox.create_empty(self._count) if self._conditions.uses_messages else None
+        return Inbox.create_empty(self._robot_count) if self._conditions.uses_messages else None
 
     def perceive(
-        self, truth: Observations, inbox: Inbox | None, working: BoolArray
+        self, ideal: Observations, inbox: Inbox | None, working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
         """Compute the observations of the robots in a step.
 
         Parameters
         ----------
-        truth : Observations
-            Observations under ideal conditions.
+        ideal : Observations
+            The observations under ideal conditions, which contain the true positions.
         inbox : Inbox or None
             Messages before the step; None if communication is ideal and no messages are in flight.
         working : (n,) bool array
@@ -67,25 +68,26 @@ class Perception:
         Returns
         -------
         observations : Observations
+            The observations under the conditions.
         inbox : Inbox or None
             Messages after the positions of the step were exchanged.
         """
-        step = round(truth.time / self._dt)
-        positions = self._add_position_noise(step, truth.positions)
-        obstacle_points = self._add_sensing_noise(step, truth, positions)
+        step = round(ideal.time / self._dt)
+        positions = self._add_position_noise(step, ideal.positions)
+        obstacle_points = self._add_sensing_noise(step, ideal, positions)
         if not working.all():
             obstacle_points = np.where(working[:, None], obstacle_points, np.nan)
         obstacle_points.setflags(write=False)
         observations = replace(
-            truth,
+            ideal,
             positions=positions,
             obstacle_points=obstacle_points,
-            scans=self._add_scanning_noise(step, truth.scans),
+            scans=self._add_scanning_noise(step, ideal.scans),
         )
         if inbox is None or not self._conditions.uses_messages:
-            neighbors = truth.neighbors.restrict_to_working(working)
+            neighbors = ideal.neighbors.restrict_to_working(working)
             return replace(observations, neighbors=neighbors), inbox
-        inbox = self._radio.exchange_positions(inbox, step, positions, truth.positions, working)
+        inbox = self._radio.exchange_positions(inbox, step, positions, ideal.positions, working)
         neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, working)
         observations = replace(
             observations,
@@ -105,25 +107,29 @@ class Perception:
         noisy.setflags(write=False)
         return np.asarray(noisy)
 
-    def _add_sensing_noise(self, step: int, truth: Observations, positions: Array) -> Array:
-        """Return the measured obstacle points, (n, 2) m; the robots think that they are at `positions`."""
+    def _add_sensing_noise(self, step: int, ideal: Observations, positions: Array) -> Array:
+        """Return the measured obstacle points, (n, 2) m.
+
+        A robot measures the distance and direction of the point, and adds them to the estimate of its own
+        position in `positions`.
+        """
         sigma = self._conditions.sensing_noise
-        if not sigma and positions is truth.positions:
-            return truth.obstacle_points
-        offset = truth.obstacle_points - truth.positions
+        if not sigma and positions is ideal.positions:
+            return ideal.obstacle_points
+        offset = ideal.obstacle_points - ideal.positions
         if sigma:
-            distance = compute_point_distances(truth.obstacle_points, truth.positions)
+            distance = compute_point_distances(ideal.obstacle_points, ideal.positions)
             rng = create_generator(self._conditions.seed, SENSING_STREAM, step)
-            noise = rng.normal(scale=sigma, size=self._count)
+            noise = rng.normal(scale=sigma, size=self._robot_count)
             measured = np.maximum(distance + noise, MIN_MEASURED_DISTANCE_M)
-            # The direction to a point at distance zero is undefined: it stays where it is.
+            # A point at distance zero has no direction in which to move it, and stays where it is.
             has_direction = distance > 0.0
             divisor = np.where(has_direction, distance, 1.0)
             offset *= np.where(has_direction, measured / divisor, 1.0)[:, None]
         return np.asarray(positions + offset)
 
     def _add_scanning_noise(self, step: int, scans: Scans | None) -> Scans | None:
-        """Return the scans as measured. A ray that meets no obstacle is measured without noise."""
+        """Return the scans with noise on the rays that meet an obstacle."""
         sigma = self._conditions.sensing_noise
         if scans is None or not sigma:
             return scans
@@ -135,18 +141,20 @@ class Perception:
         return replace(scans, distances=distances)
 
 
-def ignore_idle_robots(decision: Decision, working: BoolArray) -> Decision:
-    """Remove the forces and goals of robots that do not work from a decision.
+def restrict_decision_to_working(decision: Decision, working: BoolArray) -> Decision:
+    """Return a decision without the forces and goals of robots that have failed or have not joined yet.
 
     Parameters
     ----------
     decision : Decision
+        The decision of the controller, for all robots.
     working : (n,) bool array
+        Mask of the robots that work.
 
     Returns
     -------
     Decision
-        The same object if all robots work.
+        The forces of the other robots are 0, and their goals nan. The same object if all robots work.
     """
     if working.all():
         return decision

@@ -1,13 +1,13 @@
 """Random numbers that depend only on a seed, a stream and a step.
 
 A generator with a state would have to be copied, rewound and branched together with a run. Here, each step of
-each stream has its own generator, so a step draws the same numbers whenever it is computed.
+each stream has its own generator, so that a step has the same random numbers whenever it is computed.
 """
 
 import numpy as np
 
 LOSS_STREAM = 0
-"""Stream of the loss of messages."""
+"""Stream of the loss of messages with positions."""
 POSITION_STREAM = 1
 """Stream of the noise of localization."""
 SENSING_STREAM = 2
@@ -17,7 +17,7 @@ SCANNING_STREAM = 3
 FAILURE_STREAM = 4
 """Stream of the times of failures."""
 MESSAGE_LOSS_STREAM = 5
-"""Stream of the loss of the messages of controllers."""
+"""Stream of the loss of controller messages."""
 
 
 def create_generator(seed: int, stream: int, step: int = 0, robot: int | None = None) -> np.random.Generator:
@@ -26,7 +26,7 @@ def create_generator(seed: int, stream: int, step: int = 0, robot: int | None = 
     Parameters
     ----------
     seed : int
-        From 0.
+        Seed of the run, at least 0.
     stream : int
         Number of the stream, such as `LOSS_STREAM`.
     step : int

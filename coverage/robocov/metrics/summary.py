@@ -76,8 +76,8 @@ def _describe_moved_joins(record: Record) -> list[str]:
     notes = []
     for joined in record.joined:
         if joined.offset >= MIN_REPORTED_OFFSET_M:
-            position = _format_point(joined.place)
-            requested = _format_point(joined.requested)
+            position = _format_point(joined.position)
+            requested = _format_point(joined.requested_position)
             notes.append(
                 f"Robot {joined.robot} joined at {joined.time:.4g} s at {position}, "
                 f"{joined.offset:.2g} m from {requested}, which is too close to a wall or another robot."

@@ -1,4 +1,4 @@
-"""Square bins: the points close to a given one are in its own bin and the adjacent ones."""
+"""Square bins, which restrict the search for close points to a bin and the bins next to it."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,16 @@ from robocov.compiled import kernel
 _MIN_BINNED_POINTS = 24
 """Minimum number of points for more than one bin: with fewer points, bins save no time."""
 _SIDE_MARGIN = 1.000001
-"""Minimum side of a bin divided by the reach; slightly above 1 to allow for rounding."""
+"""Minimum side of a bin divided by the distance of close points; slightly above 1 to allow for rounding."""
 
 
 class Bins(NamedTuple):
     """A grid of square bins that covers a set of points. Bins are numbered row by row."""
 
     left: float
-    """x at which the first column begins, m."""
+    """x of the left side of the first column, m."""
     bottom: float
-    """y at which the first row begins, m."""
+    """y of the lower side of the first row, m."""
     scale: float
     """Bins per meter."""
     columns: int
@@ -33,7 +33,7 @@ def find_bin(offset: float, scale: float) -> int:
     Parameters
     ----------
     offset : float, m
-        Distance from where the first row or column begins.
+        Distance from the side at which the first row or column begins.
     scale : float, 1/m
         Bins per meter.
 
@@ -52,6 +52,7 @@ def count_starts(point_count: int) -> int:
     Parameters
     ----------
     point_count : int
+        Number of points to sort.
 
     Returns
     -------
@@ -64,10 +65,10 @@ def count_starts(point_count: int) -> int:
 
 
 @kernel
-def _fit_bins(points: Array, first: int, stop: int, reach: float) -> Bins:
-    """Return the bins that cover ``points[first:stop]``, with sides a little longer than the reach.
+def _fit_bins(points: Array, first: int, stop: int, max_distance: float) -> Bins:
+    """Return bins that cover ``points[first:stop]`` and whose sides are longer than the distance.
 
-    The number of bins is limited in proportion to the number of points.
+    The sides are also long enough to limit the number of bins in proportion to the number of points.
     """
     count = stop - first
     left = points[first, 0]
@@ -81,7 +82,7 @@ def _fit_bins(points: Array, first: int, stop: int, reach: float) -> Bins:
         top = max(top, points[i, 1])
     width = right - left
     height = top - bottom
-    side = max(_SIDE_MARGIN * reach, np.sqrt(width * height / count), max(width, height) / count)
+    side = max(_SIDE_MARGIN * max_distance, np.sqrt(width * height / count), max(width, height) / count)
     # With a scale of 0, all points are in one bin.
     scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0
     columns = find_bin(width, scale) + 1
@@ -99,31 +100,30 @@ def _find_bin_of_point(bins: Bins, points: Array, i: int) -> int:
 
 @kernel
 def sort_into_bins(
-    points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
+    points: Array, first: int, stop: int, max_distance: float, starts: IntArray, order: IntArray
 ) -> Bins:
-    """Sort points into square bins.
+    """Sort points into square bins, such that close points are in the same bin or in adjacent bins.
 
-    Points within reach of each other are in the same bin or in adjacent ones. This is a counting sort: it
-    counts the points in each bin, computes where each bin starts in `order`, and then writes the points
-    there.
+    This is a counting sort: it counts the points in each bin, computes where each bin starts in `order`, and
+    then writes the points there.
 
     Parameters
     ----------
     points : (n, 2) array, m
     first, stop : int
         Only ``points[first:stop]`` are sorted.
-    reach : float, m
-        May be infinite.
+    max_distance : float, m
+        Distance up to which points are close; may be infinite.
     starts : (``count_starts(stop - first)``,) int array
         Overwritten: bin b contains the points ``order[starts[b]:starts[b + 1]]``, ascending.
     order : (stop - first,) int array
-        Overwritten.
+        Overwritten with the indices of the points, sorted by bin.
 
     Returns
     -------
     Bins
     """
-    bins = _fit_bins(points, first, stop, reach)
+    bins = _fit_bins(points, first, stop, max_distance)
     bin_count = bins.columns * bins.rows
     # Count the points: starts[b + 2] is the number of points in bin b.
     for b in range(bin_count + 2):

@@ -16,7 +16,7 @@ from robocov.density.cell_edges import POLAR_MOMENT, CellEdges
 
 @dataclass(eq=False)
 class Cells(ABC):
-    """The cells of the robots in a region. Edges, outlines and moments are computed on first use."""
+    """The cells of robots in a region. Edges, outlines and polar moments are computed on first use."""
 
     generators: Array
     """(n, 2) m, the points to which the cells belong."""
@@ -43,8 +43,8 @@ class Cells(ABC):
     def adjacency(self) -> IntArray:
         """The pairs (i, j), i < j, of cells that share a border, (m, 2), ascending.
 
-        If communication is limited, cells may overlap: i and j are then a pair if the border between them is
-        an edge of at least one of them.
+        If communication is limited, cells may overlap. Two cells are then a pair if the border between them
+        is an edge of at least one of the two.
         """
         return self.edges.list_adjacent_pairs()
 

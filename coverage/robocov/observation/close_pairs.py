@@ -10,7 +10,7 @@ from robocov.compiled import kernel
 from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 
 _INITIAL_NEIGHBORS = 8
-"""Initial size of the arrays, in neighbors per point."""
+"""Number of neighbors per point for which the arrays have space at first."""
 
 
 class ClosePairs(NamedTuple):
@@ -24,14 +24,14 @@ class ClosePairs(NamedTuple):
     """(m,) m"""
 
 
-def find_close_pairs(positions: Array, reach: float) -> ClosePairs:
-    """Find the directed pairs of points that are at most `reach` apart.
+def find_close_pairs(positions: Array, max_distance: float) -> ClosePairs:
+    """Find the directed pairs of points that are close to each other.
 
     Parameters
     ----------
     positions : (n, 2) array, m
-    reach : float, m
-        May be infinite.
+    max_distance : float, m
+        Maximum distance between the two points of a pair; may be infinite.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def find_close_pairs(positions: Array, reach: float) -> ClosePairs:
     >>> pairs.first, pairs.second, pairs.distance
     (array([0, 1]), array([1, 0]), array([1., 1.]))
     """
-    _, pairs = find_pairs_in_range(positions, np.full(len(positions), reach))
+    _, pairs = find_pairs_in_range(positions, np.full(len(positions), max_distance))
     return pairs
 
 
@@ -55,12 +55,14 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     ----------
     points : (n, 2) array, m
     ranges : (n,) array, m
+        Range of each point.
 
     Returns
     -------
     indptr : (n + 1,) int array
         ``pairs.second[indptr[i]:indptr[i + 1]]`` are the points in range of point i.
     pairs : ClosePairs
+        Each pair appears twice, once in each direction.
     """
     n = len(points)
     indptr = np.zeros(n + 1, np.intp)
@@ -74,7 +76,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     bins = sort_into_bins(points, 0, n, ranges.max(), starts, order)
     total = 0
     for i in range(n):
-        # A point may have all others in range.
+        # All other points may be in range of this one.
         if total + n > len(second):
             capacity = 2 * (total + n)
             first = _enlarge(first, total, capacity)
@@ -111,7 +113,7 @@ def _enlarge(values: NDArray[Any], used: int, capacity: int) -> NDArray[Any]:
 
 @kernel
 def _insert(second: IntArray, distance: Array, begin: int, end: int, point: int, separation: float) -> None:
-    """Insert a point into the ascending ``second[begin:end]``, and its distance; slot `end` must be free."""
+    """Insert a point and its distance so that ``second[begin:end + 1]`` is ascending; index `end` is free."""
     k = end
     while k > begin and second[k - 1] > point:
         second[k] = second[k - 1]

@@ -68,9 +68,11 @@ def check_decision(
     returned : object
         Value returned by the controller's ``decide``.
     robot_count : int
+        Number of robots for which a decision is expected.
     controller : str
         Name of the controller, for messages.
     time : float, s
+        Simulation time, for messages.
     source : str
         File and line of ``decide``, for messages, such as " (mine.py, line 12)".
 
@@ -84,32 +86,32 @@ def check_decision(
     ParameterError
         If it is not a `Decision`, or its forces are not finite numbers of shape (robot_count, 2).
     """
-    where = f"controller {controller!r}: decide(seen, memory)"
+    subject = f"controller {controller!r}: decide(seen, memory) returned"
     suffix = f" at {time:.3f} s{source}"
     if not isinstance(returned, Decision):
         hint = " (is a return statement missing?)" if returned is None else ""
-        raise ParameterError(f"{where} returned {quote(returned)}{hint}{suffix}, expected a Decision")
+        raise ParameterError(f"{subject} {quote(returned)}{hint}{suffix}, expected a Decision")
     decision: Decision = returned
-    forces = _to_rows(decision.forces, robot_count, f"{where} returned forces", suffix)
+    forces = _to_rows(decision.forces, robot_count, f"{subject} forces", suffix)
     goals = decision.goals
     if goals is not None:
-        goals = _to_rows(goals, robot_count, f"{where} returned goals", suffix)
+        goals = _to_rows(goals, robot_count, f"{subject} goals", suffix)
     if forces is not decision.forces or goals is not decision.goals:
         decision = replace(decision, forces=forces, goals=goals)
     if not _is_finite(forces):
         robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
         got = f"the force {forces[robot].tolist()} for robot {robot + 1}{suffix}"
-        raise ParameterError(f"{where} returned {got}, expected two finite numbers in newtons")
+        raise ParameterError(f"{subject} {got}, expected two finite numbers in newtons")
     return decision
 
 
 def copy_decision(decision: Decision, controller: str, source: str = "") -> Decision:
-    """Copy the arrays of a checked decision, because a user's controller may overwrite its own.
+    """Copy the arrays and messages of a checked decision, which a user's controller may overwrite later.
 
     Parameters
     ----------
     decision : Decision
-        Returned by `check_decision`.
+        A decision that `check_decision` returned.
     controller, source : str
         As for `check_decision`.
 
@@ -123,18 +125,18 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
         If `terms` is not a mapping of names to forces of all robots, `cells` is not a `Cells` object, or
         `messages` are not messages of each robot.
     """
-    where = f"controller {controller!r}: decide(seen, memory) returned"
+    subject = f"controller {controller!r}: decide(seen, memory) returned"
     if not isinstance(decision.terms, Mapping):
-        raise ParameterError(f"{where} terms {quote(decision.terms)}{source}, expected a dict of forces")
+        raise ParameterError(f"{subject} terms {quote(decision.terms)}{source}, expected a dict of forces")
     terms = {}
     for name, term in decision.terms.items():
-        rows = _to_rows(term, len(decision.forces), f"{where} the term {quote(name)}", source)
+        rows = _to_rows(term, len(decision.forces), f"{subject} the term {quote(name)}", source)
         terms[name] = rows.copy()
     if decision.cells is not None and not isinstance(decision.cells, Cells):
         got = f"{quote(decision.cells)}{source}"
-        raise ParameterError(f"{where} cells {got}, expected the result of robocov.partition, or None")
+        raise ParameterError(f"{subject} cells {got}, expected the result of robocov.partition, or None")
     goals = None if decision.goals is None else decision.goals.copy()
-    messages = check_messages(decision.messages, len(decision.forces), f"{where} messages")
+    messages = check_messages(decision.messages, len(decision.forces), f"{subject} messages")
     if messages:
         messages = [[_copy_message(message) for message in robot_messages] for robot_messages in messages]
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms, messages=messages)
@@ -154,7 +156,9 @@ def check_forces(values: Any, robot_count: int, name: str) -> Array:
     Parameters
     ----------
     values : array-like of shape (robot_count, 2), N
+        The forces.
     robot_count : int
+        Number of robots.
     name : str
         Name of the forces in messages.
 
@@ -165,7 +169,7 @@ def check_forces(values: Any, robot_count: int, name: str) -> Array:
     Raises
     ------
     ParameterError
-        If they are not finite numbers of that shape.
+        If the forces are not finite numbers of that shape.
     """
     forces = _to_rows(values, robot_count, name)
     if not _is_finite(forces):
@@ -181,6 +185,7 @@ def to_numbers(values: object) -> Array | None:
     Parameters
     ----------
     values : object
+        Anything that a controller may return, such as an array or a nested list.
 
     Returns
     -------
@@ -197,7 +202,8 @@ def to_numbers(values: object) -> Array | None:
 
 
 def _is_finite(forces: Array) -> bool:
-    # The sum of squares is faster. It is finite if all forces are, unless huge forces make it overflow.
+    # The sum of squares is fast to compute, and finite only if all forces are. It may overflow for huge
+    # finite forces; only then is each force tested.
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 

@@ -27,8 +27,8 @@ class Message:
     payload : object
         The content. It must not be changed after the message was sent.
     size : int, bytes
-        Size of the payload as it would be encoded. It determines how long the message takes, and how
-        likely it is lost.
+        Size of the payload when encoded. It determines how long the transmission takes, and how likely
+        the message is lost.
 
     Raises
     ------
@@ -72,16 +72,17 @@ class ReceivedMessage(NamedTuple):
     payload: Any
 
 
-def check_messages(messages: Any, count: int, label: str) -> Sequence[Sequence[Message]]:
-    """Check the messages of a decision.
+def check_messages(messages: Any, robot_count: int, subject: str) -> Sequence[Sequence[Message]]:
+    """Check the messages of a decision, and return them unchanged.
 
     Parameters
     ----------
     messages : object
-    count : int
+        The messages that a controller returned.
+    robot_count : int
         Number of robots.
-    label : str
-        Start of an error, such as "controller 'x' returned messages".
+    subject : str
+        First words of an error, such as "controller 'x' returned messages".
 
     Returns
     -------
@@ -93,12 +94,12 @@ def check_messages(messages: Any, count: int, label: str) -> Sequence[Sequence[M
     ParameterError
         If they are not a sequence of messages for each robot.
     """
-    if not isinstance(messages, Sequence) or len(messages) not in (0, count):
-        raise ParameterError(f"{label} {quote(messages)}, expected a list of messages for each robot")
+    if not isinstance(messages, Sequence) or len(messages) not in (0, robot_count):
+        raise ParameterError(f"{subject} {quote(messages)}, expected a list of messages for each robot")
     for robot, robot_messages in enumerate(messages):
         if not _is_message_list(robot_messages):
             raise ParameterError(
-                f"{label} {quote(robot_messages)} for robot {robot + 1}, expected a list of Message"
+                f"{subject} {quote(robot_messages)} for robot {robot + 1}, expected a list of Message"
             )
     return messages
 

@@ -17,7 +17,7 @@ _NO_POSITIONS: Array = np.empty((0, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbors:
-    """A communication graph in compressed sparse rows; a complete graph is stored without its n² entries.
+    """A communication graph in compressed sparse row format. A complete graph has no rows, to save memory.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Neighbors:
     See Also
     --------
     Observations : Contain the neighbors of all robots.
-    partition : Cells that only neighbors cut.
+    partition : Voronoi cells, each bounded only by neighbors.
 
     Examples
     --------
@@ -54,13 +54,13 @@ class Neighbors:
 
     @classmethod
     def from_ranges(cls, positions: Array, ranges: Array) -> Neighbors:
-        """Link robots whose distance is at most the smaller of their communication ranges.
+        """Build the graph that links two robots if each is within the communication range of the other.
 
         Parameters
         ----------
         positions : (n, 2) array, m
         ranges : (n,) array, m
-            If all are infinite, the graph is complete.
+            Communication ranges. If all are infinite, the graph is complete.
 
         Returns
         -------
@@ -88,8 +88,9 @@ class Neighbors:
         Parameters
         ----------
         robot_count : int
+            Number of robots n.
         robot, neighbor : (m,) int arrays
-            Sorted by robot, then neighbor.
+            Indices of the two robots of each pair, sorted by robot, then neighbor.
         ranges : (n,) array or None, m
             Communication ranges, which the graph stores.
 
@@ -108,6 +109,7 @@ class Neighbors:
         Parameters
         ----------
         graphs : sequence of Neighbors
+            The graph of each run.
 
         Returns
         -------
@@ -137,11 +139,12 @@ class Neighbors:
         Parameters
         ----------
         robot : int
+            Index of the robot, from 0.
 
         Returns
         -------
         (k,) int array
-            Ascending.
+            Indices of its neighbors, ascending.
         """
         if self.indptr is None or self.indices is None:
             return np.delete(np.arange(self.robot_count), robot)
@@ -180,7 +183,7 @@ class Neighbors:
 
 
 class NeighborPositions(NamedTuple):
-    """The neighbors of each robot and their positions as known to it, as plain arrays for kernels."""
+    """The neighbors of each robot, and their positions as the robot knows them, as arrays for kernels."""
 
     is_complete: bool
     """Whether each robot knows the current positions of all others. The arrays are then empty."""
@@ -200,6 +203,7 @@ class NeighborPositions(NamedTuple):
         Parameters
         ----------
         neighbors : Neighbors
+            The graph.
         reported_positions : (m, 2) array or None, m
             As in `Observations`; ignored if the graph is complete.
 

@@ -49,23 +49,23 @@ class Observations:
     max_speeds : (n,) array or None, m/s
         The maximum speed of each robot, which its neighbors know as well. None if unknown.
     reported_positions : (m, 2) array or None, m
-        The positions of the neighbors in the newest messages that robots received, in the order of
+        The position of each neighbor according to the newest message from it, in the order of
         ``neighbors.indices``. None: robots know the current positions of their neighbors.
     report_ages : (m,) array or None, s
-        The ages of these messages.
+        The ages of these messages. None if `reported_positions` is None.
     density : Density or None
         φ, the importance of each point: part of the task, known to all. None: 1 everywhere.
     scans : Scans or None
         A range scan of each robot, in the steps in which the controller requests one.
     steering : (n, 2) array or None, rad and rad/s
-        Heading of each unicycle, from +x, and its turning rate; a robot knows its own. None in a team of
-        points.
+        Heading of each unicycle, from +x, and its turning rate; a robot knows only its own. None in a team
+        of point robots.
     messages : sequence of sequence of ReceivedMessage
         The messages that have arrived at each robot in this step, in the order in which they were sent;
         empty if no robot has received any.
     send_limits : (n,) array or None, bytes
-        The size of the messages that each robot can send in this step. 0: earlier messages still wait, or
-        the next ones leave later. None: unlimited.
+        The total size of the messages that each robot can send in this step. It is 0 if earlier messages
+        still wait in its queue, or if no messages are sent in this step. None: unlimited.
 
     See Also
     --------
@@ -108,6 +108,7 @@ class Observations:
         Parameters
         ----------
         robot : int
+            Index of the robot, from 0.
 
         Returns
         -------
@@ -122,6 +123,7 @@ class Observations:
         Parameters
         ----------
         robot : int
+            Index of the robot, from 0.
 
         Returns
         -------
@@ -133,21 +135,22 @@ class Observations:
         start, stop = self.neighbors.indptr[robot : robot + 2]
         return self.reported_positions[start:stop]
 
-    def find_near_neighbors(self, reach: float) -> NearNeighbors:
-        """Find the neighbors that are at most `reach` meters away, by their known positions.
+    def find_near_neighbors(self, max_distance: float) -> NearNeighbors:
+        """Find the neighbors whose known positions are near the robot.
 
         Parameters
         ----------
-        reach : float, m
-            May be infinite.
+        max_distance : float, m
+            Maximum distance of a neighbor; may be infinite.
 
         Returns
         -------
         NearNeighbors
-            Sorted, so that sums over the neighbors of a robot are bit-for-bit independent of other robots.
+            Sorted. A sum over the neighbors of a robot therefore has the same rounding errors whatever the
+            other robots do.
         """
         if self.reported_positions is None and self.neighbors.is_complete:
-            pairs = find_close_pairs(self.positions, reach)
+            pairs = find_close_pairs(self.positions, max_distance)
             offset = self.positions[pairs.first] - self.positions[pairs.second]
             return NearNeighbors(pairs.first, pairs.second, offset, pairs.distance)
         robot, neighbor = self.neighbors.list_pairs()
@@ -157,5 +160,5 @@ class Observations:
             known_positions = self.reported_positions
         offset = self.positions[robot] - known_positions
         distance = compute_point_distances(self.positions[robot], known_positions)
-        is_near = distance <= reach
+        is_near = distance <= max_distance
         return NearNeighbors(robot[is_near], neighbor[is_near], offset[is_near], distance[is_near])

@@ -43,7 +43,7 @@ class Region:
     normals : (k, 2) array
         Outward unit normals of the edges.
     offsets : (k,) array, m
-        ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``.
+        ``normals[e] @ vertices[e]``. A point q is inside if and only if ``normals @ q <= offsets``.
     sides : (k, 5) array
         The vertex, the normal and the offset of each edge in one row, for kernels. For the columns, see the
         constants `SIDE_...`.
@@ -123,7 +123,7 @@ class Region:
         ----------
         points : (..., 2) array, m
         tolerance : float, m
-            Points outside count as inside up to this distance from the boundary.
+            Maximum distance from the line of an edge at which a point beyond the edge counts as inside.
 
         Returns
         -------

@@ -11,23 +11,23 @@ from robocov.density.base import Density
 from robocov.observation.observations import Observations
 from robocov.observation.scans import Scanning
 
-_PATH_PARTS = 4
-"""Number of equal parts of a path; the points between them are checked for walls."""
+_PATH_INTERVALS = 4
+"""Number of equal intervals into which a path is divided. The points between them are tested for walls."""
 _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances in divisions."""
 _MIN_CORNER_DISTANCE_M = 1e-3
 """Lower limit of the distances of corners in divisions."""
-_DECREASE = 0.5
-"""Factor of the fraction of full speed when the gradient turns by more than a right angle."""
-_INCREASE = 1.2
-"""Factor of that fraction otherwise, up to full speed."""
+_DECELERATION_FACTOR = 0.5
+"""Factor of the fraction of full speed after the gradient has turned by more than a right angle."""
+_ACCELERATION_FACTOR = 1.2
+"""Factor of the fraction of full speed otherwise; the fraction does not exceed 1."""
 
 
 class View(NamedTuple):
     """Visible distances along the rays of the last scan of each robot."""
 
     distances: Array
-    """(n, rays) m, at most the sensing range."""
+    """(n, rays) m, at most the range of the view."""
     hit: BoolArray
     """(n, rays) Whether the ray ends at an obstacle."""
 
@@ -50,8 +50,8 @@ class Windows(NamedTuple):
     """(w,) m, ρ."""
 
 
-def compute_view(seen: Observations, previous: View | None, scanning: Scanning, reach: Array) -> View:
-    """Return the view of the last scan.
+def compute_view(seen: Observations, previous: View | None, scanning: Scanning, max_distances: Array) -> View:
+    """Return the views of the robots, which are those of their last scans.
 
     Parameters
     ----------
@@ -61,23 +61,23 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
         The view at the previous step. None before the first scan, when everything in range is assumed free.
     scanning : Scanning
         Settings of the scans.
-    reach : (n,) array, m
-        Maximum distance of each robot's view.
+    max_distances : (n,) array, m
+        Range of each robot's view.
 
     Returns
     -------
     View
     """
     if seen.scans is not None:
-        return View(np.minimum(seen.scans.distances, reach[:, None]), seen.scans.hit)
+        return View(np.minimum(seen.scans.distances, max_distances[:, None]), seen.scans.hit)
     if previous is not None:
         return previous
-    shape = (len(reach), scanning.rays)
-    return View(distances=np.broadcast_to(reach[:, None], shape), hit=np.zeros(shape, dtype=bool))
+    shape = (len(max_distances), scanning.rays)
+    return View(distances=np.broadcast_to(max_distances[:, None], shape), hit=np.zeros(shape, dtype=bool))
 
 
-def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Windows:
-    """Find where views become abruptly deeper from one ray to the next.
+def find_windows(view: View, directions: Array, max_distances: Array, min_jump: float) -> Windows:
+    """Find the rays at which views become abruptly deeper than at the ray before.
 
     Seen at a low angle, a wall also becomes deeper from ray to ray. Along a straight wall, 1/distance is a
     sinusoid of the angle, so two rays predict where the next one meets the wall. Only a ray that goes
@@ -88,10 +88,10 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     view : View
     directions : (rays, 2) array
         Unit vectors along the rays.
-    reach : (n,) array, m
-        Maximum distance of each robot's view.
-    jump : float, m
-        Minimum distance by which a ray exceeds the predicted depth.
+    max_distances : (n,) array, m
+        Range of each robot's view.
+    min_jump : float, m
+        Minimum distance by which the ray of a window exceeds the predicted depth.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     for side in (1, -1):
         previous_depth = np.roll(view.distances, side, axis=1)
         previous_hit = np.roll(view.hit, side, axis=1)
-        is_deeper = view.distances > _predict_depth(view, reach, side) + jump
+        is_deeper = view.distances > _predict_depth(view, max_distances, side) + min_jump
         robot, ray = np.nonzero(previous_hit & is_deeper)
         robots.append(robot)
         rays.append(ray)
@@ -137,8 +137,8 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
     Returns
     -------
     (w, 2) array, m
-        The integral of weight * (s - ρ)/ρ along the part of the edge beyond the corner, times t (see
-        `Windows`): the growth per meter of the robot's motion.
+        The growth of the weighted area per meter of the robot's motion: the integral of weight * (s - ρ)/ρ
+        along the edge beyond the corner, times t. For the symbols, see `Windows`.
     """
     part_count = depths.shape[2]
     edge_depths = depths[windows.robot, windows.ray]
@@ -149,16 +149,18 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
     return np.asarray(integral[:, None] * windows.across)
 
 
-def _predict_depth(view: View, reach: Array, side: int) -> Array:
+def _predict_depth(view: View, max_distances: Array, side: int) -> Array:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
 
     The rays are in counter-clockwise order if `side` is 1, and in clockwise order if it is -1.
     """
-    inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
+    inverse_distances = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
-    predicted = factor * np.roll(inverse, side, axis=1) - np.roll(inverse, 2 * side, axis=1)
-    wall_depth = 1.0 / np.maximum(predicted, 1.0 / reach[:, None])
+    first_before = np.roll(inverse_distances, side, axis=1)
+    second_before = np.roll(inverse_distances, 2 * side, axis=1)
+    predicted_inverse = factor * first_before - second_before
+    wall_depth = 1.0 / np.maximum(predicted_inverse, 1.0 / max_distances[:, None])
     previous_depth = np.roll(view.distances, side, axis=1)
     has_second_hit = np.roll(view.hit, 2 * side, axis=1)
     return np.where(has_second_hit, np.maximum(wall_depth, previous_depth), previous_depth)
@@ -185,9 +187,9 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
 def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
     """Compute the fraction of full speed at which robots follow discontinuous gradients.
 
-    The visible area has ridges, for example at doors. On both sides of a ridge the gradient points toward it,
-    so a robot would oscillate. The fraction is halved whenever the gradient turns by more than a right
-    angle, and grows again otherwise.
+    The visible area as a function of the position has ridges, for example at doors. On both sides of a ridge
+    the gradient points toward the ridge, so a robot at full speed would oscillate. The fraction is therefore
+    halved whenever the gradient turns by more than a right angle, and grows again otherwise.
 
     Parameters
     ----------
@@ -206,7 +208,8 @@ def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: A
     if previous is None or fraction is None:
         return np.ones(len(gradient))
     has_turned = (gradient * previous).sum(axis=1) < 0.0
-    return np.where(has_turned, _DECREASE * fraction, np.minimum(_INCREASE * fraction, 1.0))
+    accelerated = np.minimum(_ACCELERATION_FACTOR * fraction, 1.0)
+    return np.where(has_turned, _DECELERATION_FACTOR * fraction, accelerated)
 
 
 @kernel
@@ -245,7 +248,7 @@ def is_path_clear(x: float, y: float, dx: float, dy: float, wall_distances: Arra
     -------
     bool
     """
-    for k in range(1, _PATH_PARTS):
-        if is_behind_wall(x + dx * k / _PATH_PARTS, y + dy * k / _PATH_PARTS, wall_distances):
+    for k in range(1, _PATH_INTERVALS):
+        if is_behind_wall(x + dx * k / _PATH_INTERVALS, y + dy * k / _PATH_INTERVALS, wall_distances):
             return False
     return True

@@ -91,11 +91,12 @@ def compute_ray_directions(rays: int) -> Array:
     Parameters
     ----------
     rays : int
+        Number of rays over a full turn.
 
     Returns
     -------
     (rays, 2) array
-        The first points along +x.
+        Counter-clockwise; the first vector is (1, 0).
     """
     angle = np.arange(rays) * (2.0 * np.pi / rays)
     return np.column_stack([np.cos(angle), np.sin(angle)])

@@ -21,14 +21,14 @@ class Snapshot:
         Observations of the robots.
     decision : Decision
         Decision of the controller for these observations.
-    truth : (n, 2) array or None, m
-        The true positions, if they differ from those that the robots observe.
+    true_positions : (n, 2) array or None, m
+        The true positions, if the robots may observe others. None: the observed positions are exact.
     working : (n,) bool array or None
         Mask of the robots that have joined and have not failed. None: all.
     inbox : object
         The messages that the robots have received so far; None if communication is ideal.
     sent_bytes : int
-        Size of the messages of the controller that the robots have sent before this step.
+        Total size of the controller messages that the robots have sent before this step.
 
     See Also
     --------
@@ -51,7 +51,7 @@ class Snapshot:
 
     seen: Observations
     decision: Decision
-    truth: Array | None = None
+    true_positions: Array | None = None
     working: BoolArray | None = None
     inbox: Any = None
     sent_bytes: int = 0
@@ -67,7 +67,7 @@ class Snapshot:
     @property
     def positions(self) -> Array:
         """True positions of the robots, (n, 2) m."""
-        return self.seen.positions if self.truth is None else self.truth
+        return self.seen.positions if self.true_positions is None else self.true_positions
 
     @property
     def velocities(self) -> Array:

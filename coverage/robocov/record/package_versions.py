@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 
 _PACKAGES = ("robocov", "numpy", "scipy", "shapely", "pymunk")
+"""Distribution names of the packages, apart from Python itself."""
 
 
 @cache
@@ -18,7 +19,7 @@ def list_versions() -> Mapping[str, str]:
     Returns
     -------
     mapping of str to str
-        Read-only.
+        Version by name of the package, read-only; "unknown" for a package that is not installed.
     """
     versions = {"python": platform.python_version()}
     for package in _PACKAGES:

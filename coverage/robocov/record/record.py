@@ -41,7 +41,7 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True, eq=False)
 class Record(Drawable):
-    """A run: the state, forces and goals of all robots at each of its T time steps.
+    """The record of a run: the state, forces and goals of all robots at each of T time steps.
 
     Attributes
     ----------
@@ -56,29 +56,30 @@ class Record(Drawable):
     start : str or None
         Name of the start from which the initial positions were sampled.
     seed : int or None
-        Seed from which they were sampled.
+        Seed from which the initial positions were sampled.
     dt : float, s
         Control period; also the time between time steps, unless the record was thinned.
     time : (T,) s
         Simulation time of each time step.
     positions, velocities : (T, n, 2) m, m/s
+        True positions and velocities of the robots.
     forces : (T, n, 2) N
         The controller's force, before any limit and without viscosity.
     goals : (T, n, 2) m
-        nan where a robot has none.
+        The goal of each robot; nan if it has none.
     obstacle_points : (T, n, 2) m
         The nearest obstacle point that each robot sensed; nan if there was none.
     steering : (T, n, 2) rad, rad/s
-        Heading, from +x, and turning rate of unicycles; None in a team of points.
-    session : dict
-        Origin of the run, if it is part of a session in the window.
+        Heading, from +x, and turning rate of unicycles; None in a team of point robots.
+    session : mapping
+        Origin of the run in a session of the window, as in ``run.json``; empty for any other run.
     conditions : Conditions or None
-        None if they are ideal.
+        Noise, limits of communication, and robots that fail or join. None if the conditions are ideal.
     joined : tuple of JoinedRobot
         The robots that joined during the run, and the positions at which they joined.
     sent_bytes : (T,) bytes, or None
-        Size of the messages of the controller that all robots have sent before each time step, received or
-        not. None if they have sent none. Positions are not included.
+        Total size of the controller messages that all robots have sent before each time step, received or
+        not. None if there are none. Messages with positions are not included.
 
     See Also
     --------
@@ -127,21 +128,21 @@ class Record(Drawable):
         """Mask of the robots that are present and have not failed, (T, n) bool; read-only."""
         if self.conditions is None:
             return self.present
-        return _protect(self.conditions.find_working(self.time, len(self.team)))
+        return _make_read_only(self.conditions.find_working(self.time, len(self.team)))
 
     @cached_property
     def present(self) -> BoolArray:
-        """Mask of the robots that are present, including failed ones, (T, n) bool; read-only."""
+        """Mask of the robots that have joined the team, including failed ones, (T, n) bool; read-only."""
         if self.conditions is None:
-            return _protect(np.ones(self.positions.shape[:2], dtype=bool))
-        return _protect(self.conditions.find_present(self.time, len(self.team)))
+            return _make_read_only(np.ones(self.positions.shape[:2], dtype=bool))
+        return _make_read_only(self.conditions.find_present(self.time, len(self.team)))
 
     @cached_property
     def traveled(self) -> BoolArray:
-        """Mask of the displacements that belong to a path, (T - 1, n) bool; read-only.
+        """Mask of the displacements that count as motion of a robot, (T - 1, n) bool; read-only.
 
-        A robot does not travel between two time steps if it has not joined yet, or if the user moved it to
-        another position in between.
+        The displacement between two time steps does not count if the robot has not joined yet, or if the user
+        placed it at another position in between.
         """
         mask = self.present[:-1].copy()
         row_of_number = {number: row for row, number in enumerate(self.robot_numbers)}
@@ -150,7 +151,7 @@ class Record(Drawable):
             rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
             if 0 < step < len(self.time):
                 mask[step - 1, rows] = False
-        return _protect(mask)
+        return _make_read_only(mask)
 
     @property
     def robot_numbers(self) -> tuple[int, ...]:
@@ -170,7 +171,7 @@ class Record(Drawable):
 
     @property
     def has_travel_time_cells(self) -> bool:
-        """Whether the controller used cells by travel time and they differ from cells by distance."""
+        """Whether the controller used cells by travel time that differ from cells by distance."""
         return self.gains.get("cells") == "time" and self.team.has_mixed_speeds
 
     def __len__(self) -> int:
@@ -192,7 +193,7 @@ class Record(Drawable):
         Returns
         -------
         VoronoiPartition or WeightedCells
-            `WeightedCells` if `has_travel_time_cells`. Communication is assumed to be unlimited.
+            `WeightedCells` if `has_travel_time_cells`. The cells are those under unlimited communication.
         """
         working = slice(None) if self.conditions is None else self.working[k]
         positions = self.positions[k][working]
@@ -241,6 +242,7 @@ class Record(Drawable):
         Parameters
         ----------
         time : float, s
+            Simulation time.
 
         Returns
         -------
@@ -249,7 +251,7 @@ class Record(Drawable):
         Raises
         ------
         ParameterError
-            If it is outside the run by more than a control period.
+            If the time is outside the run by more than a control period.
         """
         first = float(self.time[0])
         last = float(self.time[-1])
@@ -258,11 +260,12 @@ class Record(Drawable):
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
     def until(self, time: float) -> Record:
-        """Return the part of the run up to a time, inclusive.
+        """Return the record up to a time, inclusive.
 
         Parameters
         ----------
         time : float, s
+            Simulation time.
 
         Returns
         -------
@@ -271,7 +274,7 @@ class Record(Drawable):
         Raises
         ------
         ParameterError
-            If it is before the start of the run.
+            If the time is before the start of the run.
         """
         if not time >= self.time[0] - TIME_ROUNDING_S:
             raise ParameterError(f"time: expected a number of at least {self.time[0]:g} s, got {quote(time)}")
@@ -284,7 +287,7 @@ class Record(Drawable):
         Parameters
         ----------
         rate : float, Hz
-            Time steps per simulated second, see `select_nearest_steps`; 0 keeps only the first and the last.
+            Number of time steps to keep per simulated second; 0 keeps only the first and the last one.
 
         Returns
         -------
@@ -300,7 +303,7 @@ class Record(Drawable):
         return self._select_steps(select_nearest_steps(self.time, rate))
 
     def _select_steps(self, steps: slice | IntArray) -> Record:
-        """Return a record of some of the time steps, with copies of the arrays."""
+        """Return a record of the selected time steps, with copies of the arrays."""
         arrays = {name: getattr(self, name)[steps].copy() for name in self.arrays}
         return replace(self, **arrays)
 
@@ -338,9 +341,9 @@ class Record(Drawable):
         Parameters
         ----------
         summary : mapping or None
-            The summary of the run, see `metrics.summarize`.
+            The summary of the run; see `metrics.summarize`.
         lattice : int or None
-            Lattice on which the cost of the run was computed.
+            Number of lattice sites along each side of the map with which the cost was computed.
 
         Returns
         -------
@@ -377,6 +380,7 @@ class Record(Drawable):
         Parameters
         ----------
         folder : Path or str
+            Folder of the run, which is created if it does not exist.
         summary, lattice
             See `to_json`.
 
@@ -403,11 +407,12 @@ class Record(Drawable):
     def load(cls, folder: Path | str) -> Record:
         """Load a record that was written by `save`.
 
-        Only the name of the controller is loaded, and no code from the folder is executed.
+        Of the controller, only the name and the gains are loaded. No code is executed.
 
         Parameters
         ----------
         folder : Path or str
+            Folder of the run.
 
         Returns
         -------
@@ -416,7 +421,7 @@ class Record(Drawable):
         Raises
         ------
         InputError
-            If it is not the folder of a run, or a file in it cannot be used.
+            If this is not the folder of a run, or a file in it cannot be used.
         """
         folder = Path(folder)
         complete_commit(folder)
@@ -451,7 +456,7 @@ class Record(Drawable):
         )
 
 
-def _protect(mask: BoolArray) -> BoolArray:
+def _make_read_only(mask: BoolArray) -> BoolArray:
     """Make a mask read-only, and return it."""
     mask.setflags(write=False)
     return mask
@@ -463,8 +468,8 @@ def _to_event(joined: JoinedRobot) -> dict[str, Any]:
         "kind": "join",
         "robot": joined.robot,
         "time_s": joined.time,
-        "place_m": list(joined.place),
-        "requested_m": list(joined.requested),
+        "place_m": list(joined.position),
+        "requested_m": list(joined.requested_position),
     }
 
 
@@ -473,6 +478,6 @@ def _from_event(event: JoinEvent) -> JoinedRobot:
     return JoinedRobot(
         robot=event.robot,
         time=event.time_s,
-        place=(event.place_m[0], event.place_m[1]),
-        requested=(event.requested_m[0], event.requested_m[1]),
+        position=(event.place_m[0], event.place_m[1]),
+        requested_position=(event.requested_m[0], event.requested_m[1]),
     )

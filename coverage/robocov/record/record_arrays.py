@@ -34,7 +34,7 @@ _MAX_VALUES = {
     STEERING: 1e9,
     SENT_BYTES: 1e18,
 }
-"""Maximum absolute values in s, m, m/s, N, rad and rad/s, and bytes; the other arrays may contain nan."""
+"""Maximum absolute value in each array, in its unit. Arrays that are not listed may contain nan."""
 
 
 def list_array_names(team: Team) -> tuple[str, ...]:
@@ -65,11 +65,12 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     Returns
     -------
     dict of str to array
+        The arrays by name.
 
     Raises
     ------
     InputError
-        If an array is missing, or has another shape or type, or contains numbers that are out of range.
+        If an array is missing, has a wrong shape or type, or contains numbers that are out of range.
     """
     with path.open("rb") as file:
         saved = read_arrays(file, str(path))
@@ -89,6 +90,7 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
 
 
 def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robot_count: int) -> None:
+    """Raise an InputError unless an array has one row for each time step, and the right type."""
     is_per_step = name in ("time", SENT_BYTES)
     shape = time_shape if is_per_step else (*time_shape, robot_count, 2)
     has_steps = len(time_shape) == 1 and time_shape != (0,)
@@ -100,6 +102,7 @@ def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...
 
 
 def _check_range(path: Path, name: str, array: Array, maximum: float) -> None:
+    """Raise an InputError if the absolute value of a number exceeds the maximum, or is nan."""
     is_in_range = np.abs(array) <= maximum
     if not is_in_range.all():
         raise InputError(

@@ -24,6 +24,25 @@ from robocov.team import Team
 class Recorder:
     """Collects snapshots of a simulation into a `Record`.
 
+    Parameters
+    ----------
+    environment : Environment
+        The map of the run.
+    team : Team
+        The robots.
+    controller : Controller
+        The controller of the run, whose name, label and gains are recorded.
+    dt : float, s
+        Control period.
+    name : str or None
+        Name under which the controller was found, such as ``mine.py:MyController``; by default its own name.
+    start : str or None
+        Name of the start from which the initial positions were sampled.
+    seed : int or None
+        Seed from which the initial positions were sampled.
+    conditions : Conditions or None
+        None if the conditions are ideal.
+
     Raises
     ------
     ParameterError
@@ -47,11 +66,8 @@ class Recorder:
     dt: float
     _: KW_ONLY
     name: str | None = None
-    """Name under which the controller was found, such as ``mine.py:MyController``. By default, its own."""
     start: str | None = None
-    """Name of the start from which the positions were sampled."""
     seed: int | None = None
-    """Seed from which they were sampled."""
     conditions: Conditions | None = None
 
     def __post_init__(self) -> None:
@@ -70,11 +86,12 @@ class Recorder:
         }
 
     def add(self, snapshot: Snapshot) -> None:
-        """Append a step; its arrays are copied.
+        """Append a time step.
 
         Parameters
         ----------
         snapshot : Snapshot
+            State, observations and decision of the step. Their arrays are copied.
         """
         goals = snapshot.decision.goals
         if goals is None:
@@ -90,7 +107,7 @@ class Recorder:
             self._rows[STEERING].append(snapshot.steering.copy())
 
     def record(self, joined: tuple[JoinedRobot, ...] = ()) -> Record:
-        """Return the record of the steps so far.
+        """Return the record of the time steps so far.
 
         Parameters
         ----------
@@ -128,6 +145,7 @@ class Recorder:
 
 
 def _is_recordable(value: Value) -> bool:
+    """Return whether a gain can be written to JSON, which has no infinite numbers."""
     if value is None or isinstance(value, str):
         return True
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max

@@ -37,17 +37,17 @@ _LATER_CONDITIONS = ("bandwidth",)
 """Conditions that files of earlier versions do not contain; null by default."""
 
 
-def _build_number_field(low: float, high: float, *, allow_null: bool, is_required: bool) -> Any:
-    """Return the field of a model for a number in a range, or null."""
+def _build_number_field(minimum: float, maximum: float, *, allow_null: bool, is_required: bool) -> Any:
+    """Return the type and the default of a field for a number in a range, or null."""
     null = " or null" if allow_null else ""
-    description = expect(f"a number from {low:g} to {high:g}{null}")
-    number: Any = Annotated[float, Field(ge=low, le=high)]
+    description = expect(f"a number from {minimum:g} to {maximum:g}{null}")
+    number: Any = Annotated[float, Field(ge=minimum, le=maximum)]
     default: Any = ... if is_required else None
     return Annotated[number | None if allow_null else number, description], default
 
 
 def _build_conditions_model() -> Any:
-    """Return the model of conditions, whose numbers have the ranges of `PARAMETERS`."""
+    """Build the model of conditions, whose numbers have the ranges in `PARAMETERS`."""
     fields: dict[str, Any] = {
         "failures": (list[_Failure], ...),
         "joins": (list[_Join], ...),

@@ -1,4 +1,4 @@
-"""Selection of time steps of a record at a rate."""
+"""Selection of the time steps of a record that are nearest to regular times."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 
 TIME_ROUNDING_S = 5e-7
-"""Difference between times that is attributed to rounding: times are sums of control periods."""
+"""Maximum difference between times that is attributed to rounding: times are sums of control periods."""
 _TIE_DECIMALS = 6
-"""Distances are compared to this number of decimals of a period; the rest is rounding error."""
+"""Number of decimals, in periods, to which distances are compared; further decimals are rounding errors."""
 
 
 def select_nearest_steps(time: Array, rate: float) -> IntArray:
@@ -18,14 +18,15 @@ def select_nearest_steps(time: Array, rate: float) -> IntArray:
     Parameters
     ----------
     time : (T,) array, s
-        Ascending.
+        Times of the steps, ascending.
     rate : float, Hz
-        0 selects only the first and the last time step.
+        Number of steps to select per second; 0 selects only the first and the last one.
 
     Returns
     -------
     (K,) int array
-        Indices of the time steps, ascending. Of two that are equally near, the earlier one is selected.
+        Indices of the selected time steps, ascending. Of two steps that are equally near to a multiple, the
+        earlier one is selected. If the rate is at least that of the steps, all steps are selected.
 
     Examples
     --------
@@ -36,8 +37,8 @@ def select_nearest_steps(time: Array, rate: float) -> IntArray:
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:
         return np.arange(last + 1)
-    # Sort the steps by their nearest multiple of the period, and by their distance from it. The first step of
-    # each multiple is then the nearest one.
+    # Sort the steps by their nearest multiple of the period, and then by their distance from that multiple.
+    # The first step of each multiple is then the step nearest to it.
     periods = (time - time[0]) * rate
     nearest_multiple = np.rint(periods)
     deviation = np.round(np.abs(periods - nearest_multiple), _TIE_DECIMALS)

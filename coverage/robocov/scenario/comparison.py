@@ -28,7 +28,7 @@ _COLUMNS = {
     "contacts": "contacts",
     "mean_path_length_m": "path length (m)",
 }
-"""Columns of the table that is printed, with their headers."""
+"""Keys of the columns of the printed table, with their headers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +72,17 @@ class Comparison(Drawable):
         Returns
         -------
         list of dict
-            One row for each controller. ``above_best`` is the relative excess of its final mean distance
-            over the lowest one.
+            One row for each controller. Lengths are in meters and times in seconds, as the keys say.
+            ``above_best`` is the relative difference between the final mean distance and the lowest one.
         """
-        best = min(summary["mean_distance_m"] for summary in self.summaries.values())
+        lowest = min(summary["mean_distance_m"] for summary in self.summaries.values())
         rows = []
         for label, summary in self.summaries.items():
             lengths = summary["path_length_m"]
             row = {
                 "controller": label,
                 "mean_distance_m": summary["mean_distance_m"],
-                "above_best": summary["mean_distance_m"] / best - 1.0,
+                "above_best": summary["mean_distance_m"] / lowest - 1.0,
                 "uncovered_area_m2": summary["uncovered_area_m2"],
                 "settled_at_s": summary["settled_at_s"],
                 "contacts": summary["contacts"],
@@ -137,8 +137,8 @@ def compare(
     ----------
     environment : Environment, str or Path
         A map, the name of a bundled map or the path of a file.
-    controllers : sequence
-        Names, or controllers with gains of their own, such as ``Rapf(k_rep=0.3)``.
+    controllers : sequence of str, Controller or IndividualController
+        Names as `make_controller` accepts them, or controllers with other gains, such as ``Rapf(k_rep=0.3)``.
     lattice : int
         The coverage cost is computed on this number of sites along each side of the map.
     **options
@@ -180,7 +180,7 @@ def compare(
 
 
 def _make_unique(label: str, labels: Collection[str]) -> str:
-    """Return a label, with a number added if it is one of the given labels."""
+    """Return a label, with a number appended if it is already one of the given labels."""
     unique_label = label
     number = 1
     while unique_label in labels:

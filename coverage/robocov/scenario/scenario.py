@@ -42,7 +42,9 @@ from robocov.team import PARAMETERS, Team
 MAX_RECORD_ROWS = 2e7
 """Maximum number of recorded steps times the number of robots: about 2 GB."""
 MAX_DURATION_S = 1e6
+"""Maximum simulated time of a run."""
 MAX_SEED = 2**63 - 1
+"""Maximum seed."""
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -56,13 +58,13 @@ class Scenario:
     controller : str, Controller or IndividualController
         A name as `make_controller` accepts it, or the controller itself.
     gains : mapping of str to float, str or None
-        Gains that differ from their defaults; only together with a name.
+        Gains that differ from their defaults; only valid if `controller` is a name.
     robots : int or None
-        Number of robots with the default properties; 6 by default. Only without `team`.
+        Number of robots with the default properties; 6 by default. Only valid without `team`.
     team : Team or None
         The robots, if they do not have the default properties.
     start : str or None
-        Name of the start of the map from which the positions are sampled; by default its first.
+        Name of the map's start from which the positions are sampled; by default the first start.
     seed : int or None
         Seed of the starting positions, from 0. None if the positions were not sampled.
     starts : (n, 2) array_like or None, m
@@ -78,14 +80,14 @@ class Scenario:
     conditions : Conditions or None
         Noise, message loss, and robots that fail or join; ideal by default.
     source : ControllerSource or None
-        The file of the controller, in case it is no longer at the path in the name.
+        The source code of a controller in a file, in case the file is no longer at the path in the name.
 
     Attributes
     ----------
     controller : str
         Name of the controller.
     gains : mapping
-        The gains that were given. Of a controller object, all of its gains.
+        The given gains; if a controller object was given, all of its gains.
     given_starts : (n, 2) array or None, m
         Starting positions, unless they are sampled.
 
@@ -205,12 +207,12 @@ class Scenario:
     def check(self) -> None:
         """Check everything that is otherwise only checked when a run starts.
 
-        This runs the code of a controller in a file.
+        If the controller is in a file, this runs the code of the file.
 
         Raises
         ------
         ParameterError
-            If the controller cannot be built, or a robot cannot join where it should.
+            If the controller cannot be built, or a robot cannot join at the requested position.
         StartError
             If the start is unknown, or has no space for the team.
         """
@@ -282,11 +284,11 @@ class Scenario:
         Parameters
         ----------
         controller : Controller or None
-            Defaults to the controller of the scenario.
+            By default the controller of the scenario.
         steps : int
-            Number of control steps already taken.
+            Number of control steps already taken; the simulation starts at the corresponding time.
         is_computed : bool
-            Whether the starting positions come from a simulation. If so, they are not checked for overlaps.
+            Whether a simulation computed the starting positions. They are then not checked for overlaps.
 
         Returns
         -------
@@ -314,8 +316,9 @@ class Scenario:
         Parameters
         ----------
         controller : Controller
+            The controller of the run, whose label and gains are recorded.
         name : str or None
-            Name of the controller in the record; by default its own.
+            Name of the controller in the record; by default its own name.
 
         Returns
         -------
@@ -347,11 +350,11 @@ class Scenario:
         Parameters
         ----------
         simulation : Simulation or None
-            By default a new one.
+            The simulation to run; by default a new one.
         every : int
-            The record contains every `every`-th step and the last one.
+            Number of steps from one recorded step to the next. The last step is always recorded.
         should_stop : callable or None
-            Called with the number of each step; the run ends if it returns True.
+            Called with the number of each step; if it returns True, the run ends with this step.
 
         Returns
         -------
@@ -384,12 +387,13 @@ class Scenario:
         Parameters
         ----------
         record : Record
+            The recorded run.
 
         Returns
         -------
         Scenario
-            It starts from the recorded positions, and has the duration of the record. Changes that the user
-            made in the window during the run are not repeated.
+            A scenario that starts from the recorded positions, and has the duration of the record. Changes
+            that the user made in the window during the run are not part of the scenario.
         """
         has_velocities = bool(record.velocities[0].any())
         return cls(
@@ -449,14 +453,14 @@ class Scenario:
         Parameters
         ----------
         document : mapping
-            As `to_json` returns it. Only ``format``, ``version`` and ``map`` are required; the map may also
-            be the name of a bundled map or the path of a file.
+            JSON object in the format of `to_json`. Only ``format``, ``version`` and ``map`` are required. The
+            map may also be the name of a bundled map or the path of a file.
         where : str
             Name of the document in messages.
         folder : Path or None
-            Folder to which the path of the map is relative.
+            Folder to which the path of the map is relative; by default the current folder.
         controllers : collection of str
-            Names of controllers outside robocov that may be used. A document alone never runs code.
+            Names of controllers in files that the document may use. Other files are never executed.
 
         Returns
         -------
@@ -500,6 +504,7 @@ class Scenario:
         Parameters
         ----------
         path : Path or str
+            Path of the file, which is overwritten if it exists.
 
         Raises
         ------
@@ -517,6 +522,7 @@ class Scenario:
         Parameters
         ----------
         path : Path or str
+            Path of the file.
         controllers : collection of str
             See `from_json`.
 
@@ -576,7 +582,10 @@ def run(
 
 
 def _build_team(team: Team | None, robots: int | None, state: TeamState | None) -> Team:
-    """Return the team, by default robots with the default properties, one for each given start."""
+    """Return the given team, or one of robots with the default properties.
+
+    Without `team` and `robots`, there is one robot for each given start.
+    """
     if team is not None:
         require_type("team", team, Team, "a Team")
         if robots not in (None, len(team)):
@@ -596,7 +605,8 @@ def _describe_controller(
     """Return the attributes of a scenario that describe its controller."""
     if isinstance(controller, str):
         if ":" not in controller:
-            # A class in a file is only loaded when it is needed, because that runs the file.
+            # This checks the name and the gains. A controller in a file ("file:class") is only checked when
+            # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
         return {"controller": controller, "gains": dict(gains or {}), "_controller_object": None}
     if gains:
@@ -610,7 +620,7 @@ def _describe_controller(
 
 
 def _load_environment(content: str | dict[str, Any], where: str, folder: Path | None) -> Environment:
-    """Return the map of a document: a map, the name of a bundled map, or a path relative to a folder."""
+    """Return the map of a document, which contains the map itself, its name, or the path of its file."""
     if not isinstance(content, str):
         return from_json(content, f"{where}: map", folder)
     try:

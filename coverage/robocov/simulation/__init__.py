@@ -1,4 +1,4 @@
-"""Simulations: all robots observe, all decide, then all move.
+"""Simulations: in each step, all robots observe, the controller decides, and all robots move.
 
 - `simulation`: one run of one team
 - `batch`: many runs of identical teams, advanced together

@@ -31,8 +31,8 @@ from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_obstacles
 
 MAX_JOINT_TEAM_SIZE = 15
-"""Size of the largest teams whose controller is called once for all runs. The cells of larger teams come from
-a triangulation, for which one call per run is just as fast."""
+"""Maximum number of robots of a run for which the controller is called once for all runs. The cells of larger
+teams come from a triangulation, for which one call per run is just as fast."""
 
 
 class _BatchDecision(NamedTuple):
@@ -43,6 +43,7 @@ class _BatchDecision(NamedTuple):
     goals: Array | None
     """(runs * n, 2) m; None if the controller has no goals."""
     memories: list[Any]
+    """The memory of each run; a single one if the controller decides for all runs at once."""
     messages: list[Sequence[Sequence[Message]]]
     """The messages of each run; empty if the controller decides for all runs at once."""
 
@@ -143,7 +144,7 @@ class SimulationBatch:
         self._start_step()
 
     def _start_step(self) -> None:
-        """Discard observations and decision of the last step."""
+        """Discard the observations and the decision of the previous step."""
         self._graphs: list[Neighbors] | None = None
         self._observations: Observations | None = None
         self._decision: _BatchDecision | None = None
@@ -176,7 +177,7 @@ class SimulationBatch:
 
     @property
     def positions(self) -> Array:
-        """Centers of the robots, (runs, n, 2) m."""
+        """Positions of the robots' centers, (runs, n, 2) m."""
         return self._world.positions.reshape(len(self), -1, 2)
 
     @property
@@ -291,7 +292,7 @@ class SimulationBatch:
         return Neighbors.combine(self._get_graphs())
 
     def _observe_and_decide(self) -> _BatchDecision:
-        """Let all robots observe and the controller decide, once in each step."""
+        """Return the decision for this step, computing it only once."""
         if self._decision is None:
             if self._decides_jointly:
                 observations = [self.observe()]
@@ -310,12 +311,12 @@ class SimulationBatch:
         return self._decision
 
     def _receive_messages(self, run: int) -> Observations:
-        """Return the observations of one run, with the messages that were sent in the last step."""
+        """Return the observations of one run, with the messages that were sent in the previous step."""
         _, observations = self._radio.receive_messages(self._inboxes[run], self._steps, self.observe_run(run))
         return observations
 
     def _send_messages(self, messages: list[Sequence[Sequence[Message]]]) -> list[Inbox | None]:
-        """Return the inbox of each run with its messages, which all arrive in the next step."""
+        """Send the messages of each run, which arrive in the next step, and return the new inboxes."""
         inboxes: list[Inbox | None] = [None] * len(self)
         working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
@@ -334,7 +335,7 @@ class SimulationBatch:
         run : int
             Index of the run, from 0.
         starts : (n, 2) array, m
-            Positions of its robots, which are at rest.
+            Positions of the run's robots, which are at rest.
 
         Raises
         ------
@@ -392,7 +393,7 @@ class SimulationBatch:
         return records
 
     def _to_snapshot(self) -> Snapshot:
-        """Return a snapshot of all runs with everything that a record needs."""
+        """Return a snapshot of all runs, which contains what a record needs."""
         decision = self._observe_and_decide()
         return Snapshot(self.observe(), Decision(forces=decision.forces, goals=decision.goals))
 
@@ -406,7 +407,7 @@ class SimulationBatch:
         return replace(joint_record, team=self.team, seed=seed, **arrays)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Observations and decision of this step are computed again on demand.
+        # The observations and the decision of this step are computed again on demand.
         return {**vars(self), "_graphs": None, "_observations": None, "_decision": None}
 
 

@@ -13,9 +13,9 @@ from robocov.errors import ParameterError, is_number, quote
 from robocov.team import Team
 
 MIN_DT_S = 1e-4
-"""Shortest control period."""
+"""Minimum control period."""
 MAX_DT_S = 1.0
-"""Longest control period."""
+"""Maximum control period."""
 
 
 def check_dt(dt: float) -> None:
@@ -24,11 +24,12 @@ def check_dt(dt: float) -> None:
     Parameters
     ----------
     dt : float, s
+        Control period.
 
     Raises
     ------
     ParameterError
-        If it is not a number from `MIN_DT_S` to `MAX_DT_S`.
+        If the period is not a number from `MIN_DT_S` to `MAX_DT_S`.
     """
     if not is_number(dt) or not MIN_DT_S <= dt <= MAX_DT_S:
         raise ParameterError(f"dt: expected a number from {MIN_DT_S:.4f} to {MAX_DT_S:g} s, got {quote(dt)}")
@@ -40,7 +41,9 @@ def count_steps(duration: float, dt: float) -> int:
     Parameters
     ----------
     duration : float, s
+        Simulated time.
     dt : float, s
+        Control period.
 
     Returns
     -------
@@ -58,12 +61,14 @@ def count_steps(duration: float, dt: float) -> int:
 
 
 def check_team(team: Any, robot_count: int) -> Team:
-    """Return a team of the expected size, by default one of identical robots.
+    """Check the size of a team, and return the team; by default, build one of identical robots.
 
     Parameters
     ----------
     team : Team or None
+        By default `Team.homogeneous(robot_count)`.
     robot_count : int
+        Expected number of robots.
 
     Returns
     -------
@@ -72,7 +77,7 @@ def check_team(team: Any, robot_count: int) -> Team:
     Raises
     ------
     ParameterError
-        If it is not a team, or has another number of robots.
+        If `team` is not a team, or has another number of robots.
     """
     if team is None:
         return Team.homogeneous(robot_count)
@@ -84,21 +89,24 @@ def check_team(team: Any, robot_count: int) -> Team:
 
 
 def check_conditions(conditions: Any, robot_count: int) -> Conditions | None:
-    """Check conditions. Return None if they are ideal, and otherwise the conditions.
+    """Check conditions, and return them unless they are ideal.
 
     Parameters
     ----------
     conditions : Conditions or None
+        None means ideal conditions.
     robot_count : int
+        Number of robots of the team.
 
     Returns
     -------
     Conditions or None
+        None if the conditions are ideal.
 
     Raises
     ------
     ParameterError
-        If they are not conditions, or refer to robots that the team does not have.
+        If `conditions` has another type, or refers to robots that the team does not have.
     """
     if conditions is None:
         return None
@@ -114,9 +122,9 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
     Parameters
     ----------
     environment : Environment
-        Its boundary must enclose the positions.
+        The map, whose boundary must enclose the positions.
     conditions : Conditions or None
-        None if no robot joins.
+        Contains the robots that join. None if no robot joins.
 
     Raises
     ------
@@ -126,16 +134,16 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
     if conditions is None:
         return
     for k, join in enumerate(conditions.joins):
-        if join.place is None:
+        if join.position is None:
             continue
-        x, y = join.place
+        x, y = join.position
         prefix = f"conditions.joins[{k}]"
         if join.time <= TIME_TOLERANCE_S:
-            expected = "expected a time above 0 s for a robot that joins at a given place"
+            expected = "expected a time above 0 s for a robot that joins at a given position"
             raise ParameterError(f"{prefix}: {expected}, got robot {join.robot} at {join.time:g} s")
         if not environment.boundary_polygon.covers(shapely.Point(x, y)):
             left, bottom, right, top = environment.boundary_polygon.bounds
             inside = f"inside the boundary of map {environment.name!r}"
             extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
             got = f"got [{x:g}, {y:g}] for robot {join.robot}"
-            raise ParameterError(f"{prefix}: expected a place {inside} ({extent}), {got}")
+            raise ParameterError(f"{prefix}: expected a position {inside} ({extent}), {got}")

@@ -1,4 +1,4 @@
-"""Calls to controllers: checks of the returned values, and errors in users' code reported in one line."""
+"""Calls to controllers: checks of the returned values, and one-line messages for errors in users' code."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ class ControllerCaller:
     Parameters
     ----------
     controller : Controller or IndividualController
+        The controller to call. A controller for one robot is called for every robot in turn.
     environment : Environment
         The map, for a controller with the information "whole map".
     time : float, s
@@ -40,9 +41,9 @@ class ControllerCaller:
     Attributes
     ----------
     controller : Controller
-        The controller of the whole team, before it was given the map.
+        The controller of the whole team, as it was before it received the map.
     scanning : Scanning or None
-        The range scans that it needs, if any.
+        Settings of the range scans that the controller needs; None if it needs none.
 
     Raises
     ------
@@ -73,13 +74,16 @@ class ControllerCaller:
         Parameters
         ----------
         region : Region
+            The convex region, which all robots know.
         team : Team
+            The robots.
         time : float, s
-            For messages.
+            Simulation time, for messages.
 
         Returns
         -------
         object
+            The memory, in whatever form the controller uses.
         """
         return self._call(time, self._informed_controller.begin, region, team)
 
@@ -89,8 +93,9 @@ class ControllerCaller:
         Parameters
         ----------
         observations : Observations
+            The observations of the robots in this step.
         memory : object
-            The memory that the previous decision returned; for the first one, that from `begin`.
+            The memory of the previous decision, or the result of `begin` before the first decision.
 
         Returns
         -------
@@ -106,7 +111,6 @@ class ControllerCaller:
         decide = self._informed_controller.decide
         if self._is_built_in:
             return check_decision(decide(observations, memory), robot_count, name, observations.time)
-        # The controller may change its arguments, and so receives copies.
         returned = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
         source = ""
         if not isinstance(self._informed_controller, IndividualControllerAdapter):
@@ -127,7 +131,7 @@ class ControllerCaller:
 
 
 def _copy_memory(memory: Any) -> Any:
-    """Return a copy of a memory, or the memory itself if it contains something that cannot be copied."""
+    """Return a copy of a memory, or the memory itself if it cannot be copied."""
     try:
         return deepcopy(memory)
     except Exception:

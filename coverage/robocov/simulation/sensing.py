@@ -22,11 +22,15 @@ def build_observations(
     Parameters
     ----------
     world : World or ChangingWorld
+        Contains the positions and velocities of the robots.
     sensor : RangeSensor
+        The range sensor, with the obstacles at their current positions.
     environment : Environment
+        The map, whose convex region and density the robots know.
     neighbors : Neighbors
         The communication graph.
     time : float, s
+        Simulation time.
     scanning : Scanning or None
         The scans to take in this step; None if none is due.
 
@@ -59,7 +63,7 @@ def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:
     Parameters
     ----------
     scanning : Scanning or None
-        None if they never scan.
+        Settings of the scans; None if the robots never scan.
     step : int
         Index of the step, from 0.
     dt : float, s

@@ -1,4 +1,4 @@
-"""The simulation of one run: all robots observe, all decide, then move."""
+"""The simulation of one run. In each step, robots observe, the controller decides, and robots move."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.conditions.communication import Inbox, Radio
-from robocov.conditions.perception import Perception, ignore_idle_robots
+from robocov.conditions.perception import Perception, restrict_decision_to_working
 from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
 from robocov.defaults import DEFAULT_DT_S
@@ -39,18 +39,18 @@ from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_movers, build_obstacles, build_solid_pieces
 
 MAX_START_OVERLAP_M = 1e-6
-"""Overlap of robots at rest, with walls or with each other, that is attributed to rounding."""
+"""Maximum overlap of robots at rest, with walls or with each other, that is attributed to rounding."""
 
 
 class _Knowledge(NamedTuple):
-    """Observations of a step, and the messages that have not arrived by then."""
+    """The observations of a step, and the inbox after the messages of the step were delivered."""
 
     observations: Observations
     inbox: Inbox | None
 
 
 class Simulation:
-    """A team under one controller in one environment.
+    """The simulation of a team of robots under one controller in one environment.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Simulation:
     team : Team or None
         By default `Team.homogeneous(n)`.
     dt : float, s
-        Control period. The physics takes substeps where it needs them.
+        Control period. The physics takes shorter substeps when contacts require them.
     conditions : Conditions or None
         Imperfect sensing and communication, failing and joining robots; by default everything is ideal.
 
@@ -72,15 +72,15 @@ class Simulation:
     memory : object
         Memory of the robots, which the controller returned with its last decision.
     inbox : Inbox or None
-        Messages that the robots have received, that are in flight or that wait. None if robots know the
-        positions of others without delay, and there are no messages of the controller.
+        Messages that the robots have received, that are in flight, or that wait to be sent. None if robots
+        know the positions of others without delay, and there are no controller messages.
     joined : tuple of JoinedRobot
         Robots that have joined since the simulation was built.
     decision_time : float
         Processor time that the controller has used so far, s.
     sent_bytes : int
-        Size of the messages of the controller that the robots have sent so far, received or not. Positions
-        are not included.
+        Total size of the controller messages that the robots have sent so far, received or not. Messages
+        with positions are not included.
 
     Raises
     ------
@@ -95,8 +95,8 @@ class Simulation:
 
     Notes
     -----
-    A step depends on nothing but the state of the robots, their memory and messages, and the number of
-    steps so far: a copy continues identically, bit for bit.
+    A step depends only on the state of the robots, their memory and messages, and the number of steps so
+    far. A copy therefore continues identically, bit for bit.
 
     Examples
     --------
@@ -143,6 +143,7 @@ class Simulation:
         if self.conditions is not None:
             self._perception = Perception(self.conditions, self.team, dt)
             self.inbox = self._perception.create_inbox()
+        # With unlimited communication ranges, the graph is complete at any positions.
         self._complete_graph: Neighbors | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graph = Neighbors(len(self.team))
@@ -150,6 +151,7 @@ class Simulation:
         self._start_step()
 
     def _build_world(self, state: TeamState) -> World | ChangingWorld:
+        """Build the physics with the robots in a given state."""
         if self.conditions is not None and self.conditions.has_team_changes:
             return ChangingWorld(
                 self.conditions,
@@ -169,7 +171,7 @@ class Simulation:
         )
 
     def _start_step(self) -> None:
-        """Discard observations and decision of the last step, and move the sensor's obstacles."""
+        """Discard the observations and the decision of the previous step, and update the sensor."""
         self._knowledge: _Knowledge | None = None
         self._snapshot: Snapshot | None = None
         if self._has_changing_obstacles:
@@ -193,7 +195,7 @@ class Simulation:
 
     @property
     def positions(self) -> Array:
-        """Centers of the robots, (n, 2) m."""
+        """Positions of the robots' centers, (n, 2) m."""
         return self._world.positions
 
     @property
@@ -203,7 +205,7 @@ class Simulation:
 
     @property
     def steering(self) -> Array | None:
-        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of point robots."""
         return self._world.steering
 
     @property
@@ -267,9 +269,9 @@ class Simulation:
         return self._get_knowledge().observations
 
     def observe_and_decide(self) -> Snapshot:
-        """Let the robots observe and the controller decide, once in each step.
+        """Let the robots observe and the controller decide.
 
-        Calling it again before the next step returns the same snapshot.
+        Both happen once in each step: a second call before the next step returns the same snapshot.
 
         Returns
         -------
@@ -291,8 +293,8 @@ class Simulation:
             else:
                 self._snapshot = Snapshot(
                     knowledge.observations,
-                    ignore_idle_robots(decision, self.working),
-                    truth=self.positions,
+                    restrict_decision_to_working(decision, self.working),
+                    true_positions=self.positions,
                     working=self.working,
                     inbox=knowledge.inbox,
                     sent_bytes=self.sent_bytes,
@@ -300,7 +302,7 @@ class Simulation:
         return self._snapshot
 
     def _get_knowledge(self) -> _Knowledge:
-        """Return the observations and messages of this step, computing them only once."""
+        """Return the observations and the inbox of this step, computing them only once."""
         if self._knowledge is None:
             observations = self._sense()
             inbox = self.inbox
@@ -311,8 +313,7 @@ class Simulation:
         return self._knowledge
 
     def _sense(self) -> Observations:
-        """Return what robots with ideal sensors and communication observe now."""
-        # The graph is complete, whatever the positions, if all communication ranges are infinite.
+        """Return the current observations of robots with ideal sensors and ideal communication."""
         neighbors = self._complete_graph
         if neighbors is None:
             neighbors = Neighbors.from_ranges(self.positions, self.team.communication_range)
@@ -329,7 +330,8 @@ class Simulation:
     def _find_new_robots(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
         """Return the robots that joined at the end of the last step.
 
-        Before a robot joins, its position is the one at which it should join.
+        `positions_before` are the positions before that step. That of a robot that has not joined yet is the
+        position requested for it.
         """
         if self.conditions is None or not self.conditions.joins:
             return ()
@@ -340,14 +342,14 @@ class Simulation:
             JoinedRobot(
                 robot=robot + 1,
                 time=self.time,
-                place=(float(self.positions[robot, 0]), float(self.positions[robot, 1])),
-                requested=(float(positions_before[robot, 0]), float(positions_before[robot, 1])),
+                position=(float(self.positions[robot, 0]), float(self.positions[robot, 1])),
+                requested_position=(float(positions_before[robot, 0]), float(positions_before[robot, 1])),
             )
             for robot in robots.tolist()
         )
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
-        """Yield the current snapshot, and one after every step.
+        """Simulate for some time, and yield the current snapshot and one after every step.
 
         Parameters
         ----------
@@ -439,12 +441,12 @@ class Simulation:
         twin.memory = deepcopy(self.memory)
         if self._has_changing_obstacles:
             twin.sensor = self.sensor.copy()
-        # The snapshot contains the next memory, which must not be shared.
+        # The snapshot contains the memory for the next step, which the two must not share.
         twin._start_step()
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        # Observations and decision of this step are computed again on demand.
+        # The observations and the decision of this step are computed again on demand.
         return {**vars(self), "_knowledge": None, "_snapshot": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -457,7 +459,7 @@ class Simulation:
         Parameters
         ----------
         environment : Environment
-            The current one, with another density. A controller that knows the map is given this one.
+            The current map with another density. A controller that knows the map receives this one.
 
         Returns
         -------
@@ -476,7 +478,7 @@ class Simulation:
         memory : object
             Memory of the robots.
         inbox : Inbox or None
-            Messages that the robots have received; by default the current ones.
+            Messages of the robots; by default the current ones.
 
         Returns
         -------
@@ -499,10 +501,10 @@ class Simulation:
         steering: Array | None = None,
         conditions: Conditions | None = None,
     ) -> Simulation:
-        """Return a simulation that continues from here with changes; this one is not affected.
+        """Return a simulation that continues from the current state with changes; this one is not affected.
 
-        The memory of the robots is kept unless the controller or the number of robots changes, and so are the
-        messages of the controller. All messages are dropped if the conditions or the number of robots change.
+        The memory of the robots and the controller messages are dropped if the controller or the number of
+        robots changes. All messages are dropped if the conditions or the number of robots change.
 
         Parameters
         ----------
@@ -541,24 +543,32 @@ class Simulation:
         )
         twin.joined = self.joined
         twin.sent_bytes = self.sent_bytes
-        has_same_robots = len(new_team) == len(self.team)
-        if has_same_robots and conditions is None:
-            twin.inbox = self.inbox
-        if has_same_robots and controller is None:
-            twin.memory = deepcopy(self.memory)
-        elif has_same_robots and twin.inbox is not None:
-            # Another controller would not understand the messages of this one.
-            twin.inbox = twin.inbox.drop_messages()
+        if len(new_team) == len(self.team):
+            self._copy_knowledge_to(
+                twin, copy_messages=conditions is None, has_same_controller=controller is None
+            )
         return twin
+
+    def _copy_knowledge_to(self, twin: Simulation, *, copy_messages: bool, has_same_controller: bool) -> None:
+        """Copy the memory and the messages to a simulation of the same robots, unless they are invalid there.
+
+        Another controller would understand neither the memory nor the controller messages of this one.
+        """
+        if copy_messages:
+            twin.inbox = self.inbox
+        if has_same_controller:
+            twin.memory = deepcopy(self.memory)
+        elif twin.inbox is not None:
+            twin.inbox = twin.inbox.drop_messages()
 
 
 def _check_robots_fit(
     environment: Environment, team: Team, state: TeamState, conditions: Conditions | None, time: float
 ) -> None:
-    """Check that no working robot is in a wall or in another robot."""
+    """Check that no working robot overlaps with a wall or another robot."""
     max_overlap = MAX_START_OVERLAP_M
     if state.velocities is not None:
-        # A moving robot may lean on something, and then overlaps with it a little.
+        # Bodies in contact overlap a little, and a moving robot may be in contact.
         max_overlap = 2.0 * MAX_PENETRATION
     working = None if conditions is None else conditions.find_working(time, len(state))
     require_free_starts(environment.at(time), state.positions, team, max_overlap, working)

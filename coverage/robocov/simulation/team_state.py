@@ -27,13 +27,13 @@ class TeamState:
     steps : int
         Number of control steps taken before this state.
     is_computed : bool
-        Whether a simulation computed this state, so that it need not be checked for overlaps: a robot that
-        leans on something overlaps with it a little.
+        Whether a simulation computed this state. It is then not checked for overlaps, because bodies in
+        contact overlap a little.
 
     Raises
     ------
     StartError
-        If there is no robot, or an array does not have two numbers for each robot, or is not finite.
+        If there is no robot, or an array does not contain two finite numbers for each robot.
 
     See Also
     --------
@@ -79,16 +79,18 @@ class TeamState:
 
 
 def _check_rows(name: str, rows: Array, shape: tuple[int, ...], columns: str) -> None:
+    """Raise a StartError unless an array has the given shape and is finite."""
     if rows.shape != shape or not np.isfinite(rows).all():
         raise StartError(f"{name}: expected finite {columns} for each robot, got {quote(rows.tolist())}")
 
 
 def to_team_state(starts: Any) -> TeamState:
-    """Return the state of robots at rest at given positions; return a state unchanged.
+    """Return the state of robots at rest at the given positions, or the given state itself.
 
     Parameters
     ----------
     starts : TeamState or (n, 2) array_like, m
+        Positions of robots at rest, or a state.
 
     Returns
     -------

@@ -72,8 +72,8 @@ class ChangingWorld:
         self._failed = conditions.find_failed(time, len(team))
         is_absent = ~(self.working | self._failed)
         for join in conditions.joins:
-            if join.place is not None and is_absent[join.robot - 1]:
-                self.positions[join.robot - 1] = join.place
+            if join.position is not None and is_absent[join.robot - 1]:
+                self.positions[join.robot - 1] = join.position
         self._build_world()
 
     @property

@@ -67,9 +67,12 @@ def test_conditions_are_ideal_by_default() -> None:
         ({"failures": (3,)}, r"conditions.failures\[0\]: expected a robot and a time, got 3"),
         (
             {"joins": ((1, 2, (1, 2, 3)),)},
-            r"conditions.joins\[0\]: expected a place \[x, y\] in meters, got \(1, 2, 3\)",
+            r"conditions.joins\[0\]: expected a position \[x, y\] in meters, got \(1, 2, 3\)",
         ),
-        ({"joins": ((1, 2, (1, math.nan)),)}, r"conditions.joins\[0\]: expected a place .* got \(1, nan\)"),
+        (
+            {"joins": ((1, 2, (1, math.nan)),)},
+            r"conditions.joins\[0\]: expected a position .* got \(1, nan\)",
+        ),
         (
             {"joins": ((2, 5),), "failures": ((2, 5),)},
             "expected robot 2 to join before it fails at 5 s, got 5 s",

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import Conditions
-from robocov.conditions.perception import MIN_MEASURED_DISTANCE_M, ignore_idle_robots
+from robocov.conditions.perception import MIN_MEASURED_DISTANCE_M, restrict_decision_to_working
 from robocov.controllers import Lloyd, Rapf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.environment import CircleObstacle, Environment
@@ -221,7 +221,7 @@ def test_records_contain_true_positions() -> None:
     assert (np.abs(np.diff(record.positions, axis=0)) < 0.06).all()
     np.testing.assert_array_equal(record.positions[0], STARTS)
     snapshot = simulation.observe_and_decide()
-    assert snapshot.truth is not None
+    assert snapshot.true_positions is not None
     np.testing.assert_array_equal(snapshot.positions, simulation.positions)
     assert not np.array_equal(snapshot.seen.positions, simulation.positions)
 
@@ -270,12 +270,12 @@ def list_steps_with_neighbor(simulation: Simulation, steps: int) -> list[int]:
 
 def test_idle_robots_have_neither_forces_nor_goals() -> None:
     decision = Decision(np.ones((3, 2)), np.ones((3, 2)), {"attraction": np.ones((3, 2))})
-    remaining = ignore_idle_robots(decision, np.array([True, False, True]))
+    remaining = restrict_decision_to_working(decision, np.array([True, False, True]))
     assert remaining.forces[:, 0].tolist() == [1, 0, 1]
     assert remaining.terms["attraction"][:, 0].tolist() == [1, 0, 1]
     assert remaining.goals is not None
     assert np.isnan(remaining.goals).all(axis=1).tolist() == [False, True, False]
-    assert ignore_idle_robots(decision, np.ones(3, dtype=bool)) is decision
+    assert restrict_decision_to_working(decision, np.ones(3, dtype=bool)) is decision
 
 
 def test_changes_keep_messages_unless_the_conditions_change() -> None:

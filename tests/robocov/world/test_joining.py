@@ -45,9 +45,9 @@ def test_moved_joining_positions_are_recorded(tmp_path: Path) -> None:
     (joined,) = record.joined
     assert joined.robot == 3
     assert joined.time == pytest.approx(1.0)
-    assert joined.requested == (10.0, 5.0)
+    assert joined.requested_position == (10.0, 5.0)
     first_moment = int(np.argmax(record.present[:, 2]))
-    np.testing.assert_array_equal(record.positions[first_moment, 2], joined.place)
+    np.testing.assert_array_equal(record.positions[first_moment, 2], joined.position)
     assert joined.offset > 1.0
     record.save(tmp_path)
     loaded = Record.load(tmp_path)
@@ -60,7 +60,7 @@ def test_robots_with_enough_space_join_at_the_requested_position() -> None:
     assert joined == JoinedRobot(3, pytest.approx(1.0), (19.0, 9.0), (19.0, 9.0))
     assert joined.offset == 0.0
     (joined,) = run_with_joins((3, 1.0)).joined
-    assert joined.place == joined.requested == (3.0, 1.0)
+    assert joined.position == joined.requested_position == (3.0, 1.0)
 
 
 def test_joining_positions_taken_by_another_robot_are_moved() -> None:
@@ -78,7 +78,7 @@ def test_robots_that_are_never_present_do_not_join() -> None:
 @pytest.mark.parametrize("place", [(100.0, 100.0), (-0.01, 5.0), (20.001, 5.0), (1e300, 0.0)])
 def test_joining_positions_outside_the_map_are_rejected(place: tuple[float, float]) -> None:
     with pytest.raises(
-        ParameterError, match=r"joins\[0\]: expected a place inside the boundary of map 'room'"
+        ParameterError, match=r"joins\[0\]: expected a position inside the boundary of map 'room'"
     ):
         run_with_joins((3, 1.0, place))
 

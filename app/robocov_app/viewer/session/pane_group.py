@@ -237,7 +237,7 @@ class PaneGroup:
         for number in self._find_changing_robots(join_times):
             if number in self.panes[0].setup.all_numbers:
                 continue
-            position = next(join.place for join in conditions.joins if join.robot == number)
+            position = next(join.position for join in conditions.joins if join.robot == number)
             if position is None:
                 x, y = self.scenario.starts[number - 1].tolist()
                 position = (x, y)
