@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from robocov.conditions import LOSS_STREAM, Conditions
 from robocov.conditions.communication import NEVER, Inbox, Radio
 from robocov.conditions.random_streams import create_generator
-from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controller
+from robocov.controllers import CONTROLLERS, Controller, inform_controller
+from robocov.controllers.exploration import atlas
 from robocov.environment import Environment
 from robocov.errors import InputError
 from robocov.observation import Observations, Scans
