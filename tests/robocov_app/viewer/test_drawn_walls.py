@@ -72,6 +72,29 @@ def test_corners_come_before_walls() -> None:
     assert snapper.snap(build_room(), (9.98, 3.0), 0.1) == pytest.approx((10.0, 3.0))
 
 
+def test_a_wall_in_a_doorway_is_in_line_with_the_walls_beside_it(tmp_path: Path) -> None:
+    below = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.2)
+    above = WallObstacle(((5.0, 3.5), (5.0, 6.0)), 0.2)
+    with open_viewer(tmp_path, RAPF, environment=build_room(below, above), robots=2) as driver:
+        driver.press_key("w")
+        # Near the left corner of one wall and the right corner of the other.
+        driver.drag_at((4.92, 2.48), (5.08, 3.52))
+        wall = driver.session.displayed.environment.obstacles[-1]
+    assert isinstance(wall, WallObstacle)
+    assert np.allclose(wall.points, ((5.0, 2.5), (5.0, 3.5)))
+
+
+def test_ends_of_walls_are_short_edges_that_stick_out() -> None:
+    snapper = MapSnapper()
+    wall = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.2)
+    block = WallObstacle(((1.0, 3.0), (3.0, 3.0)), 1.0)
+    environment = build_room(wall, block)
+    assert snapper.snap(environment, (4.92, 2.45), 0.2) == pytest.approx((5.0, 2.5))
+    # The block is too wide to be continued by a wall, and the wall does not end at the boundary.
+    assert snapper.snap(environment, (1.03, 3.45), 0.2) == pytest.approx((1.0, 3.5))
+    assert snapper.snap(environment, (4.92, 0.03), 0.2) == pytest.approx((4.9, 0.0))
+
+
 def test_the_area_without_robots_is_cut_off() -> None:
     before = build_room()
     after = add_obstacle(before, WallObstacle(((4.0, 0.0), (4.0, 6.0)), 0.1))
