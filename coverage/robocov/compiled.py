@@ -14,12 +14,13 @@ import importlib.metadata
 import importlib.util
 import os
 import pickle
+import re
 import shutil
 import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -42,8 +43,9 @@ _compilation_listeners: list[Callable[[str], None]] = []
 """Functions that `notify_compilation` calls."""
 _lock = threading.RLock()
 _is_cache_usable = True
-_must_interpret: Callable[[str], bool] | None = None
+_must_interpret: Callable[[str, tuple[Any, ...]], bool] | None = None
 _kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()
+_ADDRESS = re.compile(" at 0x[0-9a-f]+")
 _CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
 """Errors that numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
 
@@ -125,7 +127,7 @@ class Kernel:
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the compiled function; compile it first if there is no machine code for these types."""
-        if _must_interpret is not None and _must_interpret(self.name):
+        if _must_interpret is not None and _must_interpret(self.name, args):
             with np.errstate(all="ignore"):
                 return self.py_func(*args, **kwargs)
         dispatcher = self._dispatcher or self.get_dispatcher()
@@ -176,14 +178,14 @@ class Kernel:
             numba.config.CACHE_DIR = previous
 
 
-def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
+def interpret_kernels(must_interpret: Callable[[str, tuple[Any, ...]], bool] | None) -> None:
     """Run some kernels as Python, which gives the same results, only more slowly.
 
     Parameters
     ----------
     must_interpret : callable or None
-        Takes the `Kernel.name` of a kernel, and returns whether to run it as Python. None runs none as
-        Python.
+        Takes the `Kernel.name` of a kernel and the positional arguments of a call, and returns whether to run
+        it as Python. None runs none as Python.
     """
     global _must_interpret
     _must_interpret = must_interpret
@@ -199,15 +201,41 @@ def is_interpreting() -> bool:
     return _must_interpret is not None
 
 
-def list_compiled_kernels() -> list[str]:
-    """Return the names of the kernels that this process has compiled, or loaded from the cache.
+def list_compiled_kernels() -> dict[str, list[str]]:
+    """Return the kernels that this process has compiled, or loaded from the cache.
 
     Returns
     -------
-    list of str
-        In alphabetical order.
+    dict of str to list of str
+        For each name of a kernel, the types for which there is machine code, as from
+        `describe_argument_types`, in alphabetical order.
     """
-    return sorted(item.name for item in _kernels if item.is_compiled)
+    compiled: dict[str, list[str]] = {}
+    for item in _kernels:
+        if item.is_compiled:
+            types = [_format_types(signature) for signature in item.get_dispatcher().signatures]
+            compiled[item.name] = sorted(types)
+    return compiled
+
+
+def describe_argument_types(arguments: tuple[Any, ...]) -> str:
+    """Return numba's types of the arguments of a kernel, as text.
+
+    Parameters
+    ----------
+    arguments : tuple
+
+    Returns
+    -------
+    str
+    """
+    numba = import_numba()
+    return _format_types([numba.typeof(argument) for argument in arguments])
+
+
+def _format_types(types: Iterable[Any]) -> str:
+    # The type of a kernel that is passed to another one contains the address of its function.
+    return _ADDRESS.sub("", "; ".join(map(str, types)))
 
 
 def _disable_cache() -> None:

@@ -20,18 +20,24 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from filelock import FileLock
 
 from robocov.arrays import Array
-from robocov.compiled import import_numba, interpret_kernels, list_compiled_kernels, open_cache_folder
+from robocov.compiled import (
+    describe_argument_types,
+    import_numba,
+    interpret_kernels,
+    list_compiled_kernels,
+    open_cache_folder,
+)
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Lloyd, Rapf
 from robocov.cost import CoverageCost
 from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
-from robocov.environment import Environment, PolygonObstacle
+from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.files.writing import replace_file
 from robocov.metrics import compute_cost_history, summarize
 from robocov.simulation import Simulation
@@ -41,14 +47,19 @@ Example: TypeAlias = Callable[[], None]
 """A function that calls kernels in order to compile them."""
 
 _COMPILED_LIST = "compiled.json"
-"""File in the cache folder with the names of the kernels whose machine code is there."""
+"""File in the cache folder with the names of the kernels whose machine code is there, and their types."""
 _POLL_PERIOD_S = 0.25
 """Time between two checks whether more kernels have been compiled."""
 _EXIT_WITH_PARENT_OPTION = "--until-stdin-closes"
 """Command-line option: exit when standard input closes, as it does when the parent process ends."""
+CONTROLLER_STEPS = 12
+"""Steps of each built-in controller, after which it has planned routes."""
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
+_WALL = WallObstacle(((3.0, 0.0), (3.0, 5.0)), 0.2)
+_DIVIDED_MAP = Environment("divided example", _SQUARE, (_WALL, _TRIANGLE))
+"""A map on which paths to the other side of the wall have a corner."""
 _FORCES_INTO_WALL = np.full((4, 2), -1000.0)
 """Forces, N, that push four robots against the boundary."""
 
@@ -113,10 +124,10 @@ def call_density_kernels() -> None:
 
 
 def call_controller_kernels() -> None:
-    """Call the kernels of all built-in controllers."""
+    """Call the kernels of all built-in controllers, on a map on which they have to find their way."""
     for controller in CONTROLLERS.values():
-        simulation = Simulation(_MAP, controller(), _place_robots(4))
-        for _ in range(3):
+        simulation = Simulation(_DIVIDED_MAP, controller(), _place_robots(4))
+        for _ in range(CONTROLLER_STEPS):
             simulation.step()
 
 
@@ -209,29 +220,36 @@ class _BackgroundCompilation:
 
     def __init__(self, folder: Path) -> None:
         self._list = folder / _COMPILED_LIST
-        self._compiled: set[str] = set()
+        self._compiled: dict[str, list[str]] = {}
         self._next_poll_time = 0.0
         # Importing numba is slow as well, so a thread of this process does it.
         self._import = threading.Thread(target=import_numba, daemon=True)
         self._import.start()
         self._process = _start_compilation_process()
 
-    def must_interpret(self, kernel: str) -> bool:
+    def must_interpret(self, kernel: str, arguments: tuple[Any, ...]) -> bool:
         """Return whether a kernel must run as Python, because its machine code is not ready yet."""
         if self._import.is_alive():
             return True
-        if kernel in self._compiled:
+        if self._is_compiled(kernel, arguments):
             return False
-        if time.monotonic() >= self._next_poll_time:
-            self._next_poll_time = time.monotonic() + _POLL_PERIOD_S
-            self._poll()
-        return kernel not in self._compiled
+        if time.monotonic() < self._next_poll_time:
+            return True
+        self._next_poll_time = time.monotonic() + _POLL_PERIOD_S
+        self._poll()
+        return not self._is_compiled(kernel, arguments)
+
+    def _is_compiled(self, kernel: str, arguments: tuple[Any, ...]) -> bool:
+        """Return whether there is machine code of a kernel for the types of its arguments."""
+        if kernel not in self._compiled:
+            return False
+        return describe_argument_types(arguments) in self._compiled[kernel]
 
     def _poll(self) -> None:
         """Read which kernels are compiled. If the process has ended, the others are compiled in this one."""
         has_ended = self._process is None or self._process.poll() is not None
         with suppress(OSError, ValueError):
-            self._compiled = set(json.loads(self._list.read_text(encoding="utf-8")))
+            self._compiled = json.loads(self._list.read_text(encoding="utf-8"))
         if has_ended:
             interpret_kernels(None)
 
@@ -263,14 +281,16 @@ def _get_marker(folder: Path, example: Example) -> Path:
 
 
 def _save_compiled_list(folder: Path) -> None:
-    """Add the kernels that this process has compiled to the list in the cache folder."""
+    """Add the kernels that this process has compiled, and their types, to the list in the cache folder."""
     path = folder / _COMPILED_LIST
     with FileLock(folder / "list.lock"):
-        compiled = set(list_compiled_kernels())
+        compiled: dict[str, list[str]] = {}
         with suppress(OSError, ValueError):
-            compiled |= set(json.loads(path.read_text(encoding="utf-8")))
+            compiled = json.loads(path.read_text(encoding="utf-8"))
+        for name, types in list_compiled_kernels().items():
+            compiled[name] = sorted({*types, *compiled.get(name, [])})
         with replace_file(path, durable=False) as temporary:
-            temporary.write_text(json.dumps(sorted(compiled)), encoding="utf-8")
+            temporary.write_text(json.dumps(compiled, sort_keys=True), encoding="utf-8")
 
 
 def main() -> None:

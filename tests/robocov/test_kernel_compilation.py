@@ -7,11 +7,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from robocov import compiled
+from robocov import compiled, kernel_compilation
 from robocov.compiled import (
     IS_COMPILER_ENABLED,
     Kernel,
@@ -69,7 +70,7 @@ def test_interpreted_kernels_give_the_same_bits(
     interpreted_run = Simulation(cluttered, controller, starts, team)
     for _ in range(60):
         compiled_run.step()
-    interpret_kernels(lambda name: True)
+    interpret_kernels(lambda name, arguments: True)
     try:
         for _ in range(60):
             interpreted_run.step()
@@ -82,7 +83,7 @@ def test_interpreted_kernels_give_the_same_bits(
 def test_only_kernels_that_must_be_are_interpreted() -> None:
     interpreted: list[str] = []
 
-    def record(name: str) -> bool:
+    def record(name: str, arguments: tuple[Any, ...]) -> bool:
         interpreted.append(name)
         return name.endswith("first")
 
@@ -123,6 +124,25 @@ def test_without_a_cache_examples_are_called_each_time(monkeypatch: pytest.Monke
         assert not is_interpreting(), "machine code of another process could not be loaded"
 
 
+def test_a_kernel_is_interpreted_for_types_without_machine_code(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernel_compilation, "_start_compilation_process", lambda: None)
+    double = Kernel(lambda x: 2.0 * x)
+    double(1.5)
+    kernel_compilation._save_compiled_list(empty_cache)
+    compilation = kernel_compilation._BackgroundCompilation(empty_cache)
+    wait_until(lambda: not compilation.must_interpret(double.name, (1.5,)))
+    assert compilation.must_interpret(double.name, (np.ones(3),))
+    double(np.ones(3))
+    kernel_compilation._save_compiled_list(empty_cache)
+    compilation._poll()
+    assert not compilation.must_interpret(double.name, (np.ones(3),))
+    read_only = np.ones(3)
+    read_only.setflags(write=False)
+    assert compilation.must_interpret(double.name, (read_only,))
+
+
 @pytest.mark.slow
 def test_kernels_are_interpreted_until_another_process_has_compiled_them(
     empty_cache: Path, cluttered: Environment
@@ -134,10 +154,24 @@ def test_kernels_are_interpreted_until_another_process_has_compiled_them(
         name = "robocov.world.dynamics.compute_net_forces"
         must_interpret = compiled._must_interpret
         assert must_interpret is not None
-        assert must_interpret(name)
-        wait_until(lambda: not must_interpret(name))
-        assert are_kernels_compiled([call_step_kernels])
-        simulation.step()
+        assert must_interpret(name, ())
+        wait_until(lambda: are_kernels_compiled([call_step_kernels]))
+        interpreted: list[str] = []
+
+        def record(kernel: str, arguments: tuple[Any, ...]) -> bool:
+            is_interpreted = must_interpret(kernel, arguments)
+            if is_interpreted:
+                interpreted.append(kernel)
+            return is_interpreted
+
+        interpret_kernels(record)
+
+        def runs_as_machine_code() -> bool:
+            interpreted.clear()
+            simulation.step()
+            return name not in interpreted
+
+        wait_until(runs_as_machine_code)
     assert not is_interpreting()
 
 
