@@ -13,8 +13,8 @@ class Inspection:
     ----------
     selected : int or None
         Number of the selected robot, which may have been removed in the meantime.
-    obstacle : Obstacle or None
-        The selected obstacle, which may have been changed or removed in the meantime.
+    obstacles : tuple of Obstacle
+        The selected obstacles, which may have been changed or removed in the meantime.
     followed : int or None
         Number of the robot that the camera follows.
     active_pane : int
@@ -26,7 +26,7 @@ class Inspection:
     """
 
     selected: int | None = None
-    obstacle: Obstacle | None = None
+    obstacles: tuple[Obstacle, ...] = ()
     followed: int | None = None
     active_pane: int = 0
     cursor: Point | None = None
@@ -35,16 +35,23 @@ class Inspection:
     def select_robot(self, number: int) -> None:
         """Select a robot instead of what was selected before."""
         self.selected = number
-        self.obstacle = None
+        self.obstacles = ()
 
-    def select_obstacle(self, obstacle: Obstacle) -> None:
-        """Select an obstacle instead of what was selected before."""
+    def select_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Select obstacles instead of what was selected before."""
         self.selected = None
-        self.obstacle = obstacle
+        self.obstacles = obstacles
+
+    def toggle_obstacle(self, obstacle: Obstacle) -> None:
+        """Select an obstacle in addition to others, or no longer."""
+        if obstacle in self.obstacles:
+            self.obstacles = tuple(other for other in self.obstacles if other != obstacle)
+        else:
+            self.select_obstacles((*self.obstacles, obstacle))
 
     def clear(self) -> bool:
         """Select nothing; return whether something was selected."""
-        had_selection = self.selected is not None or self.obstacle is not None
+        had_selection = self.selected is not None or bool(self.obstacles)
         self.selected = None
-        self.obstacle = None
+        self.obstacles = ()
         return had_selection

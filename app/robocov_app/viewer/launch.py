@@ -15,7 +15,12 @@ from robocov_app.storage.settings import (
     save_changed_settings,
 )
 from robocov_app.terminal.output import echo
-from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
+from robocov_app.toolkit.window.display import (
+    choose_scale,
+    fit_to_screen,
+    open_display,
+    prefers_reduced_motion,
+)
 from robocov_app.toolkit.window.exceptions import ExceptionLog
 from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
@@ -197,6 +202,7 @@ class ViewerLauncher:
         viewer.view.fades_trajectories = settings.fade
         viewer.view.has_suggestions = settings.suggests
         viewer.view.has_motion = settings.motion
+        viewer.view.is_motion_reduced = prefers_reduced_motion()
         viewer.files.recent = list(settings.recent)
         return viewer
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 
 from robocov.controllers import CONTROLLERS
-from robocov.environment import Environment
+from robocov.environment import Environment, Obstacle
 from robocov.errors import RobocovError
 from robocov_app.toolkit.window.window_model import WindowModel
 from robocov_app.viewer.costs.costs import Costs
@@ -89,13 +89,10 @@ class ViewerModel(WindowModel):
         return None
 
     @property
-    def selected_obstacle(self) -> int | None:
-        """Index of the selected obstacle, if it is still on the displayed map."""
+    def selected_obstacles(self) -> tuple[Obstacle, ...]:
+        """The selected obstacles, as far as they are still on the displayed map."""
         obstacles = self.session.displayed.environment.obstacles
-        selected = self.inspection.obstacle
-        if selected is None or selected not in obstacles:
-            return None
-        return obstacles.index(selected)
+        return tuple(obstacle for obstacle in self.inspection.obstacles if obstacle in obstacles)
 
     def attempt(self, action: Callable[[], object]) -> None:
         """Run an action, and show the message that it returns or the error that it raises."""

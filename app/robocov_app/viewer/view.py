@@ -24,7 +24,9 @@ class ViewState:
     has_suggestions : bool
         Whether the window suggests what to try once the team has settled.
     has_motion : bool
-        Whether the camera glides when the zoom changes.
+        Whether the camera glides when the zoom changes, as far as the user of this window has chosen.
+    is_motion_reduced : bool
+        Whether the user's system asks for reduced motion, so that the camera does not glide.
     is_recording : bool
         Whether a video of the window is being recorded.
     """
@@ -35,6 +37,7 @@ class ViewState:
     fades_trajectories: bool = False
     has_suggestions: bool = True
     has_motion: bool = True
+    is_motion_reduced: bool = False
     is_recording: bool = False
 
     def toggle_layer(self, name: str) -> None:
@@ -75,6 +78,8 @@ class ViewState:
     def toggle_motion(self) -> str:
         """Switch between smooth and instant zooming; return a message."""
         self.has_motion = not self.has_motion
+        if self.has_motion and self.is_motion_reduced:
+            return "zooming is instant, because the system asks for reduced motion"
         if self.has_motion:
             return "zooming is smooth"
         return "zooming is instant"

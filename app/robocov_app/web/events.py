@@ -62,19 +62,21 @@ class _HeldMessage(_Message):
     held: int = Field(default=0, ge=0, le=15)  # Shift 1, Ctrl 2, Alt 4, Meta 8
 
 
-class _PointerMessage(_HeldMessage):
+class PointerMessage(_HeldMessage):
+    """A message with the position of the pointer, in pixels of the frame that the page shows."""
+
     x: _Pixel
     y: _Pixel
 
 
-class PointerMoved(_PointerMessage):
+class PointerMoved(PointerMessage):
     """The pointer has moved while `button` was held; 0 for none."""
 
     kind: Literal["move"]
     button: int = Field(default=0, ge=0, le=3)
 
 
-class ButtonChanged(_PointerMessage):
+class ButtonChanged(PointerMessage):
     """A mouse button is pressed or released."""
 
     kind: Literal["button"]
@@ -82,7 +84,7 @@ class ButtonChanged(_PointerMessage):
     down: bool
 
 
-class WheelTurned(_PointerMessage):
+class WheelTurned(PointerMessage):
     """The wheel is turned by a number of notches."""
 
     kind: Literal["wheel"]
@@ -127,13 +129,14 @@ class FocusLost(_Message):
 
 
 class PageChanged(_Message):
-    """The page reports its size in device pixels, device pixels per CSS pixel, and its color scheme."""
+    """The page reports its size in device pixels, device pixels per CSS pixel, and the user's preferences."""
 
     kind: Literal["page"]
     width: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
     height: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
     ratio: float = Field(ge=0.25, le=8.0)
     dark: bool
+    reduced_motion: bool = False
 
     @property
     def is_narrow(self) -> bool:

@@ -9,6 +9,7 @@ from time import monotonic
 from typing import NamedTuple
 
 from robocov_app.web.frames import BaseFrames, Frame, encode_frame
+from robocov_app.web.map_frames import MapFrames
 from robocov_app.web.pages import Page, Pages
 
 SERVED_FPS = 60
@@ -38,6 +39,8 @@ class FrameDelivery:
     ----------
     newest : Frame or None
         The newest frame of the window; set by the window's thread.
+    maps : MapFrames
+        The map in the sizes of phones, which show it instead of the window.
     has_work : asyncio.Event
         Set when there is a newer frame, or when a page has connected, disconnected, or shown a frame.
     bases : BaseFrames
@@ -46,6 +49,7 @@ class FrameDelivery:
 
     def __init__(self, pages: Pages) -> None:
         self.newest: Frame | None = None
+        self.maps = MapFrames()
         self.has_work = asyncio.Event()
         self.bases = BaseFrames()
         self._pages = pages
@@ -58,6 +62,7 @@ class FrameDelivery:
         """Deliver frames until the task is canceled."""
         while True:
             self.has_work.clear()
+            self._switch_pages()
             delivery = self._choose_delivery()
             if delivery is None:
                 await self._wait_for_work()
@@ -76,19 +81,37 @@ class FrameDelivery:
         comes first.
         """
         controlling = self._pages.controlling
-        newest = self.newest
         to_controlling: _Delivery | None = None
-        if controlling is not None and newest is not None and controlling.is_ready_for(newest):
-            to_controlling = _Delivery(controlling, newest)
+        if controlling is not None:
+            newest = self._find_frame(controlling)
+            if newest is not None and controlling.is_ready_for(newest):
+                to_controlling = _Delivery(controlling, newest)
         if to_controlling is not None and not self._controlling_was_last:
             return to_controlling
         watching = [page for page in self._pages if page is not controlling]
-        self._update_shared_frame(len(watching))
-        frame = self._shared_frame
-        ready = [page for page in watching if page.is_ready_for(frame)]
-        if ready and frame is not None:
-            return _Delivery(min(ready, key=lambda page: page.base_number), frame)
+        self._update_shared_frame(sum(page.shown_map is None for page in watching))
+        for page in sorted(watching, key=lambda page: page.base_number):
+            frame = self._find_frame(page)
+            if frame is not None and page.is_ready_for(frame):
+                return _Delivery(page, frame)
         return to_controlling
+
+    def _switch_pages(self) -> None:
+        """Switch phones between the map and the window, whose frames are not based on each other."""
+        for page in self._pages:
+            shown_map = page.map_size if page.map_size in self.maps.frames else None
+            if shown_map != page.shown_map:
+                page.shown_map = shown_map
+                page.base_number = 0
+                page.has_updates.set()
+
+    def _find_frame(self, page: Page) -> Frame | None:
+        """Return the newest frame for a page: of the map in its size, or of the window."""
+        if page.shown_map is not None:
+            return self.maps.frames.get(page.shown_map)
+        if page is self._pages.controlling:
+            return self.newest
+        return self._shared_frame
 
     def _update_shared_frame(self, page_count: int) -> None:
         """Update the frame for the other pages; with many of them, only every `SHARED_FRAME_INTERVAL_S`."""
@@ -101,6 +124,7 @@ class FrameDelivery:
     async def _deliver(self, page: Page, frame: Frame) -> None:
         """Encode a frame for a page, and queue it for all pages that now show the same frame as that page."""
         base_number = page.base_number
+        shown_map = page.shown_map
         base = self.bases.get(base_number)
         loop = asyncio.get_running_loop()
         message = await loop.run_in_executor(self._encoder, encode_frame, frame, base)
@@ -109,7 +133,8 @@ class FrameDelivery:
         self._controlling_was_last = page is controlling
         for receiver in self._pages:
             is_due = receiver is page or receiver is not controlling
-            if receiver.base_number == base_number and is_due and receiver.is_ready_for(frame):
+            has_same_base = receiver.base_number == base_number and receiver.shown_map == shown_map
+            if has_same_base and is_due and receiver.is_ready_for(frame):
                 receiver.add_frame(frame.number, message)
 
     async def _wait_for_work(self) -> None:

@@ -59,6 +59,16 @@ class SharedWindow:
     )
     uploads: dict[str, float] = field(default_factory=dict)
 
+    def update_sizes(self) -> None:
+        """Pass the sizes that the window and the map should have to the window."""
+        self.pages.update_map_sizes()
+        sizes = (page.map_size for page in self.pages)
+        self.delivery.maps.requested_sizes = frozenset(size for size in sizes if size is not None)
+        controlling = self.pages.controlling
+        map_size = None if controlling is None else controlling.map_size
+        self.window_input.set_page(self.pages.display_settings, map_size)
+        self.delivery.has_work.set()
+
 
 class _EventBudget:
     """The number of events that a page may still send; it is replenished at a constant rate."""
@@ -173,7 +183,7 @@ class PageConnection:
         if message.width * message.height > events.MAX_PAGE_PIXELS:
             raise ValueError("page too large")
         self._page.settings = message
-        self._shared.window_input.set_page(self._shared.pages.display_settings)
+        self._shared.update_sizes()
 
     # Files from the page.
 
@@ -246,6 +256,7 @@ class PageConnection:
             "participants": self._shared.pages.participants,
             "you": page.number,
             "may_control": page.may_control,
+            "shows_map": page.shown_map is not None,
         }
         if not self._is_controlling:
             # Only the controlling page may see the clipboard, and downloads what its user saves.

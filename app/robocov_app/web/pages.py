@@ -6,7 +6,8 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from math import log, sqrt
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.errors import RobocovError
 
@@ -21,10 +22,29 @@ MAX_VIEWERS = 100
 """Maximum number of pages opened with the watch link."""
 MAX_CONTROL_PAGES = 16
 """Maximum number of pages opened with the control link. If one more is opened, the oldest is closed."""
+MAX_MAP_SIZES = 3
+"""Maximum number of sizes in which the map is drawn for phones; other phones scale one of these pictures."""
+MAX_MAP_PIXELS = 1_000_000
+"""Maximum number of pixels of the map that is drawn for a phone."""
 MAX_NOTICES = 8
 """Maximum number of notices waiting to be sent to a page."""
 MAX_FRAMES_IN_FLIGHT = 2
 """Maximum number of frames that were sent to a page but that it has not shown yet."""
+
+
+class MapSize(NamedTuple):
+    """Size in which the map is drawn for a phone.
+
+    Attributes
+    ----------
+    width, height : int, px
+    scale : float
+        Size of texts and symbols.
+    """
+
+    width: int
+    height: int
+    scale: float
 
 
 class TooManyPagesError(RobocovError):
@@ -50,6 +70,10 @@ class Page:
         Whether its user has asked for control.
     settings : PageChanged or None
         Its size and color scheme, once it has reported them.
+    map_size : MapSize or None
+        Size of the map that it should show instead of the window, which would be too small on its screen.
+    shown_map : MapSize or None
+        Size of the map that it shows; None while it shows the window.
     upload : Upload or None
         The file that it is sending.
     base_number : int
@@ -73,6 +97,8 @@ class Page:
     page_id: str
     requests_control: bool = False
     settings: PageChanged | None = None
+    map_size: MapSize | None = None
+    shown_map: MapSize | None = None
     upload: Upload | None = None
     base_number: int = 0
     in_flight: deque[int] = field(default_factory=deque)
@@ -225,7 +251,7 @@ class Pages:
         """Size and color scheme that the window adopts; None until the controlling page has reported its own.
 
         The controlling page determines them, with one exception: a phone must not shrink the window that a
-        class sees on a projector. While a wide page is open, a controlling phone gets a scaled image.
+        class sees on a projector. While a wide page is open, a controlling phone shows the map alone.
         """
         controlling = self.controlling
         if controlling is None or controlling.settings is None:
@@ -235,6 +261,19 @@ class Pages:
             return controlling.settings
         # Prefer pages that may control: they are more likely on the projector.
         return min(wide, key=lambda page: (not page.may_control, page.number)).settings
+
+    def update_map_sizes(self) -> None:
+        """Choose in which size each phone shows the map; None for pages that show the window.
+
+        Phones show the map while the window has the size of a wide page.
+        """
+        window = self.display_settings
+        has_wide_window = window is not None and not window.is_narrow
+        sizes: list[MapSize] = []
+        for page in self._pages:
+            page.map_size = None
+            if has_wide_window and page.settings is not None and page.settings.is_narrow:
+                page.map_size = _choose_map_size(page.settings, sizes)
 
     def wake(self) -> None:
         """Wake the senders of all pages, so that they send the changes."""
@@ -281,3 +320,16 @@ class Pages:
             for page in self._pages
         ]
         self.wake()
+
+
+def _choose_map_size(settings: PageChanged, sizes: list[MapSize]) -> MapSize:
+    """Return the size of the map for a page; add it to `sizes` unless these are `MAX_MAP_SIZES` already."""
+    shrinkage = min(1.0, sqrt(MAX_MAP_PIXELS / (settings.width * settings.height)))
+    width = round(shrinkage * settings.width)
+    height = round(shrinkage * settings.height)
+    size = MapSize(width, height, shrinkage * settings.ratio)
+    if size not in sizes and len(sizes) >= MAX_MAP_SIZES:
+        return min(sizes, key=lambda other: abs(log(other.width / other.height * height / width)))
+    if size not in sizes:
+        sizes.append(size)
+    return size

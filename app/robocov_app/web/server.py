@@ -129,6 +129,8 @@ class WebDisplay:
         self._is_relayed = is_relayed
         self._offer: dict[str, Any] = {"number": 0, "name": ""}
         self._status = ""
+        self._window: BaseWindow | None = None
+        self._last_frame_number = 0
         self._files_listed_at = 0.0
         self._created_at = time()
         self._background: set[asyncio.Task[None]] = set()
@@ -159,6 +161,7 @@ class WebDisplay:
 
     def receive(self, window: BaseWindow) -> None:
         """Fit the window to the controlling page, and post that page's input as events."""
+        self._window = window
         self._status = window.status_text
         self.shared.window_input.post(window)
 
@@ -179,11 +182,12 @@ class WebDisplay:
         delivery = self.shared.delivery
         # The server's thread reads `newest`; it is woken only if the frame differs.
         previous = delivery.newest
-        number = 1 if previous is None else previous.number + 1
-        frame = Frame.from_surface(surface, number)
+        frame = Frame.from_surface(surface, self._last_frame_number + 1)
         if previous is None or not np.array_equal(previous.pixels, frame.pixels):
+            self._last_frame_number += 1
             delivery.newest = frame
             self._loop.call_soon_threadsafe(delivery.has_work.set)
+        self._send_maps()
         if monotonic() - self._files_listed_at >= SAVED_FILES_INTERVAL_S:
             self._files_listed_at = monotonic()
             self.saved_files = list_saved(self.shared.folder, self._created_at, self.shared.uploads)
@@ -198,6 +202,20 @@ class WebDisplay:
         if state != self.shared.state:
             self.shared.state = state
             self._loop.call_soon_threadsafe(self.shared.pages.wake)
+
+    def _send_maps(self) -> None:
+        """Send the map to the phones that show it instead of the window."""
+        delivery = self.shared.delivery
+        window = self._window
+        if window is None or delivery.newest is None:
+            return
+        if delivery.maps.update(window.replacement or window, delivery.newest, self._create_frame_number):
+            self._loop.call_soon_threadsafe(delivery.has_work.set)
+
+    def _create_frame_number(self) -> int:
+        """Return a number that no frame of the window or the map has."""
+        self._last_frame_number += 1
+        return self._last_frame_number
 
     # Called in the server's thread.
 
@@ -290,13 +308,12 @@ class WebDisplay:
             await PageConnection(page, self.shared).run()
         finally:
             pages.close(page)
-            self.shared.window_input.set_page(pages.display_settings)
-            # The delivery can drop the page's base frame.
-            self.shared.delivery.has_work.set()
+            # This also lets the delivery drop the page's base frame.
+            self.shared.update_sizes()
 
     def _handle_control_change(self, previous: Page | None, page: Page | None) -> None:
         """Fit the window to the new controlling page, and release the keys held in the previous one."""
-        self.shared.window_input.set_page(self.shared.pages.display_settings)
+        self.shared.update_sizes()
         if previous is not None:
             self.shared.window_input.put(events.FocusLost(kind="blur"))
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import pygame
 
 from robocov_app.toolkit.window.clipboard import Clipboard
-from robocov_app.web.events import EventTranslator, InputMessage, PageChanged, Uploaded, get_modifiers
+from robocov_app.web.events import (
+    EventTranslator,
+    InputMessage,
+    PageChanged,
+    PointerMessage,
+    Uploaded,
+    get_modifiers,
+)
+from robocov_app.web.pages import MapSize
 
 if TYPE_CHECKING:
     from robocov_app.toolkit.window.window import BaseWindow
@@ -35,6 +43,7 @@ class WindowInput:
         self._messages: deque[InputMessage | Uploaded] = deque()
         self._page: PageChanged | None = None
         self._fitted_page: PageChanged | None = None
+        self._map_size: MapSize | None = None
         self._is_narrow = False
         self._translator = EventTranslator(clipboard)
         self._held = 0
@@ -50,9 +59,17 @@ class WindowInput:
         self._messages.append(message)
         self._has_arrived.set()
 
-    def set_page(self, page: PageChanged | None) -> None:
-        """Let the window adopt the size and color scheme of a page; None changes nothing."""
+    def set_page(self, page: PageChanged | None, map_size: MapSize | None = None) -> None:
+        """Let the window adopt the size and color scheme of a page; None changes nothing.
+
+        Parameters
+        ----------
+        page : PageChanged or None
+        map_size : MapSize or None
+            Size of the map if the controlling page shows it instead of the window.
+        """
         self._page = page or self._page
+        self._map_size = map_size
         self._has_arrived.set()
 
     def wait(self, seconds: float) -> None:
@@ -78,9 +95,19 @@ class WindowInput:
                     return
                 self._held = held
                 pygame.key.set_mods(get_modifiers(held))
-            for event in self._translator.translate(self._messages.popleft()):
+            message = self._convert_pixel(self._messages.popleft(), window)
+            for event in self._translator.translate(message):
                 pygame.event.post(event)
                 has_posted = True
+
+    def _convert_pixel(self, message: InputMessage | Uploaded, window: BaseWindow) -> InputMessage | Uploaded:
+        """Convert a pixel of the map that a phone shows to the pixel of the window with the same point."""
+        size = self._map_size
+        if size is None or not isinstance(message, PointerMessage):
+            return message
+        shown = window.replacement or window
+        x, y = shown.find_window_pixel((size.width, size.height), (message.x, message.y))
+        return message.model_copy(update={"x": x, "y": y})
 
     def _fit(self, window: BaseWindow, page: PageChanged) -> None:
         """Give the window the size, scale and color scheme of a page."""
@@ -96,3 +123,4 @@ class WindowInput:
             shows_panel = not is_narrow
         self._is_narrow = is_narrow
         window.set_appearance(page.ratio, theme, panel=shows_panel)
+        window.reduce_motion(is_reduced=page.reduced_motion)

@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.play_mode import build_play_change
+from robocov_app.editor.ui.play_mode import BACK_COMMAND, build_play_change
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 
@@ -123,6 +123,17 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
         )
         driver.press_key("d")
         assert driver.window.closed
+
+
+def test_a_button_leads_back_to_the_editor(tmp_path: Path) -> None:
+    with open_editor(tmp_path, build_sheet()) as driver:
+        trial = start_trial(driver)
+        driver.run_frames(2)
+        button = trial.top_bar.ui.find("button", BACK_COMMAND)
+        assert button is not None
+        assert "F5" in trial.commands[BACK_COMMAND].tip
+        driver.click(*button.rect.center)
+        assert driver.window.play_window is None
 
 
 def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 from driven_window import Driver
 
 from robocov_app.render.camera import Camera
+from robocov_app.toolkit.window.display import REDUCED_MOTION_VARIABLE, prefers_reduced_motion
 from robocov_app.viewer.canvas.camera_glide import GLIDE_S, CameraGlide
 
 
@@ -62,3 +63,25 @@ def test_motion_can_be_switched_off(driver: Driver) -> None:
     driver.window.do("motion")
     driver.window.do("zoom:in")
     assert not canvas.camera.is_moving
+
+
+def test_reduced_motion_of_the_system_is_respected(driver: Driver) -> None:
+    canvas = driver.window.canvas
+    canvas.camera.is_animated = True
+    driver.window.reduce_motion(is_reduced=True)
+    driver.window.do("zoom:in")
+    assert not canvas.camera.is_moving
+    for _ in range(2):
+        driver.window.do("motion")
+    assert driver.viewer.message == "zooming is instant, because the system asks for reduced motion"
+    driver.window.reduce_motion(is_reduced=False)
+    driver.window.do("zoom:in")
+    assert canvas.camera.is_moving
+
+
+@pytest.mark.parametrize(("value", "is_reduced"), [("1", True), ("0", False), ("", False)])
+def test_a_variable_asks_for_reduced_motion(
+    value: str, is_reduced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(REDUCED_MOTION_VARIABLE, value)
+    assert prefers_reduced_motion() == is_reduced

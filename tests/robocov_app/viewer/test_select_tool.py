@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import pygame
 import pytest
 from driven_window import MIDDLE, MODIFIERS, Driver, get_position
 from pointer_events import build_event
-from sample_sessions import start_session
+from sample_sessions import advance_session, start_session
 
-from robocov.environment import CircleObstacle, Obstacle, WallObstacle
+from robocov.environment import CircleObstacle, Obstacle, PolygonObstacle, WallObstacle
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.hand import HandTool
+from robocov_app.viewer.tools.handles import drag_handle, find_handle, list_handles
 from robocov_app.viewer.tools.outlines import AddWallTool
 from robocov_app.viewer.tools.segments import RulerTool
+
+ObstacleT = TypeVar("ObstacleT", bound=Obstacle)
 
 PILLAR = (4.2, 1.2)
 WALL = (2.5, 3.2)
@@ -56,10 +61,10 @@ def test_the_obstacle_under_the_cursor_has_an_outline(driver: Driver) -> None:
 def test_a_click_selects_an_obstacle_and_delete_deletes_it(driver: Driver) -> None:
     count = len(list_obstacles(driver))
     driver.click_at(PILLAR)
-    assert isinstance(driver.viewer.inspection.obstacle, CircleObstacle)
+    assert isinstance(driver.viewer.selected_obstacles[0], CircleObstacle)
     assert len(list_obstacles(driver)) == count
     driver.press_key("escape")
-    assert driver.viewer.selected_obstacle is None
+    assert driver.viewer.selected_obstacles == ()
     driver.click_at(PILLAR)
     driver.press_key("delete")
     assert len(list_obstacles(driver)) == count - 1
@@ -71,7 +76,7 @@ def test_delete_removes_the_selected_robot(driver: Driver) -> None:
     driver.click_at(PILLAR)
     driver.press_key("i")
     assert driver.viewer.selected_robot == 1
-    assert driver.viewer.selected_obstacle is None
+    assert driver.viewer.selected_obstacles == ()
     driver.press_key("delete")
     assert 1 not in driver.session.displayed.numbers
 
@@ -85,7 +90,7 @@ def test_alt_drag_copies_an_obstacle(driver: Driver) -> None:
     assert after[: len(before)] == before
     assert isinstance(after[-1], CircleObstacle)
     assert after[-1].center == pytest.approx((4.6, 2.9), abs=0.05)
-    assert driver.viewer.inspection.obstacle == after[-1]
+    assert driver.viewer.selected_obstacles == (after[-1],)
 
 
 def test_shift_drag_keeps_the_direction(driver: Driver) -> None:
@@ -104,7 +109,7 @@ def test_the_menu_of_a_wall_changes_duplicates_and_deletes_it(driver: Driver) ->
     (wall,) = [each for each in list_obstacles(driver) if isinstance(each, WallObstacle)]
     assert wall.width == pytest.approx(0.125)
     driver.press_key("[")
-    assert driver.viewer.inspection.obstacle == list_obstacles(driver)[driver.viewer.selected_obstacle]
+    assert len(driver.viewer.selected_obstacles) == 1
     open_menu(driver, WALL)
     choose(driver, "duplicate")
     assert len(list_obstacles(driver)) == count + 1
@@ -168,6 +173,102 @@ def test_shift_keeps_angles_of_walls_and_of_the_ruler() -> None:
     ruler.press(session, build_event((0.5, 3.0)))
     ruler.move(session, build_event((1.5, 3.9), shift=True))
     assert ruler.segment.end == pytest.approx((1.45, 3.95))
+
+
+def find(driver: Driver, kind: type[ObstacleT]) -> ObstacleT:
+    """Return the only obstacle of a kind."""
+    (found,) = [each for each in list_obstacles(driver) if isinstance(each, kind)]
+    return found
+
+
+def test_the_rim_of_a_selected_circle_is_dragged(driver: Driver) -> None:
+    pillar = find(driver, CircleObstacle)
+    x, y = pillar.center
+    driver.click_at(pillar.center)
+    driver.drag_at((x + pillar.radius, y), (x + pillar.radius + 0.1, y), (x + 0.8, y))
+    changed = find(driver, CircleObstacle)
+    assert changed.center == pillar.center
+    assert changed.radius == pytest.approx(0.8, abs=0.03)
+    assert driver.viewer.selected_obstacles == (changed,)
+    driver.press_key("ctrl+z")
+    assert find(driver, CircleObstacle) == pillar
+
+
+def test_the_end_of_a_selected_wall_is_dragged_and_snaps(driver: Driver) -> None:
+    wall = find(driver, WallObstacle)
+    first, last = wall.points
+    driver.click_at(WALL)
+    driver.drag_at(last, (last[0], 1.0), (last[0] + 0.02, 0.03))
+    changed = find(driver, WallObstacle)
+    assert changed.points[0] == first
+    assert changed.points[-1] == pytest.approx((last[0] + 0.02, 0.0), abs=0.01)
+    assert changed.width == wall.width
+
+
+def test_a_polygon_is_resized_by_its_frame() -> None:
+    polygon = PolygonObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)))
+    reach = 0.2
+    handles = [handle for handle in list_handles(polygon, reach) if handle.kind == "corner"]
+    (corner,) = [handle for handle in handles if min(handle.position) > 1.0]
+    x, y = corner.position
+    larger = drag_handle(polygon, corner, (x + 2.0, y + 0.5))
+    assert larger.vertices == ((0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (0.0, 1.5))
+    similar = drag_handle(polygon, corner, (x + 2.0, y + 0.5), shift=True)
+    assert similar.vertices == ((0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (0.0, 2.0))
+    centered = drag_handle(polygon, corner, (x + 1.0, y), alt=True)
+    assert centered.vertices == ((-1.0, 0.0), (3.0, 0.0), (3.0, 1.0), (-1.0, 1.0))
+    inverted = drag_handle(polygon, corner, (x - 9.0, y))
+    assert inverted.polygon.area > 0.0
+
+
+def test_points_of_a_polygon_are_dragged() -> None:
+    polygon = PolygonObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0)))
+    handle = find_handle(polygon, (2.01, 1.0), 0.05)
+    assert handle is not None
+    assert drag_handle(polygon, handle, (2.2, 1.5)).vertices[2] == (2.2, 1.5)
+    assert drag_handle(polygon, handle, (2.1, 1.5), shift=True).vertices[2] == (2.0, 1.5)
+
+
+def test_obstacles_in_a_box_are_moved_by_the_arrow_keys_and_deleted(driver: Driver) -> None:
+    pillar = find(driver, CircleObstacle)
+    x, y = pillar.center
+    hold_keys("shift")
+    driver.drag_at((x - 0.6, y - 0.6), (x, y), (x + 0.6, y + 0.6))
+    hold_keys()
+    assert driver.viewer.selected_obstacles == (pillar,)
+    driver.press_key("right")
+    driver.press_key("shift+up")
+    moved = find(driver, CircleObstacle)
+    assert (moved.center[0] - x, moved.center[1] - y) == pytest.approx((0.05, 0.5))
+    assert driver.viewer.selected_obstacles == (moved,)
+    driver.press_key("delete")
+    assert [type(each) for each in list_obstacles(driver)] == [WallObstacle]
+
+
+def test_a_box_dragged_to_the_left_selects_what_it_touches(driver: Driver) -> None:
+    pillar = find(driver, CircleObstacle)
+    x, y = pillar.center
+    hold_keys("shift")
+    driver.drag_at((x + 0.9, y + 0.9), (x + 0.5, y + 0.3), (x, y))
+    assert driver.viewer.selected_obstacles == (pillar,)
+    driver.click_at(WALL)
+    assert set(driver.viewer.selected_obstacles) == set(list_obstacles(driver))
+    driver.click_at(WALL)
+    assert driver.viewer.selected_obstacles == (pillar,)
+    hold_keys()
+
+
+def test_selected_obstacles_are_dragged_together(driver: Driver) -> None:
+    before = list_obstacles(driver)
+    driver.viewer.inspection.select_obstacles(before)
+    driver.drag_at(PILLAR, (4.0, 1.25), (4.0, 1.3))
+    assert all(changed != old for changed, old in zip(list_obstacles(driver), before, strict=True))
+
+
+def test_arrow_keys_move_through_time_without_a_selection(driver: Driver) -> None:
+    advance_session(driver.session, 5)
+    driver.press_key("left")
+    assert not driver.session.timeline.is_live
 
 
 def test_a_hovered_obstacle_that_was_deleted_has_no_outline() -> None:

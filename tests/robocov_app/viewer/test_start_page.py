@@ -18,7 +18,7 @@ from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.commands import demo
 from robocov_app.commands.demo import Arguments
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.window.display import open_display
+from robocov_app.toolkit.window.display import REDUCED_MOTION_VARIABLE, open_display
 from robocov_app.viewer.start.cards import START_CARDS, StartChoice, Target, choose_map, choose_session
 from robocov_app.viewer.start.page import ANIMATION_S, StartPage
 from robocov_app.viewer.start.previews import load_previews
@@ -174,6 +174,15 @@ def test_examples_move_and_rest_after_a_while() -> None:
         rest = page.build_frame_key()
         page.run_frame(5.0)
         assert page.build_frame_key() == rest
+
+
+def test_examples_stand_still_with_reduced_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(REDUCED_MOTION_VARIABLE, "1")
+    with open_page() as page:
+        page.run_frame(0.1)
+        key = page.build_frame_key()
+        page.run_frame(1.0)
+        assert page.build_frame_key() == key
 
 
 def test_outlines_are_those_of_the_bundled_maps() -> None:

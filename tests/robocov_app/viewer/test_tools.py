@@ -166,17 +166,17 @@ def test_the_hand_moves_obstacles():
     hand = HandTool(Inspection())
     session = start_session()
     hand.press(session, build_event((4.2, 1.2)))
-    assert hand.obstacle == 0
-    assert hand.build_overlay(session) == ViewerToolOverlay(selected=HALL.obstacles[0])
+    assert hand.is_holding
+    assert hand.build_overlay(session).selected == HALL.obstacles[:1]
     hand.move(session, build_event((4.5, 2.2)))
     state = hand.build_overlay(session)
-    assert state.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
+    assert state.obstacles == (replace(HALL.obstacles[0], center=(4.5, 2.2)),)
     assert state.line == ((4.2, 1.2), (4.5, 2.2))
     assert state.label == "1.04 m"
     assert session.displayed.environment is HALL
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) == "circle “pillar” moved"
-    assert session.displayed.environment.obstacles == (state.obstacle, HALL.obstacles[1])
-    assert hand.build_overlay(session) == ViewerToolOverlay(selected=state.obstacle)
+    assert session.displayed.environment.obstacles == (*state.obstacles, HALL.obstacles[1])
+    assert hand.build_overlay(session).selected == state.obstacles
     assert session.undo() == "circle “pillar” moved"
     assert session.displayed.environment == HALL
 
@@ -197,7 +197,7 @@ def test_the_map_can_change_while_an_obstacle_is_dragged():
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "obstacles reversed")
-    assert hand.build_overlay(session) == ViewerToolOverlay(selected=HALL.obstacles[0])
+    assert hand.build_overlay(session).selected == HALL.obstacles[:1]
     assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
@@ -287,7 +287,7 @@ def test_enter_ends_a_wall():
     click(tool, session, (3.2, 3.2), (3.2, 3.8))
     tool.move(session, build_event((3.8, 3.8)))
     state = tool.build_overlay(session)
-    assert state.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
+    assert state.obstacles == (WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M),)
     assert state.label == "0.60 m, 0.1 m wide"
     assert tool.finish(session) == "wall drawn"
     assert session.displayed.environment.obstacles[-1] == WallObstacle(
@@ -330,7 +330,7 @@ def test_a_wall_requires_two_points():
     tool = AddWallTool()
     session = start_session()
     click(tool, session, (3.2, 3.2))
-    assert tool.build_overlay(session).obstacle is None
+    assert tool.build_overlay(session).obstacles == ()
     with pytest.raises(MapError, match="two points that are apart"):
         tool.finish(session)
     assert session.displayed.environment is HALL
@@ -343,10 +343,10 @@ def test_a_circle_is_drawn_from_its_center():
     tool = AddCircleTool()
     session = start_session()
     tool.press(session, build_event((3.5, 3.2)))
-    assert tool.build_overlay(session).obstacle is None
+    assert tool.build_overlay(session).obstacles == ()
     tool.move(session, build_event((3.5, 3.5)))
     assert tool.build_overlay(session).label == "radius 0.30 m"
-    assert tool.build_overlay(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
+    assert tool.build_overlay(session).obstacles == (CircleObstacle((3.5, 3.2), 0.3),)
     assert tool.release(session, build_event((3.5, 3.5)), clicked=False) == "circle drawn"
     assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
     assert tool.release(session, build_event((3.5, 3.5)), clicked=False) is None

@@ -6,9 +6,11 @@ from importlib.resources import files
 from itertools import count
 from types import SimpleNamespace
 
+import pytest
+
 from robocov_app.web.events import PageChanged
 from robocov_app.web.files import list_saved
-from robocov_app.web.pages import Pages
+from robocov_app.web.pages import MAX_MAP_PIXELS, MAX_MAP_SIZES, Pages
 
 IDENTITIES = count()
 
@@ -58,6 +60,37 @@ def test_a_phone_alone_has_a_window_of_its_size():
     phone = open_page(pages, may_control=True)
     report_size(phone, 390, 800)
     assert pages.display_settings is phone.settings
+
+
+def test_phones_show_the_map_while_the_window_is_wide():
+    pages = Pages(lambda previous, page: None)
+    projector = open_page(pages, may_control=True)
+    report_size(projector, 1920, 1080)
+    phones = [open_page(pages, may_control=False) for _ in range(2)]
+    for phone in phones:
+        report_size(phone, 780, 1600, ratio=2.0)
+    pages.update_map_sizes()
+    assert projector.map_size is None
+    size = phones[0].map_size
+    assert size == phones[1].map_size
+    assert size.width * size.height <= MAX_MAP_PIXELS + 2000
+    assert size.width / size.height == pytest.approx(780 / 1600, abs=0.001)
+    assert size.scale / 2.0 == pytest.approx(size.width / 780, abs=0.001), "texts have the size of the page's"
+    pages.close(projector)
+    pages.give_control(phones[0])
+    pages.update_map_sizes()
+    assert [phone.map_size for phone in phones] == [None, None], "the window has the size of a phone"
+
+
+def test_the_number_of_sizes_of_the_map_is_limited():
+    pages = Pages(lambda previous, page: None)
+    report_size(open_page(pages, may_control=True), 1920, 1080)
+    phones = [open_page(pages, may_control=False) for _ in range(MAX_MAP_SIZES + 3)]
+    for number, phone in enumerate(phones):
+        report_size(phone, 390, 600 + 20 * number)
+    pages.update_map_sizes()
+    assert len({phone.map_size for phone in phones}) == MAX_MAP_SIZES
+    assert phones[-1].map_size == phones[MAX_MAP_SIZES - 1].map_size, "the most similar one"
 
 
 def test_uploaded_files_are_not_offered_as_saved_until_they_are_saved(tmp_path):

@@ -25,6 +25,7 @@ from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.display import open_display
 from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
@@ -660,6 +661,100 @@ def test_who_comes_to_a_window_at_rest_sees_it(display):
             while not isinstance(data := line.recv(5), bytes):
                 pass
         assert np.array_equal(decode_picture(data, None), Frame.from_surface(surface, 0).pixels)
+
+
+class FakeWindow:
+    """A window whose map is all of one color, unless a dialog covers it."""
+
+    replacement = None
+    status_text = ""
+
+    def __init__(self):
+        self.screen = pygame.Surface((1280, 720), 0, 32)
+        self.has_dialog = False
+        self.shade = 0
+
+    def set_appearance(self, scale, theme, *, panel):
+        pass
+
+    def reduce_motion(self, *, is_reduced):
+        self.is_motion_reduced = is_reduced
+
+    def draw_map(self, size, scale):
+        if self.has_dialog:
+            return None
+        picture = pygame.Surface(size, 0, 32)
+        picture.fill((self.shade, 0, 0))
+        return picture
+
+    def find_window_pixel(self, size, pixel):
+        return pixel if self.has_dialog else (pixel[0] + 1000, pixel[1])
+
+
+def receive_frame(socket, before):
+    """Return the picture of a page after the next frame that it receives."""
+    while not isinstance(data := socket.recv(5), bytes):
+        pass
+    socket.send(json.dumps({"kind": "shown", "number": HEADER.unpack_from(data)[0]}))
+    return decode_picture(data, before)
+
+
+def send_until(display, window, condition):
+    """Send frames of a window, until a condition is true."""
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline
+        display.receive(window)
+        display.send(window.screen)
+        time.sleep(0.02)
+
+
+def test_a_phone_that_watches_gets_the_map_and_sees_dialogs(display):
+    window = FakeWindow()
+    delivery = display.shared.delivery
+    wide = {"kind": "page", "width": 1280, "height": 720, "ratio": 1.0, "dark": False}
+    with open_socket(display, Cookie=read_cookie(display)) as projector, open_watcher(display) as phone:
+        projector.send(json.dumps(wide))
+        phone.send(json.dumps({**wide, "width": 390, "height": 800}))
+        send_until(display, window, lambda: delivery.maps.frames)
+        shown = None
+        while shown is None or shown.shape != (800, 390):
+            shown = receive_frame(phone, shown)
+        window.shade = 7
+        window.screen.fill((1, 2, 3))
+        send_until(display, window, lambda: delivery.maps.frames and window.shade == 7)
+        time.sleep(0.1)
+        send_until(display, window, lambda: True)
+        display.send(window.screen)
+        while shown[0, 0] != 7 << 16:
+            shown = receive_frame(phone, shown)
+        assert receive_frame(projector, None).shape == (720, 1280)
+        window.has_dialog = True
+        window.screen.fill((4, 5, 6))
+        send_until(display, window, lambda: not delivery.maps.frames)
+        while shown.shape != (720, 1280):
+            shown = receive_frame(phone, shown)
+
+
+def test_a_phone_in_control_points_at_the_map(display):
+    window = FakeWindow()
+    wide = {"kind": "page", "width": 1280, "height": 720, "ratio": 1.0, "dark": False, "reduced_motion": True}
+    pages = display.shared.pages
+    with (
+        open_display(headless=True),
+        open_socket(display, Cookie=read_cookie(display)) as projector,
+        open_watcher(display) as phone,
+    ):
+        projector.send(json.dumps(wide))
+        phone.send(json.dumps({**wide, "width": 390, "height": 800}))
+        send_until(display, window, lambda: display.shared.delivery.maps.frames)
+        projector.send(json.dumps({"kind": "control", "to": 2}))
+        send_until(display, window, lambda: pages.controlling is not None and pages.controlling.number == 2)
+        pygame.event.clear()
+        phone.send(json.dumps({"kind": "move", "x": 30.0, "y": 40.0}))
+        send_until(display, window, lambda: pygame.event.peek(pygame.MOUSEMOTION))
+        assert pygame.event.get(pygame.MOUSEMOTION)[-1].pos == (1030, 40)
+        assert window.is_motion_reduced
 
 
 def test_a_program_that_asks_for_heads_alone_gets_them(display):

@@ -15,6 +15,9 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.toolkit.command_bar import BarCell, measure_cells
+from robocov_app.toolkit.commands.command import Command
+from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.viewer.actions.files import FileActions
 from robocov_app.viewer.costs.costs import Costs
@@ -22,8 +25,10 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window.top_bar import TopBar
 from robocov_app.viewer.window.window import ViewerWindow
 
+BACK_COMMAND = "editor"
 DRAFT_PAUSE_S = 1.0  # minimum time between two drafts of a map in play mode
 FIRST_UPDATE_S = 0.01
 
@@ -67,6 +72,15 @@ class PlayPresenter(Presenter):
     def __init__(self, session: Session, costs: Costs, layers: set[str], folder: Path, title: str) -> None:
         super().__init__(session, costs, layers, folder, title, controllers=list_controller_classes())
         self.files = PlayFiles(self, folder, title)
+
+
+class PlayTopBar(TopBar):
+    """The top bar of the viewer in play mode, which has a button that leads back to the editor."""
+
+    def list_left_cells(self, ui: Ui, width: float) -> list[BarCell]:
+        """Return the cells at the left end: the way back, undo, redo and the file."""
+        back = self.build_wide_button(ui, "back", "Editor", command=BACK_COMMAND)
+        return [back, *super().list_left_cells(ui, width - measure_cells([back]))]
 
 
 class PlayDrafts:
@@ -138,9 +152,21 @@ class PlayWindow(ViewerWindow):
         if event.type == pygame.KEYDOWN and event.key == self.ignored_key:
             return
         if event.type == pygame.KEYDOWN and get_key_name(event) == "f5":
-            self.returns_to_editor = True
+            self.return_to_editor()
         else:
             super().handle_event(event)
+
+    def list_more_commands(self) -> list[Command]:
+        """Return the command that leads back to the editor."""
+        return [Command(BACK_COMMAND, "Back to the editor", "File", self.return_to_editor, ("f5",))]
+
+    def build_top_bar(self, viewer: Presenter) -> TopBar:
+        """Build the top bar with a button that leads back to the editor."""
+        return PlayTopBar(viewer, self.commands, self.do)
+
+    def return_to_editor(self) -> None:
+        """Return to the editor at the end of the frame."""
+        self.returns_to_editor = True
 
     def save_draft(self, *, force: bool = False) -> None:
         """Save a draft of the map with the changes made here, unless another map was opened."""

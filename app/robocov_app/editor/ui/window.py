@@ -38,7 +38,7 @@ from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.command_window import CommandWindow
-from robocov_app.toolkit.window.display import set_title
+from robocov_app.toolkit.window.display import prefers_reduced_motion, set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
 
@@ -139,6 +139,7 @@ class EditorWindow(CommandWindow):
         self.pointer = EditorPointer(editor, self.canvas, self.parts, self.open_menu)
         self.team_sampler = TeamSampler()
         self._waits_for_workers = waits_for_workers
+        self._is_motion_reduced = prefers_reduced_motion()
         editor.snapper.waits_for_targets = waits_for_workers
         self._layout_key: tuple[object, ...] | None = None
         self._arrange()
@@ -246,6 +247,12 @@ class EditorWindow(CommandWindow):
         self.editor.revision += 1
         if self.play_window is not None:
             self.play_window.set_appearance(scale, theme, panel=panel)
+
+    def reduce_motion(self, *, is_reduced: bool) -> None:
+        """Adopt the setting of the user's system for reduced motion, which matters in play mode."""
+        self._is_motion_reduced = is_reduced
+        if self.play_window is not None:
+            self.play_window.reduce_motion(is_reduced=is_reduced)
 
     def update(self, seconds: float) -> None:
         """Advance the clock, poll files and workers, and update layout, parts, cursor and title."""
@@ -374,6 +381,7 @@ class EditorWindow(CommandWindow):
         play_window = open_play_window(
             self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers
         )
+        play_window.reduce_motion(is_reduced=self._is_motion_reduced)
         play_window.windowed_size = self.windowed_size
         play_window.cursor = self.cursor
         self.play_window = play_window

@@ -21,11 +21,23 @@ _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
 """Environment variables. On Linux, one of them must be set for a visible window."""
 _INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
 """Drivers that SDL silently falls back to without a display; the program would run forever, unseen."""
+REDUCED_MOTION_VARIABLE = "ROBOCOV_REDUCED_MOTION"
+"""Environment variable: if it is neither empty nor 0, windows on the screen show no animations."""
 _FULL_HD_HEIGHT_PX = 1080
 _MAX_SCALE = 3.0
 _SCALE_STEP = 0.25
 _COLLECTION_THRESHOLD = 50_000
 """Allocations between garbage collections: about one collection per frame (Python's default is 700)."""
+
+
+def prefers_reduced_motion() -> bool:
+    """Return whether the user wants no animations; SDL does not know the setting of the system.
+
+    Returns
+    -------
+    bool
+    """
+    return os.environ.get(REDUCED_MOTION_VARIABLE, "") not in ("", "0")
 
 
 @contextmanager

@@ -152,6 +152,36 @@ def build_layout(
     )
 
 
+def build_map_layout(size: tuple[int, int], scale: float, panes: int, aspect: float) -> Layout:
+    """Lay out a picture that consists of the panes alone.
+
+    Parameters
+    ----------
+    size, scale, panes, aspect
+        See `build_layout`; the scale is not reduced.
+
+    Returns
+    -------
+    Layout
+        All boxes other than those of the panes are empty.
+    """
+    arena = Box(0, 0, *size)
+    empty = Box(0, 0, 0, 0)
+    return Layout(
+        size=size,
+        scale=scale,
+        bar=empty,
+        rail=empty,
+        arena=arena,
+        panel=empty,
+        chart=empty,
+        time_slider=empty,
+        status=empty,
+        panes=_arrange_panes(panes, aspect, scale, arena, 0),
+        legend=empty,
+    )
+
+
 def _arrange_panes(
     count: int, aspect: float, scale: float, arena: Box, legend_height: int
 ) -> tuple[Box, ...]:

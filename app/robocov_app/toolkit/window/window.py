@@ -139,6 +139,38 @@ class BaseWindow:
         """Text that a screen reader announces when it changes."""
         return ""
 
+    def draw_map(self, size: tuple[int, int], scale: float) -> Surface | None:
+        """Draw the map without the controls of the window, for a small screen.
+
+        Parameters
+        ----------
+        size : (width, height), px
+        scale : float
+            Size of texts and symbols.
+
+        Returns
+        -------
+        pygame.Surface or None
+            None if the window itself must be seen now, because it shows a dialog, for example.
+        """
+        return None
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same point of the map.
+
+        Parameters
+        ----------
+        size : (width, height), px
+            Size of a picture that `draw_map` has returned.
+        pixel : (x, y)
+            Pixel of that picture.
+
+        Returns
+        -------
+        (x, y)
+        """
+        return pixel
+
     def close(self) -> None:
         """Stop threads and processes that the window has started."""
 
@@ -153,6 +185,9 @@ class BaseWindow:
         panel : bool or None
             Whether the panel is shown; None to leave it as it is.
         """
+
+    def reduce_motion(self, *, is_reduced: bool) -> None:
+        """Adopt the setting of the user's system for reduced motion."""
 
     def create_save_point(self) -> RollBack:
         """Return a function that reverts all later changes; it is called if handling an event raises."""

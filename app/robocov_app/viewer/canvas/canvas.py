@@ -61,6 +61,8 @@ class ViewerCanvas:
         The viewer.
     theme : Theme
         Colors.
+    has_controls : bool
+        Whether the window draws its layer bar over the canvas, and its status line below.
 
     Attributes
     ----------
@@ -74,9 +76,10 @@ class ViewerCanvas:
 
     layout: Layout
 
-    def __init__(self, viewer: Presenter, theme: Theme) -> None:
+    def __init__(self, viewer: Presenter, theme: Theme, *, has_controls: bool = True) -> None:
         """Build a canvas without painters; `arrange` adds them."""
         self.viewer = viewer
+        self._has_controls = has_controls
         self.theme = theme
         self.camera = SharedCamera(viewer)
         self.hovered: HoveredRobot | None = None
@@ -161,10 +164,14 @@ class ViewerCanvas:
         # A pane that was just added has no painter and no box in the layout yet.
         for pane, painter, box in zip(panes, self._painters, self.layout.panes, strict=False):
             # The caption of a pane is always visible.
-            fixed_layers = {"caption"} & {layer.name for layer in painter.layers}
+            fixed_layers = {"caption"}
+            if not self._has_controls:
+                fixed_layers.add("status")
+            fixed_layers &= {layer.name for layer in painter.layers}
             painter.visible = self.viewer.view.layers | fixed_layers
             painter.top_strip = 0.0
-            if len(panes) == 1 and "legend" in self.viewer.view.layers:
+            has_layer_bar = self._has_controls and "legend" in self.viewer.view.layers
+            if len(panes) == 1 and has_layer_bar:
                 painter.top_strip = BAR_HEIGHT_PX + _BAR_GAP_PX
             scene = self._scene_builder.build(pane, painter)
             surface = screen.subsurface(pygame.Rect(box))

@@ -85,6 +85,18 @@ class SharedCamera:
             camera = replace(camera, zoom=FOLLOW_ZOOM * camera.zoom)
         self._show(replace(camera, center=point))
 
+    def follow(self, other: "SharedCamera") -> None:
+        """Show the section of the map that the camera of another canvas shows."""
+        if other._camera is None and other._glide is None:
+            self._camera = None
+            for painter in self._painters:
+                painter.fit()
+            return
+        shown = other._painters[0].camera
+        view = self._painters[0].camera.view
+        shrinkage = min(view[2] / shown.view[2], view[3] / shown.view[3])
+        self._show(replace(shown, zoom=shrinkage * shown.zoom))
+
     @property
     def is_moving(self) -> bool:
         """Whether the camera is gliding."""
@@ -110,7 +122,8 @@ class SharedCamera:
 
     def _glide_from(self, start: Camera) -> None:
         """Let the camera glide from `start` to the present one, unless the user prefers no motion."""
-        if self.is_animated and self._viewer.view.has_motion:
+        view = self._viewer.view
+        if self.is_animated and view.has_motion and not view.is_motion_reduced:
             self._glide = CameraGlide(start, self._painters[0].camera.with_view(start.view))
             self.update(0.0)
 

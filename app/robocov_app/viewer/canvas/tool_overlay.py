@@ -1,6 +1,7 @@
 """Overlays on a pane: dragged and hovered robots, and previews of tools."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pygame
@@ -20,6 +21,7 @@ from robocov_app.viewer.tools.tool import ViewerToolOverlay
 # Lengths in pixels at scale 1.
 FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
 _MARK_PX = 3.0  # half the side of the mark of a point
+_HANDLE_PX = 4.0  # half the side of a handle
 _LINE_PX = 1.5
 _SELECTED_LINE_PX = 2.5  # outline of the selected obstacle
 _CLOSING_LINE_PX = 1.0  # from the last point of an outline to its first one
@@ -76,16 +78,20 @@ def draw_tool_overlay(canvas: Canvas, overlay: ViewerToolOverlay) -> None:
     if overlay.hovered is not None:
         color = mix(canvas.theme.background, canvas.theme.accent, _HOVER_STRENGTH)
         _draw_obstacle_outline(canvas, overlay.hovered, color, _LINE_PX)
-    if overlay.selected is not None:
-        _draw_obstacle_outline(canvas, overlay.selected, canvas.theme.accent, _SELECTED_LINE_PX)
-    if overlay.obstacle is not None:
-        _draw_obstacle(canvas, overlay.obstacle)
+    for obstacle in overlay.selected:
+        _draw_obstacle_outline(canvas, obstacle, canvas.theme.accent, _SELECTED_LINE_PX)
+    for obstacle in overlay.obstacles:
+        _draw_obstacle(canvas, obstacle)
+    if overlay.handles:
+        _draw_marks(canvas, canvas.camera.to_pixels(np.array(overlay.handles)), _HANDLE_PX)
+    if overlay.box is not None:
+        _draw_box(canvas, canvas.camera.to_pixels(np.array(overlay.box)))
     if not overlay.line:
         return
     points = canvas.camera.to_pixels(np.array(overlay.line))
     _draw_line(canvas, points, is_closed=overlay.is_closed)
     if overlay.has_marks:
-        _draw_marks(canvas, points)
+        _draw_marks(canvas, points, _MARK_PX)
     if overlay.label:
         x, y = points[-1].tolist()
         dx, dy = _LABEL_OFFSET_PX
@@ -123,8 +129,17 @@ def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
         )
 
 
-def _draw_marks(canvas: Canvas, points: Array) -> None:
-    size = _MARK_PX * canvas.scale
+def _draw_box(canvas: Canvas, corners: Array) -> None:
+    """Draw a dashed box between two opposite corners, px."""
+    (left, top), (right, bottom) = corners.tolist()
+    outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+    for start, end in pairwise(outline):
+        canvas.draw_dashed_line(start, end, canvas.theme.accent, canvas.scale_width(_LINE_PX))
+
+
+def _draw_marks(canvas: Canvas, points: Array, half_size: float) -> None:
+    """Draw a square at each point; half of its size is in px at scale 1."""
+    size = half_size * canvas.scale
     for x, y in points.tolist():
         box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
         pygame.draw.rect(canvas.surface, canvas.theme.background, box)

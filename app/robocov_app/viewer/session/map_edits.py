@@ -1,6 +1,6 @@
 """Edits of a map: adding, moving and removing obstacles, and painting the density."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -80,14 +80,21 @@ def move_obstacle(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
     """Return an obstacle moved by dx and dy, m."""
 
     def move(point: Point) -> Point:
-        return round(point[0] + dx, _COORDINATE_DECIMALS), round(point[1] + dy, _COORDINATE_DECIMALS)
+        return point[0] + dx, point[1] + dy
 
     if isinstance(obstacle, CircleObstacle):
-        return replace(obstacle, center=move(obstacle.center))
+        (center,) = map_points((obstacle.center,), move)
+        return replace(obstacle, center=center)
     if isinstance(obstacle, WallObstacle):
-        return replace(obstacle, points=tuple(map(move, obstacle.points)))
-    holes = tuple(tuple(map(move, hole)) for hole in obstacle.holes)
-    return replace(obstacle, vertices=tuple(map(move, obstacle.vertices)), holes=holes)
+        return replace(obstacle, points=map_points(obstacle.points, move))
+    holes = tuple(map_points(hole, move) for hole in obstacle.holes)
+    return replace(obstacle, vertices=map_points(obstacle.vertices, move), holes=holes)
+
+
+def map_points(points: Iterable[Point], function: Callable[[Point], Point]) -> tuple[Point, ...]:
+    """Apply a function to points, m, and round the results to a tenth of a millimeter."""
+    mapped = map(function, points)
+    return tuple((round(x, _COORDINATE_DECIMALS), round(y, _COORDINATE_DECIMALS)) for x, y in mapped)
 
 
 def find_obstacle(environment: Environment, point: Point, reach: float = 0.0) -> int | None:

@@ -19,6 +19,7 @@ from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.help_page import draw_help_page
 from robocov_app.toolkit.dialogs import Dialogs, create_file_choice
 from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.window.display import prefers_reduced_motion
 from robocov_app.toolkit.window.input import get_wheel_notches
 from robocov_app.toolkit.window.layout import Box, find_max_scale
 from robocov_app.toolkit.window.window import BaseWindow
@@ -40,6 +41,8 @@ ANIMATION_S = 30.0
 """Time after the last event for which the examples move."""
 ANIMATION_FPS = 10.0
 """Pictures per second of the examples."""
+STILL_TIME_S = 3.0
+"""Time of the examples with reduced motion, at which the robots have left their starts."""
 
 _TITLE = "robocov"
 _TAGLINE = "Robots share out a building that they do not know. Pick an example and play."
@@ -109,6 +112,7 @@ class StartPage(BaseWindow):
         self._maps = MapSection(previews, self.choose)
         self._recent_sessions = RecentSection(self._recent, self.open_file)
         self._animated_until_s = ANIMATION_S
+        self._is_motion_reduced = prefers_reduced_motion()
         self._commands = CommandTable(self._list_commands(), self.model.attempt)
         self._arrange()
         self.draw()
@@ -261,7 +265,12 @@ class StartPage(BaseWindow):
 
     @property
     def _preview_time(self) -> float:
-        """Time of the examples, s; it stops a while after the last event."""
+        """Time of the examples, s.
+
+        It stops a while after the last event. With reduced motion, it is fixed.
+        """
+        if self._is_motion_reduced:
+            return STILL_TIME_S
         return min(self.model.now, self._animated_until_s)
 
     def _arrange(self) -> None:

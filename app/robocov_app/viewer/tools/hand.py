@@ -3,24 +3,24 @@
 from dataclasses import dataclass
 from math import dist
 
-import numpy as np
-
 from robocov.environment import Obstacle, Point
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay, change_map
+from robocov_app.viewer.tools.handles import find_handle, list_handles
+from robocov_app.viewer.tools.obstacle_drags import BoxDrag, HandleDrag, MoveDrag, ObstacleDrag
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay
 
 MIN_DRAG_M = 0.02  # a shorter move counts as part of a click
-_MIN_SHIFT_M = 1e-3  # an obstacle that is moved by less stays where it is
 
 
 @dataclass
 class HandTool(ViewerTool):
-    """Selects, drags and throws robots, and selects, moves and copies obstacles.
+    """Selects, drags and throws robots; selects, moves, copies and resizes obstacles.
 
-    While an obstacle is dragged, Shift keeps the direction a multiple of 45°, and Alt makes a copy.
+    While an obstacle is dragged, Shift keeps the direction a multiple of 45°, and Alt makes a copy. A click
+    with Shift adds an obstacle to the selection, and a drag of the floor with Shift selects those in a box.
 
     Attributes
     ----------
@@ -28,8 +28,8 @@ class HandTool(ViewerTool):
         The selection; a press selects the robot or the obstacle under the pointer.
     robot : int or None
         Number of the robot that is held.
-    obstacle : int or None
-        Index of the obstacle that is held.
+    drag : ObstacleDrag or None
+        The drag of obstacles, of a handle or of a box.
     hovered : Obstacle or None
         The obstacle under the pointer.
     """
@@ -38,48 +38,80 @@ class HandTool(ViewerTool):
     title = "Hand"
     key = "v"
     hint = (
-        "click or drag a robot or an obstacle; Alt-drag copies it; right click: menu; drag the floor to pan"
+        "click or drag a robot or an obstacle; Alt-drag copies it; Shift-drag selects several; "
+        "right click: menu; drag the floor to pan"
     )
     takes_robots = True
 
     inspection: Inspection
     robot: int | None = None
-    obstacle: int | None = None
+    drag: ObstacleDrag | None = None
     hovered: Obstacle | None = None
     _pressed_at: Point = (0.0, 0.0)
-    _cursor: Point = (0.0, 0.0)
-    _obstacles: tuple[Obstacle, ...] = ()  # of the map when the button was pressed
+    _reach: float = 0.0  # of the latest event, m
     _drags: bool = False
-    _copies: bool = False
+    _is_over_handle: bool = False
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Grab the robot or the obstacle under the cursor."""
+        """Grab the handle, robot or obstacle under the cursor; with Shift, start a box on the floor."""
         self._pressed_at = event.unsnapped_point
-        self._cursor = event.unsnapped_point
+        self._reach = event.reach
         self._drags = False
-        self._copies = False
-        self._obstacles = session.displayed.environment.obstacles
-        self.robot = event.robot
-        self.obstacle = None
+        self.drag = self._start_handle_drag(session, event)
+        self.robot = None
+        if self.drag is not None:
+            return None
         if event.robot is not None:
+            self.robot = event.robot
             self.inspection.select_robot(event.robot)
             return None
-        self.obstacle = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point)
-        if self.obstacle is not None:
-            self.inspection.select_obstacle(self._obstacles[self.obstacle])
+        index = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point)
+        if index is not None:
+            self._press_obstacle(session, event, session.displayed.environment.obstacles[index])
+        elif event.shift:
+            self.drag = BoxDrag(session, event)
         return None
+
+    def _start_handle_drag(self, session: Session, event: ViewerPointerEvent) -> ObstacleDrag | None:
+        """Return the drag of the handle under the pointer; None if there is none."""
+        selected = self._get_single_selection(session)
+        if selected is None:
+            return None
+        handle = find_handle(selected, event.unsnapped_point, event.reach)
+        if handle is None:
+            return None
+        return HandleDrag(session, event, selected, handle)
+
+    def _press_obstacle(self, session: Session, event: ViewerPointerEvent, pressed: Obstacle) -> None:
+        """Select an obstacle; if it is one of several selected ones, drag all of them."""
+        if event.shift and self.inspection.obstacles:
+            self.inspection.toggle_obstacle(pressed)
+        elif pressed not in self.inspection.obstacles:
+            self.inspection.select_obstacles((pressed,))
+        obstacles = session.displayed.environment.obstacles
+        selected = tuple(obstacle for obstacle in self.inspection.obstacles if obstacle in obstacles)
+        self.drag = MoveDrag(session, event, selected)
+
+    def _get_single_selection(self, session: Session) -> Obstacle | None:
+        """Return the selected obstacle if it is the only one, and still on the displayed map."""
+        selected = self.inspection.obstacles
+        if len(selected) != 1 or selected[0] not in session.displayed.environment.obstacles:
+            return None
+        return selected[0]
 
     @property
     def is_holding(self) -> bool:
-        """Whether a robot or an obstacle is held."""
-        return self.robot is not None or self.obstacle is not None
+        """Whether a robot, an obstacle, a handle or a box is held."""
+        return self.robot is not None or self.drag is not None
 
     def move(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Drag the held robot; a held obstacle is moved only when the button is released."""
+        """Drag the held robot; held obstacles are changed only when the button is released."""
+        self._reach = event.reach
         if not self.is_holding:
             self._hover(session, event)
             return
-        self._follow_pointer(event)
+        if self.drag is not None:
+            self.drag.update(event)
         if dist(self._pressed_at, event.unsnapped_point) > MIN_DRAG_M:
             self._drags = True
         if self.robot is None or not self._drags:
@@ -89,89 +121,67 @@ class HandTool(ViewerTool):
             session.drag_robot(self.robot, event.unsnapped_point)
 
     def _hover(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Note the obstacle under the pointer; a robot in front of it takes precedence."""
+        """Note the handle or the obstacle under the pointer; a robot in front of it takes precedence."""
         environment = session.displayed.environment
         self.hovered = None
-        if event.robot is None:
+        selected = self._get_single_selection(session)
+        self._is_over_handle = False
+        if selected is not None:
+            self._is_over_handle = find_handle(selected, event.unsnapped_point, event.reach) is not None
+        if event.robot is None and not self._is_over_handle:
             index = map_edits.find_obstacle(environment, event.unsnapped_point)
             if index is not None:
                 self.hovered = environment.obstacles[index]
 
-    def _follow_pointer(self, event: ViewerPointerEvent) -> None:
-        """Move a held obstacle with the pointer; Shift keeps its direction, Alt copies it."""
-        self._copies = event.alt
-        self._cursor = event.unsnapped_point
-        if self.obstacle is not None:
-            self._cursor = event.constrain(self._pressed_at)
-
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Let go of the held robot, or move or copy the held obstacle to its new position."""
-        self._follow_pointer(event)
-        index = self.obstacle
-        moved = self._move_obstacle(session)
+        """Let go of the held robot, or apply the drag of obstacles."""
+        drag = self.drag
         if self.robot is not None:
             session.release()
         self.robot = None
-        self.obstacle = None
-        if moved is None or index is None:
+        self.drag = None
+        if drag is None or clicked:
             return None
-        name = map_edits.describe_obstacle(moved)
-        if self._copies:
-            environment = map_edits.add_obstacle(session.displayed.environment, moved)
-            message = change_map(session, environment, f"{name} copied")
-        else:
-            environment = map_edits.replace_obstacles(session.displayed.environment, index, 1, [moved])
-            message = change_map(session, environment, f"{name} moved")
-        self.inspection.select_obstacle(moved)
-        return message
+        drag.update(event)
+        if drag.is_outdated(session):
+            return None
+        return drag.end(session, self.inspection)
 
     def cancel(self, session: Session) -> bool:
         """Release the held object, or else clear the selection; return whether there was either."""
         if not self.is_holding:
             return self.inspection.clear()
         self.robot = None
-        self.obstacle = None
+        self.drag = None
         session.release()
         return True
 
     def build_overlay(self, session: Session) -> ViewerToolOverlay:
-        """Return the selected and the hovered obstacle, or a preview of the held one at its new position."""
-        moved = self._move_obstacle(session)
-        if moved is None:
-            return self._build_outlines(session)
-        distance = dist(self._pressed_at, self._cursor)
-        line = (self._pressed_at, self._cursor)
-        return ViewerToolOverlay(line, obstacle=moved, label=f"{distance:.2f} m")
+        """Return a preview of the drag, or the outlines and handles of the selection."""
+        overlay = None
+        if self.drag is not None and not self.drag.is_outdated(session):
+            overlay = self.drag.build_overlay()
+        return overlay or self._build_outlines(session)
 
     def choose_cursor(self, session: Session) -> CursorShape:
         """Return the shape of the cursor where there is no robot."""
-        if self.obstacle is not None or self.hovered is not None:
+        if isinstance(self.drag, BoxDrag):
+            return "cross"
+        if self._is_over_handle:
+            return "hand"
+        if self.drag is not None or self.hovered is not None:
             return "move"
         return "arrow"
 
     def _build_outlines(self, session: Session) -> ViewerToolOverlay:
-        """Return the outlines of the selected obstacle and of the one under the pointer."""
+        """Return the outlines of the selected obstacles, their handles, and the one under the pointer."""
         obstacles = session.displayed.environment.obstacles
-        selected = self.inspection.obstacle
-        if selected not in obstacles:
-            selected = None
+        selected = tuple(obstacle for obstacle in self.inspection.obstacles if obstacle in obstacles)
         hovered = self.hovered
         # The pointer may have left the map, and the obstacle may have been moved or deleted.
-        if self.inspection.cursor is None or hovered not in obstacles or hovered == selected:
+        if self.inspection.cursor is None or hovered not in obstacles or hovered in selected:
             hovered = None
-        return ViewerToolOverlay(hovered=hovered, selected=selected)
-
-    def _move_obstacle(self, session: Session) -> Obstacle | None:
-        """Return the held obstacle, moved with the cursor; None if none is held or it stays where it is."""
-        index = self.obstacle
-        if index is None:
-            return None
-        present = session.displayed.environment.obstacles
-        # The map may have been changed while the obstacle was held.
-        if present[index : index + 1] != self._obstacles[index : index + 1]:
-            return None
-        dx = self._cursor[0] - self._pressed_at[0]
-        dy = self._cursor[1] - self._pressed_at[1]
-        if np.hypot(dx, dy) < _MIN_SHIFT_M:
-            return None
-        return map_edits.move_obstacle(present[index], dx, dy)
+        handles: tuple[Point, ...] = ()
+        if len(selected) == 1:
+            handles = tuple(handle.position for handle in list_handles(selected[0], self._reach))
+        return ViewerToolOverlay(hovered=hovered, selected=selected, handles=handles)

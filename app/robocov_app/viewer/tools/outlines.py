@@ -145,12 +145,12 @@ class AddWallTool(OutlineTool):
         state = super().build_overlay(session)
         if not state.line:
             return state
-        wall: Obstacle | None = None
+        walls: tuple[Obstacle, ...] = ()
         # Two points at the same position do not define a wall yet.
         with suppress(RobocovError):
-            wall = self.build_obstacle(list(state.line))
+            walls = (self.build_obstacle(list(state.line)),)
         label = f"{state.label}, {self.width:g} m wide"
-        return ViewerToolOverlay(state.line, obstacle=wall, label=label)
+        return ViewerToolOverlay(state.line, obstacles=walls, label=label)
 
     def resize(self, session: Session, factor: float) -> str:
         """Multiply the width of new walls by a factor, and return a message."""

@@ -126,8 +126,8 @@ class AddCircleTool(SegmentTool):
         if center is None:
             return ViewerToolOverlay()
         rim = self.segment.end
-        circle: CircleObstacle | None = None
+        circles: tuple[CircleObstacle, ...] = ()
         # A circle whose radius is almost zero is not an obstacle yet.
         with suppress(RobocovError):
-            circle = map_edits.build_circle(center, rim)
-        return ViewerToolOverlay((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")
+            circles = (map_edits.build_circle(center, rim),)
+        return ViewerToolOverlay((center, rim), obstacles=circles, label=f"radius {dist(center, rim):.2f} m")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from robocov.environment import Environment, Obstacle
+from robocov.environment import Environment, Obstacle, Point
 from robocov_app.toolkit.tools.tool import PointerEvent, Tool, ToolOverlay
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.passages import describe_passage_changes
@@ -35,20 +35,26 @@ class ViewerToolOverlay(ToolOverlay):
     ----------
     line, is_closed, label
         See `ToolOverlay`.
-    obstacle : Obstacle or None
-        Preview of the obstacle that is being drawn or moved.
+    obstacles : tuple of Obstacle
+        Preview of the obstacles that are being drawn, moved or changed.
     has_marks : bool
         Whether the points of the line are marked.
     hovered : Obstacle or None
         The obstacle under the pointer, which gets a thin outline.
-    selected : Obstacle or None
-        The selected obstacle, which gets a thick outline.
+    selected : tuple of Obstacle
+        The selected obstacles, which get thick outlines.
+    handles : tuple of Point
+        Handles of the selected obstacle, m.
+    box : tuple of Point or None
+        Two opposite corners of the box in which obstacles are selected, m.
     """
 
-    obstacle: Obstacle | None = None
+    obstacles: tuple[Obstacle, ...] = ()
     has_marks: bool = True
     hovered: Obstacle | None = None
-    selected: Obstacle | None = None
+    selected: tuple[Obstacle, ...] = ()
+    handles: tuple[Point, ...] = ()
+    box: tuple[Point, Point] | None = None
 
 
 class ViewerTool(Tool[Session, ViewerPointerEvent]):

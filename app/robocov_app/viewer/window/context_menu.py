@@ -14,6 +14,6 @@ def list_menu_commands(viewer: Presenter) -> tuple[str, ...]:
         return ROBOT_COMMANDS
     if viewer.selection.has_wall:
         return WALL_COMMANDS
-    if viewer.selected_obstacle is not None:
+    if viewer.selected_obstacles:
         return OBSTACLE_COMMANDS
     return FLOOR_COMMANDS

@@ -254,12 +254,14 @@ class ViewerPointer(Pointer):
             self._open_menu(event.pos)
 
     def _select_at(self, pixel: Pixel) -> None:
-        """Select the robot or the obstacle at a pixel of a pane; nothing on the bare floor."""
+        """Select the robot or the obstacle at a pixel of a pane; nothing on the bare floor.
+
+        If the obstacle is one of several selected ones, all of them stay selected.
+        """
         viewer = self._viewer
         pane = self._canvas.find_pane(pixel)
         if pane is None:
             return
-        viewer.inspection.clear()
         viewer.revision += 1
         number = self._canvas.find_robot(pixel, pane)
         if number is not None:
@@ -268,8 +270,10 @@ class ViewerPointer(Pointer):
         environment = viewer.session.displayed.environment
         reach = MENU_REACH_FRACTION * self._canvas.get_reach(pane)
         index = map_edits.find_obstacle(environment, self._canvas.to_world(pixel, pane), reach)
-        if index is not None:
-            viewer.inspection.select_obstacle(environment.obstacles[index])
+        if index is None:
+            viewer.inspection.clear()
+        elif environment.obstacles[index] not in viewer.inspection.obstacles:
+            viewer.inspection.select_obstacles((environment.obstacles[index],))
 
     def hover(self, event: pygame.event.Event) -> None:
         """Update the inspected point, and while no button is held down, the tool and the chart's tag."""

@@ -10,7 +10,7 @@ from robocov_app.look.theme import get_theme
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
@@ -25,6 +25,7 @@ from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
+from robocov_app.viewer.canvas.map_picture import MapPicture
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.chart_focus import ChartFocus
 from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
@@ -52,6 +53,7 @@ KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pa
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 _LESSON_HINT = "F2 back to the lesson · Esc ends it"
 _FOCUS_KEYS = ("tab", "shift+tab")
+MAX_MAP_PICTURES = 8  # of different sizes that are kept
 _ASPECT_DECIMALS = 3  # smaller changes of the shape of the map do not change the layout
 
 
@@ -156,11 +158,11 @@ class ViewerWindow(CommandWindow):
         titles = {layer.name: layer.title for layer in build_standard_layers()}
         self.share = ShareActions(viewer, lambda: self.remote)
         window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())
-        listed = [*list_viewer_commands(viewer, titles), *window_commands]
+        listed = [*list_viewer_commands(viewer, titles), *window_commands, *self.list_more_commands()]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
-        self.top_bar = TopBar(viewer, self.commands, self.do)
+        self.top_bar = self.build_top_bar(viewer)
         self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.do)
         self.chart_focus = ChartFocus(self.chart)
         self.focus = KeyboardFocus(self._list_focus_groups)
@@ -174,6 +176,7 @@ class ViewerWindow(CommandWindow):
             self.lesson.leave,
             self.open_menu,
         )
+        self._map_pictures: dict[tuple[int, int], MapPicture] = {}
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
         self._inspector = RobotInspector(viewer, self.panel)
@@ -181,6 +184,14 @@ class ViewerWindow(CommandWindow):
         self._unrecorded_s = 0.0  # time since the last frame of the video
         self._arrange()
         self.draw()
+
+    def list_more_commands(self) -> list[Command]:
+        """Return further commands of a subclass."""
+        return []
+
+    def build_top_bar(self, viewer: Presenter) -> TopBar:
+        """Build the top bar."""
+        return TopBar(viewer, self.commands, self.do)
 
     def _build_actions(self) -> ViewerWindowActions:
         """Return the functions of this window that commands call."""
@@ -272,6 +283,34 @@ class ViewerWindow(CommandWindow):
         if panel is not None:
             view.has_panel = panel
         self.viewer.revision += 1
+
+    def draw_map(self, size: tuple[int, int], scale: float) -> pygame.Surface | None:
+        """Draw the panes without the controls; see `BaseWindow`. None while a page or a dialog is open."""
+        if self._is_map_covered:
+            return None
+        picture = self._map_pictures.get(size)
+        if picture is None:
+            if len(self._map_pictures) >= MAX_MAP_PICTURES:
+                self._map_pictures.clear()
+            picture = MapPicture(self.viewer, self.canvas)
+            self._map_pictures[size] = picture
+        return picture.draw(size, scale)
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same point of the map; see `BaseWindow`."""
+        picture = self._map_pictures.get(size)
+        if picture is None or self._is_map_covered:
+            return pixel
+        return picture.find_window_pixel(pixel)
+
+    @property
+    def _is_map_covered(self) -> bool:
+        """Whether a lesson, the help page or a dialog is shown."""
+        return self.lesson.shown is not None or self.is_help_open or self.dialogs.current is not None
+
+    def reduce_motion(self, *, is_reduced: bool) -> None:
+        """Adopt the setting of the user's system for reduced motion."""
+        self.viewer.view.is_motion_reduced = is_reduced
 
     def update(self, seconds: float) -> None:
         """Advance everything by a time, s."""
@@ -492,6 +531,7 @@ class ViewerWindow(CommandWindow):
             or self.layer_bar.handle_key(name)
             or self.chart_focus.handle_key(name)
             or super().use_key(event)
+            or self.viewer.selection.nudge_by_key(name)
         )
 
     def handle_mouse(self, event: pygame.event.Event) -> None:

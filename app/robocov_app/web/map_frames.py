@@ -1,0 +1,75 @@
+"""The map of a window in the sizes of the phones that show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov_app.web.frames import Frame
+from robocov_app.web.pages import MapSize
+
+if TYPE_CHECKING:
+    from robocov_app.toolkit.window.window import BaseWindow
+
+MAP_FRAME_INTERVAL_S = 1 / 15
+"""Minimum time between two pictures of the map in one size."""
+
+
+class MapFrames:
+    """Draws the map in all requested sizes, not more often than phones need it.
+
+    The server's thread sets `requested_sizes` and reads `frames`, the window's thread calls `update`.
+
+    Attributes
+    ----------
+    requested_sizes : frozenset of MapSize
+        Sizes of the phones that show the map.
+    frames : dict of MapSize to Frame
+        The newest picture of each size; empty while phones have to show the window itself.
+    """
+
+    def __init__(self) -> None:
+        self.requested_sizes: frozenset[MapSize] = frozenset()
+        self.frames: dict[MapSize, Frame] = {}
+        self._drawn_window: Frame | None = None
+        self._drawn_sizes: Collection[MapSize] = ()
+        self._next_time = 0.0
+
+    def update(self, window: BaseWindow, window_frame: Frame, create_number: Callable[[], int]) -> bool:
+        """Draw the map again if the window has changed.
+
+        Parameters
+        ----------
+        window : BaseWindow
+        window_frame : Frame
+            The newest frame of the window.
+        create_number : callable
+            Returns the number of a new frame.
+
+        Returns
+        -------
+        bool
+            Whether `frames` has changed.
+        """
+        sizes = self.requested_sizes
+        is_up_to_date = window_frame is self._drawn_window and sizes == self._drawn_sizes
+        if is_up_to_date or monotonic() < self._next_time:
+            return False
+        self._next_time = monotonic() + MAP_FRAME_INTERVAL_S
+        self._drawn_window = window_frame
+        self._drawn_sizes = sizes
+        frames: dict[MapSize, Frame] = {}
+        for size in sizes:
+            picture = window.draw_map((size.width, size.height), size.scale)
+            if picture is None:
+                continue
+            previous = self.frames.get(size)
+            frame = Frame.from_surface(picture, create_number())
+            is_same = previous is not None and np.array_equal(previous.pixels, frame.pixels)
+            frames[size] = previous if previous is not None and is_same else frame
+        has_changed = frames != self.frames
+        self.frames = frames
+        return has_changed
