@@ -53,10 +53,10 @@ def compute_distance_error(environment, lattice, robots):
     nearest = distances.min(axis=0)
     is_reached = np.isfinite(nearest)
     np.testing.assert_array_equal(np.isfinite(result.distances), is_reached)
-    np.testing.assert_array_equal(result.owner >= 0, is_reached)
+    np.testing.assert_array_equal(result.owners >= 0, is_reached)
     # The owner is one of the nearest robots.
     site = np.flatnonzero(is_reached)
-    owner = result.owner[site]
+    owner = result.owners[site]
     assert np.abs(distances[owner, site] - nearest[site]).max(initial=0.0) < tolerance
     check_first_corners(cost, result, robots, site, nearest, tolerance)
     check_last_corners(cost, result, robots, site, nearest, tolerance)
@@ -65,13 +65,13 @@ def compute_distance_error(environment, lattice, robots):
 
 def check_first_corners(cost, result, robots, site, nearest, tolerance):
     """Check that the first waypoint of each site is on a shortest path."""
-    to_first = compute_lengths(result.first_waypoints[site] - robots[result.owner[site]])
+    to_first = compute_lengths(result.first_waypoints[site] - robots[result.owners[site]])
     assert (to_first <= nearest[site] * (1 + 1e-12) + tolerance).all()
-    is_bent = result.first_corner[site] >= 0
+    is_bent = result.first_corners[site] >= 0
     bent = site[is_bent]
     if len(bent) == 0:
         return
-    corners, number = np.unique(result.first_corner[bent], return_inverse=True)
+    corners, number = np.unique(result.first_corners[bent], return_inverse=True)
     from_corners = cost.geodesics.compute_distances(cost.corners[corners], cost.points[bent])
     total = to_first[is_bent] + from_corners[number, np.arange(len(bent))]
     # A corner at a pinch belongs to both of its sides, and may be a short cut: the total is not exact.
@@ -80,8 +80,8 @@ def check_first_corners(cost, result, robots, site, nearest, tolerance):
 
 def check_last_corners(cost, result, robots, site, nearest, tolerance):
     """Check that the last corner of each site is no farther away than its owner."""
-    last_points = robots[result.owner[site]]
-    is_bent = result.last_corner[site] >= 0
-    last_points[is_bent] = cost.corners[result.last_corner[site[is_bent]]]
+    last_points = robots[result.owners[site]]
+    is_bent = result.last_corners[site] >= 0
+    last_points[is_bent] = cost.corners[result.last_corners[site[is_bent]]]
     from_last = compute_lengths(cost.points[site] - last_points)
     assert (from_last <= nearest[site] * (1 + 1e-12) + tolerance).all()

@@ -96,7 +96,7 @@ def _save_sites(
     arrays: dict[str, Any] = {
         "points": cost.points,
         "distances": owning_result.distances,
-        "owner": owning_result.owner,
+        "owner": owning_result.owners,
     }
     if timed_result is not None:
         arrays["times"] = timed_result.times

@@ -406,7 +406,7 @@ def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[
         if arena.get_label(handle) == legend.UNKNOWN_OBSTACLE:
             handle.set_label(legend.OBSTACLE)
         handles.append(handle)
-    if any((snapshot.field.result.owner < 0).any() for snapshot in snapshots):
+    if any((snapshot.field.result.owners < 0).any() for snapshot in snapshots):
         unreached = Patch(
             facecolor=to_plot_color(theme.unreached),
             edgecolor=to_plot_color(theme.obstacle_edge),

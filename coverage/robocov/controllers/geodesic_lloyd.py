@@ -188,8 +188,8 @@ class GeodesicPlanner:
         They are weighted means of first waypoints; see the notes of `GeodesicLloyd`.
         """
         result = self.cost(positions)
-        sites = np.flatnonzero(result.owner >= 0)
-        owner = result.owner[sites]
+        sites = np.flatnonzero(result.owners >= 0)
+        owner = result.owners[sites]
         first_waypoints = result.first_waypoints[sites]
         distances = result.distances[sites]
         first_lengths = np.hypot(*(first_waypoints - positions[owner]).T)

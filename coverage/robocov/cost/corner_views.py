@@ -31,40 +31,47 @@ from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
 class CornerViews(NamedTuple):
-    """The sites that each corner sees. There is a row for each corner and tile, sorted by tile."""
+    """The sites that each corner sees and to which a shortest path can bend at the corner.
 
-    first_row: IntArray
-    """(t + 1,) The rows of tile k are those from ``first_row[k]`` up to ``first_row[k + 1]``."""
-    corner: IntArray
+    There is a row for each corner and each tile in which it sees such sites. The rows are sorted by tile.
+    """
+
+    row_starts: IntArray
+    """(t + 1,) The rows of tile k are those from ``row_starts[k]`` up to ``row_starts[k + 1]``."""
+    corners: IntArray
     """(r,) The corner of each row."""
     visible_slots: IntArray
-    """(r,) Bit mask: bit s is set if the corner sees the site in slot s, and a path to it can bend there."""
-    nearest: Array
+    """(r,) The slots of the tile that contain these sites, as a bit mask: bit s is set for slot s."""
+    min_distances: Array
     """(r,) Distance from the corner to the nearest of these sites, grid steps."""
-    farthest: Array
+    max_distances: Array
     """(r,) Distance from the corner to the farthest of these sites, grid steps."""
 
 
 _CORNER = 0
+"""Column of the integers that `find_corner_views` writes: the corner."""
 _TILE = 1
+"""Column of the same integers: the tile."""
 _VISIBLE_SLOTS = 2
-"""Columns of the integers that `find_corner_views` writes; see `CornerViews`."""
+"""Column of the same integers: the bit mask of the visible slots."""
 INDEX_COLUMNS = 3
-"""Number of these columns."""
+"""Number of columns of these integers."""
 
-_NEAREST = 0
-_FARTHEST = 1
-"""Columns of the lengths that `find_corner_views` writes; see `CornerViews`."""
+_MIN_DISTANCE = 0
+"""Column of the lengths that `find_corner_views` writes: the distance to the nearest visible site."""
+_MAX_DISTANCE = 1
+"""Column of the same lengths: the distance to the farthest visible site."""
 LENGTH_COLUMNS = 2
-"""Number of these columns."""
+"""Number of columns of these lengths."""
 
 
 def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:
-    """Group the views that `find_corner_views` has found by their tiles.
+    """Sort the rows that `find_corner_views` has written by tile.
 
     Parameters
     ----------
     tile_count : int
+        Number of tiles.
     indices : (r, 3) int array
         Corner, tile and visible slots.
     lengths : (r, 2) array, grid steps
@@ -78,11 +85,11 @@ def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> Co
     indices = indices[by_tile]
     lengths = lengths[by_tile]
     return CornerViews(
-        first_row=np.searchsorted(indices[:, _TILE], np.arange(tile_count + 1)),
-        corner=np.ascontiguousarray(indices[:, _CORNER]),
+        row_starts=np.searchsorted(indices[:, _TILE], np.arange(tile_count + 1)),
+        corners=np.ascontiguousarray(indices[:, _CORNER]),
         visible_slots=np.ascontiguousarray(indices[:, _VISIBLE_SLOTS]),
-        nearest=np.ascontiguousarray(lengths[:, _NEAREST]),
-        farthest=np.ascontiguousarray(lengths[:, _FARTHEST]),
+        min_distances=np.ascontiguousarray(lengths[:, _MIN_DISTANCE]),
+        max_distances=np.ascontiguousarray(lengths[:, _MAX_DISTANCE]),
     )
 
 
@@ -96,25 +103,25 @@ def find_corner_views(
     indices: IntArray,
     lengths: Array,
 ) -> int:
-    """Find the sites that are visible from a range of corners.
+    """Find the sites that each corner of a range sees; see `CornerViews`.
 
     Parameters
     ----------
     walls : Walls
     tiles : Tiles
     first, end : int
-        The corners are those from `first` up to `end`.
+        The range of corners, from `first` up to but not including `end`.
     wall_index : AngularWallIndex
         Scratch space for one source.
     indices : (m, 3) int array
-        Result: corner, tile and visible slots; see `CornerViews`.
+        Result: corner, tile and visible slots.
     lengths : (m, 2) array, grid steps
-        Result: distances of the nearest and the farthest site.
+        Result: distances of the nearest and the farthest visible site.
 
     Returns
     -------
     int
-        Number of rows of the result, or `NO_SPACE` if there is not enough in it or in the index.
+        Number of rows of the result, or `NO_SPACE` if the arrays for it or the wall index are too small.
     """
     row_count = 0
     for corner in range(first, end):
@@ -140,8 +147,8 @@ def _add_views(
 ) -> int:
     """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`.
 
-    A search in the box tree of the tiles skips boxes that are entirely hidden by walls, and empty ones, which
-    start at infinity.
+    A search in the box tree of the tiles skips boxes that are hidden by walls, and empty boxes, whose lower
+    bounds are infinite.
     """
     tree = tiles.tree
     node = ROOT
@@ -173,31 +180,31 @@ def _add_views(
 def _find_visible_sites(
     walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: Array
 ) -> int:
-    """Find the sites of a tile that the last segment of a shortest path around a corner can lead to.
+    """Find the sites of a tile to which a shortest path can lead straight from a corner at which it bends.
 
-    These are the sites that the corner sees in a direction in which a shortest path can bend around it.
-    Return them as a bit mask, with bit s for the site in slot s of the tile. The distances from the corner to
-    the nearest and to the farthest of them are written to `lengths`.
+    The corner sees these sites, and a shortest path can bend at the corner in their direction. Return the
+    sites as a bit mask, with bit s for the site in slot s of the tile. Write the distances from the corner to
+    the nearest and to the farthest of these sites to `lengths`.
     """
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]
     visible_slots = 0
-    nearest = np.inf
-    farthest = 0.0
+    min_distance = np.inf
+    max_distance = 0.0
     for slot in range(SLOTS):
         x = tiles.x[tile, slot]
         y = tiles.y[tile, slot]
         if (
-            tiles.site[tile, slot] != NO_SITE
+            tiles.sites[tile, slot] != NO_SITE
             and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
             and is_visible(walls, wall_index, ONLY_SOURCE, x, y)
         ):
             visible_slots |= 1 << slot
             dx = x - corner_x
             dy = y - corner_y
-            length = np.sqrt(dx * dx + dy * dy)
-            nearest = min(nearest, length)
-            farthest = max(farthest, length)
-    lengths[_NEAREST] = nearest
-    lengths[_FARTHEST] = farthest
+            distance = np.sqrt(dx * dx + dy * dy)
+            min_distance = min(min_distance, distance)
+            max_distance = max(max_distance, distance)
+    lengths[_MIN_DISTANCE] = min_distance
+    lengths[_MAX_DISTANCE] = max_distance
     return visible_slots

@@ -33,14 +33,14 @@ from robocov.geodesic.geodesics import SOURCE_BINS
 class CoverageCost:
     """The coverage cost (22) of one environment on a lattice of sites.
 
-    The region's bounding box is widened to a square, anchored at its lower left corner, and cut into
-    ``lattice²`` square cells; the cell centers in the open free space are the sites. Distances are
-    exact; only the mean over the sites is an approximation of the integral. If the environment has a
-    density φ, each site is weighted by the exact mean of φ over its cell.
+    The region's bounding box is extended from its lower left corner to a square, which is divided into
+    ``lattice²`` square cells. The centers of the cells that are in the open free space are the sites.
+    Distances are exact; only the mean over the sites is an approximation of the integral. If the environment
+    has a density φ, each site is weighted by the exact mean of φ over its cell.
 
-    Paths are those of a point, except that no path leads through a gap that is narrower than a robot. What
-    lies behind such a gap counts as uncovered. The path of a disc is longer than that of a point by less than
-    its radius times the angle of each turn.
+    The paths are those of a point, except that no path leads through a gap that is narrower than a robot. The
+    area behind such a gap counts as uncovered. The path of a disc is longer than that of a point, but at each
+    turn by less than the radius times the angle of the turn.
 
     Parameters
     ----------
@@ -59,13 +59,17 @@ class CoverageCost:
     Attributes
     ----------
     environment : Environment
+        The map.
     closed_environment : Environment
-        The environment with closed gaps; the same object if there is none.
+        The map with closed gaps; the same object if no gap is narrower than a robot.
     lattice : int
+        Number of cells along a side.
     radius : float, m
+        Radius of the smallest robot.
     geodesics : Geodesics
-        The shortest paths of the closed environment.
+        The shortest paths of the map with closed gaps.
     sites : Sites
+        The sites of the lattice.
     points : (m, 2) array, m
         Positions of the sites.
     cells : (m,) int array
@@ -129,7 +133,7 @@ class CoverageCost:
         self.points = self.sites.points
         self.cells = self.sites.cells
         self.spacing = self.sites.spacing
-        # Which sites each corner sees does not depend on the robots.
+        # The sites that each corner sees do not depend on the robots, and are found only once.
         indices, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles),
             index_columns=INDEX_COLUMNS,
@@ -140,7 +144,7 @@ class CoverageCost:
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
         components = self.closed_environment.free.geoms
         self._component_areas = np.array([component.area for component in components])
-        # A first guess, which `_find_paths` doubles whenever the wall index turns out to be too small.
+        # An initial guess, which `_find_paths` doubles whenever the wall index turns out to be too small.
         self._index_entries_per_robot = 2 * SOURCE_BINS
         self._set_density(environment, self.closed_environment)
 
@@ -155,17 +159,17 @@ class CoverageCost:
         Returns
         -------
         CoverageCost
-            It shares all other data with this one.
+            It shares all data that do not depend on the density with this one.
         """
-        twin = copy(self)
+        cost = copy(self)
         closed_environment = environment
         if self.closed_environment is not self.environment:
             closed_environment = self.closed_environment.with_density(environment.density)
-        twin._set_density(environment, closed_environment)
-        return twin
+        cost._set_density(environment, closed_environment)
+        return cost
 
     def _set_density(self, environment: Environment, closed_environment: Environment) -> None:
-        """Use the density of an environment: compute the weights of the sites."""
+        """Set the environment, and compute everything that depends on its density."""
         self.environment = environment
         self.closed_environment = closed_environment
         self._component_masses = closed_environment.free_masses
@@ -212,7 +216,8 @@ class CoverageCost:
     def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
         """Compute the coverage cost of each of several teams of the same size.
 
-        The results are the same as those of separate calls, but are computed faster.
+        The results are the same as if the cost were called for one team after the other, but it takes less
+        time.
 
         Parameters
         ----------
@@ -249,11 +254,11 @@ class CoverageCost:
         return [self._build_result(teams[team], is_covered[team], paths, team) for team in range(team_count)]
 
     def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
-        """Find the paths to the sites from the robots of teams, whose positions are (r, n, 2) grid steps.
+        """Find the paths to all sites from the robots of teams, whose positions are (r, n, 2) grid steps.
 
         `is_covered`, (r, c), says which components of the free space contain robots of each team. The search
-        uses an index of the walls around each robot. If it is too small, the search is repeated with a larger
-        one.
+        uses an index of the walls around each robot. It is repeated with a larger index if this one is too
+        small.
         """
         team_count, robot_count, _ = grid_positions.shape
         paths = SitePaths.allocate(team_count, len(self.points))
@@ -267,7 +272,7 @@ class CoverageCost:
                 tile_count=len(self._map.tiles.boxes),
             )
             if find_site_paths(
-                self._map, search, grid_positions, is_covered, self.geodesics.grid.unit, paths
+                self._map, search, grid_positions, is_covered, self.geodesics.grid.spacing, paths
             ):
                 return paths
             self._index_entries_per_robot *= 2
@@ -276,30 +281,30 @@ class CoverageCost:
         """Find the path to each site from the robot that arrives first.
 
         `grid_positions` are (n, 2) grid steps, and `is_inside`, (n, c), says in which components of the free
-        space each robot is. Among robots of the same speed, the nearest one arrives first. There is one
-        search for each speed, the fastest robots first. A path replaces the one found before if it takes less
-        time.
+        space each robot is. Of the robots with the same speed, the nearest one arrives first. There is one
+        search for each speed, starting with the highest. A path replaces the one that was found before if the
+        robot arrives sooner.
         """
-        # There is one team, which does not reach any site yet.
+        # One team, without a path to any site yet.
         shape = (1, len(self.points))
         arrivals = SitePaths(
-            distance=np.full(shape, np.inf),
-            owner=np.full(shape, NO_ROBOT),
-            first_corner=np.full(shape, NO_CORNER),
-            last_corner=np.full(shape, NO_CORNER),
+            distances=np.full(shape, np.inf),
+            owners=np.full(shape, NO_ROBOT),
+            first_corners=np.full(shape, NO_CORNER),
+            last_corners=np.full(shape, NO_CORNER),
         )
         times = np.full(shape, np.inf)
         for speed in np.unique(speeds)[::-1]:
             robots = np.flatnonzero(speeds == speed)
             is_covered = is_inside[None, robots].any(axis=1)
             paths = self._find_paths(grid_positions[None, robots], np.asarray(is_covered))
-            is_sooner = paths.distance / speed < times
-            times[is_sooner] = paths.distance[is_sooner] / speed
-            arrivals.distance[is_sooner] = paths.distance[is_sooner]
-            # The owners are indices of the robots of this speed.
-            arrivals.owner[is_sooner] = robots[paths.owner[is_sooner]]
-            arrivals.first_corner[is_sooner] = paths.first_corner[is_sooner]
-            arrivals.last_corner[is_sooner] = paths.last_corner[is_sooner]
+            is_sooner = paths.distances / speed < times
+            times[is_sooner] = paths.distances[is_sooner] / speed
+            arrivals.distances[is_sooner] = paths.distances[is_sooner]
+            # The search numbers the robots of this speed from 0.
+            arrivals.owners[is_sooner] = robots[paths.owners[is_sooner]]
+            arrivals.first_corners[is_sooner] = paths.first_corners[is_sooner]
+            arrivals.last_corners[is_sooner] = paths.last_corners[is_sooner]
         return arrivals
 
     def _build_result(
@@ -310,24 +315,25 @@ class CoverageCost:
         team: int,
         speeds: Array | None = None,
     ) -> CoverageResult:
-        """Build the result of the team with the given index, at positions (n, 2) m, from the paths.
+        """Build the result of one team from the paths of several teams.
 
-        `is_covered`, (c,), says which components of the free space contain robots of the team. The cost is
-        the mean distance of the sites in these components (with speeds, the mean time) times the integral of
-        the density over them, `mass`.
+        The team has the index `team` in the paths. Its robots are at `positions`, (n, 2) m, in the components
+        of the free space that are true in `is_covered`, (c,). The cost is the mean distance of the sites in
+        these components (with speeds, the mean time) times the integral of the density over the components,
+        `mass`.
         """
-        distances = paths.distance[team]
-        owner = paths.owner[team]
+        distances = paths.distances[team]
+        owners = paths.owners[team]
         reached_distances = distances
-        reached_owner = owner
+        reached_owners = owners
         weights = self.weights
         mass = self._mass
         uncovered_area = 0.0
         # Sites that no robot can reach are left out of the means.
         if not is_covered.all():
-            is_reached = owner != NO_ROBOT
+            is_reached = owners != NO_ROBOT
             reached_distances = distances[is_reached]
-            reached_owner = owner[is_reached]
+            reached_owners = owners[is_reached]
             weights = None if self.weights is None else self.weights[is_reached]
             mass = float(self._component_masses[is_covered].sum())
             uncovered_area = float(self._component_areas[~is_covered].sum())
@@ -335,16 +341,16 @@ class CoverageCost:
         mean_time = None
         value = mean_distance * mass
         if speeds is not None:
-            mean_time = compute_weighted_mean(reached_distances / speeds[reached_owner], weights)
+            mean_time = compute_weighted_mean(reached_distances / speeds[reached_owners], weights)
             value = mean_time * mass
         return CoverageResult(
             mean_distance=mean_distance,
             value=value,
             uncovered_area=uncovered_area,
             distances=distances,
-            owner=owner,
-            first_corner=paths.first_corner[team],
-            last_corner=paths.last_corner[team],
+            owners=owners,
+            first_corners=paths.first_corners[team],
+            last_corners=paths.last_corners[team],
             positions=positions,
             points=self.points,
             corners=self.corners,
@@ -366,8 +372,8 @@ class CoverageCost:
 
         Returns
         -------
-        (rows, columns) array
-            See `Sites.to_grid`.
+        (lattice, lattice) array
+            The lowest row first; see `Sites.to_grid`.
         """
         return self.sites.to_grid(values)
 
@@ -379,11 +385,13 @@ class CoverageCost:
         positions : (n, 2) array, m
             Positions of the robots.
         point : (2,) array, m
+            The point, in the free space.
 
         Returns
         -------
         (w, 2) array, m
-            Waypoints, including both ends; empty, of shape (0, 2), if no robot can reach the point.
+            The waypoints from the point to the robot, including both ends; of shape (0, 2) if no robot can
+            reach the point.
 
         Raises
         ------

@@ -14,22 +14,22 @@ from robocov.geodesic import Geodesics
 from robocov.geodesic.box_tree import build_box_tree, compute_z_order
 
 MAX_LATTICE = 4096
-"""Maximum number of cells along a side."""
+"""Maximum number of cells along a side of the lattice."""
 
 TILE_SIDE = 4
 """Number of cells along a side of a tile."""
 
 SLOTS = TILE_SIDE**2
-"""Number of cells per tile."""
+"""Number of slots of a tile: one for each of its cells."""
 
 TILES_PER_GROUP = 16
-"""Number of consecutive tiles that share a bounding box."""
+"""Number of consecutive tiles in a group, which has a bounding box of its own."""
 
 NO_SITE = -1
-"""Used in place of a site if a cell is not free."""
+"""Used in place of a site if a slot of a tile is empty."""
 
 _CELLS_PER_BLOCK = 1 << 18
-"""Number of cells that are located at the same time, to limit memory."""
+"""Number of cells whose components are determined at the same time, to limit memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +39,11 @@ class Sites:
     Attributes
     ----------
     lattice : int
-        Number of cells along a side.
+        Number of cells along a side of the lattice.
     spacing : float, m
         Side of a cell.
     points : (m, 2) array, m
-        Positions, row by row from the lower left.
+        Positions of the sites, row by row from the lower left.
     cells : (m,) int array
         Index of the cell of each site, ``row * lattice + column``.
     """
@@ -59,14 +59,16 @@ class Sites:
         Parameters
         ----------
         values : (m,) array
+            One value for each site.
 
         Returns
         -------
         (lattice, lattice) array
-            The lowest row first. Cells that are not free are nan, or -1 if the values are integers.
+            The value of each cell, the lowest row first. Cells without a site are nan, or -1 if the values
+            are integers.
         """
-        fill = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
-        image = np.full(self.lattice**2, fill, dtype=values.dtype)
+        fill_value = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
+        image = np.full(self.lattice**2, fill_value, dtype=values.dtype)
         image[self.cells] = values
         return image.reshape(self.lattice, self.lattice)
 
@@ -74,19 +76,21 @@ class Sites:
 class Tiles(NamedTuple):
     """The sites of a lattice in square tiles of `SLOTS` cells, in grid steps.
 
-    Nearby tiles have nearby indices. A slot whose cell is not free repeats another site of its tile.
+    Each tile has one slot per cell. Its sites fill the first slots. If it has fewer sites than slots, the
+    other slots are empty: their coordinates and component repeat those of the first site, and their site is
+    `NO_SITE`. Nearby tiles have nearby indices.
     """
 
     x: Array
-    """(t, SLOTS) x coordinate of each site."""
+    """(t, SLOTS) x coordinate of the site in each slot."""
     y: Array
-    """(t, SLOTS) y coordinate of each site."""
-    site: IntArray
-    """(t, SLOTS) Index of the site in the lattice, or `NO_SITE` if the cell is not free."""
-    component: IntArray
-    """(t, SLOTS) Component of the free space."""
+    """(t, SLOTS) y coordinate of the site in each slot."""
+    sites: IntArray
+    """(t, SLOTS) Index of the site in each slot, as in `Sites`, or `NO_SITE` if the slot is empty."""
+    components: IntArray
+    """(t, SLOTS) The component of the free space that contains the site in each slot."""
     boxes: Array
-    """(t, 4) The bounding box of the sites of each tile; for the columns see `robocov.geodesic.box_tree`."""
+    """(t, 4) The bounding box of the sites of each tile; for the columns, see `robocov.geodesic.box_tree`."""
     group_boxes: Array
     """(g, 4) The bounding box of each group of `TILES_PER_GROUP` consecutive tiles."""
     tree: Array
@@ -94,9 +98,10 @@ class Tiles(NamedTuple):
 
 
 def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
-    """Build the sites of a lattice and their tiles.
+    """Build the sites of a lattice, and arrange them in tiles.
 
-    The region's bounding box, extended to a square from its lower left corner, is cut into ``side²`` cells.
+    The region's bounding box, extended to a square from its lower left corner, is divided into ``side²``
+    cells.
 
     Parameters
     ----------
@@ -139,31 +144,30 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
 
 
 def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
-    """Return the centers of cells, (m, 2) m."""
-    column = cells % side
-    row = cells // side
-    return (np.column_stack([column, row]) + 0.5) * spacing + origin
+    """Return the centers of cells with the indices (m,), in meters, (m, 2)."""
+    columns = cells % side
+    rows = cells // side
+    return (np.column_stack([columns, rows]) + 0.5) * spacing + origin
 
 
-def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
-    """Arrange the sites, whose positions are (m, 2) grid steps, in square tiles.
+def _build_tiles(sites: Sites, grid_positions: Array, components: IntArray) -> Tiles:
+    """Arrange the sites, which are at (m, 2) grid positions in components (m,), in square tiles.
 
-    Each tile has as many slots as cells, so that kernels need no lists of varying length. Its sites
-    fill the first slots.
+    Each tile has as many slots as cells, so that kernels need no lists of varying length.
     """
-    column = sites.cells % sites.lattice
-    row = sites.cells // sites.lattice
+    columns = sites.cells % sites.lattice
+    rows = sites.cells // sites.lattice
     # Sort the sites by tile, so that those of one tile are consecutive entries of `by_tile`.
-    tile = compute_z_order(column // TILE_SIDE, row // TILE_SIDE)
-    by_tile = np.argsort(tile, kind="stable")
-    first = find_run_starts(tile[by_tile])
-    count = np.diff(first, append=len(by_tile))
-    slot = np.arange(SLOTS)
-    is_empty = slot >= count[:, None]
+    tile_numbers = compute_z_order(columns // TILE_SIDE, rows // TILE_SIDE)
+    by_tile = np.argsort(tile_numbers, kind="stable")
+    first_entries = find_run_starts(tile_numbers[by_tile])
+    site_counts = np.diff(first_entries, append=len(by_tile))
+    slots = np.arange(SLOTS)
+    is_empty = slots >= site_counts[:, None]
     # Empty slots repeat the first site of their tile, so that they change no bounding box or minimum.
-    site = by_tile[first[:, None] + np.where(is_empty, 0, slot)]
-    x = np.ascontiguousarray(grid_positions[site, 0])
-    y = np.ascontiguousarray(grid_positions[site, 1])
+    slot_sites = by_tile[first_entries[:, None] + np.where(is_empty, 0, slots)]
+    x = np.ascontiguousarray(grid_positions[slot_sites, 0])
+    y = np.ascontiguousarray(grid_positions[slot_sites, 1])
     low = np.column_stack([x.min(axis=1), y.min(axis=1)])
     high = np.column_stack([x.max(axis=1), y.max(axis=1)])
     group_starts = np.arange(0, len(low), TILES_PER_GROUP)
@@ -172,8 +176,8 @@ def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Ti
     return Tiles(
         x=x,
         y=y,
-        site=np.where(is_empty, NO_SITE, site),
-        component=component[site],
+        sites=np.where(is_empty, NO_SITE, slot_sites),
+        components=components[slot_sites],
         boxes=np.hstack([low, high]),
         group_boxes=np.hstack([group_low, group_high]),
         tree=build_box_tree(low, high),

@@ -19,28 +19,31 @@ from robocov.errors import format_count
 class CoverageResult(Drawable):
     """The coverage cost (22) of n robots, evaluated at m sites.
 
+    The owner of a site is the robot that is nearest to it or, with `speeds`, the robot that arrives first.
+
     Attributes
     ----------
     mean_distance : float, m
-        Mean geodesic distance from a site to its nearest robot, weighted by φ, over the components of the
-        free space that contain robots; nan if these are too small to contain a site.
+        Mean geodesic distance from a site to its owner, weighted by φ, over the components of the free space
+        that contain robots; nan if these are too small to contain a site.
     value : float, m³
         Equation (22), with φ as in (4): `mean_distance` times the integral of φ over these components, which
         is their area if there is no density. With `speeds`, `mean_time` times that integral, in m² s.
     uncovered_area : float, m²
         Area of the components without a robot. Gaps that are narrower than a robot separate components.
     distances : (m,) array, m
-        Distance to the owner; inf if there is none.
-    owner : (m,) int array
-        The nearest robot (the geodesic Voronoi partition), or with `speeds` the first one to arrive. Ties go
-        to the lowest index. -1 if no robot can reach the site.
-    first_corner, last_corner : (m,) int array
-        Rows of `corners` where the path from the owner to the site bends first and last; -1 if it is
-        straight.
+        Distance from each site to its owner; inf if it has none.
+    owners : (m,) int array
+        The owner of each site, as the index of a robot; -1 if no robot can reach the site. Of several robots
+        at the same distance, the one with the lowest index is the owner. Without `speeds`, this is the
+        geodesic Voronoi partition.
+    first_corners, last_corners : (m,) int array
+        The first and the last corner at which the path from the owner to each site bends, as rows of
+        `corners`; -1 if the path is straight.
     positions : (n, 2) array, m
         Positions of the robots.
     points : (m, 2) array, m
-        The sites.
+        Positions of the sites.
     corners : (k, 2) array, m
         All points where paths can bend.
     environment : Environment or None
@@ -50,11 +53,11 @@ class CoverageResult(Drawable):
     weights : (m,) array or None
         Mean of φ over the cell of each site, or None if all are equal.
     speeds : (n,) array or None, m/s
-        If given, each site belongs to the robot that arrives first instead of the nearest one.
+        Speed of each robot, if the cost is based on travel times.
     mean_time : float or None, s
         With `speeds`, the mean time until the first robot arrives at a site.
     radius : float, m
-        Radius of the smallest robot; no path leads through narrower gaps.
+        Radius of the smallest robot. No path leads through a gap that is narrower than this robot.
 
     See Also
     --------
@@ -68,7 +71,7 @@ class CoverageResult(Drawable):
     >>> result = rc.CoverageCost(room, lattice=32)([[1.0, 1.0], [3.0, 1.0]])
     >>> result
     <CoverageResult 2 robots, mean distance 0.764 m>
-    >>> np.bincount(result.owner)
+    >>> np.bincount(result.owners)
     array([256, 256])
     """
 
@@ -78,9 +81,9 @@ class CoverageResult(Drawable):
     value: float
     uncovered_area: float
     distances: Array
-    owner: IntArray
-    first_corner: IntArray
-    last_corner: IntArray
+    owners: IntArray
+    first_corners: IntArray
+    last_corners: IntArray
     positions: Array
     points: Array
     corners: Array
@@ -108,44 +111,47 @@ class CoverageResult(Drawable):
         """
         if self.speeds is None:
             return self.distances
-        # The owner -1 of a site that no robot can reach selects the last speed. This does not matter, because
-        # the distance is infinite.
-        return np.asarray(self.distances / self.speeds[self.owner])
+        # For a site without an owner, the index -1 selects the speed of the last robot. This does not matter,
+        # because the distance is infinite.
+        return np.asarray(self.distances / self.speeds[self.owners])
 
     @cached_property
     def first_waypoints(self) -> Array:
-        """First waypoint from the owner to each site, (m, 2) m: a corner, or the site itself."""
+        """First waypoint on the path from the owner to each site, (m, 2) m: a corner, or the site itself."""
         waypoints = self.points.copy()
-        bent = np.flatnonzero(self.first_corner >= 0)
-        waypoints[bent] = self.corners[self.first_corner[bent]]
+        is_bent = self.first_corners >= 0
+        waypoints[is_bent] = self.corners[self.first_corners[is_bent]]
         return waypoints
 
     @cached_property
     def gradient(self) -> Array:
         """Derivative of `value` with respect to the positions, (n, 2) m²; with `speeds` in m s.
 
-        Each site pulls its owner toward its first waypoint, by a unit vector times the site's share of the
-        integral of φ, divided by the owner's speed. The gradient is exact where `value` is differentiable and
-        a small move changes neither owners nor corners.
+        If a robot moves toward the first waypoint of a site, the path to the site gets shorter by the same
+        distance. The derivative for a robot is therefore minus the sum, over its sites, of the unit vectors
+        toward their first waypoints, each times the site's share of the integral of φ. With `speeds`, it is
+        divided by the speed of the robot. The gradient is exact where `value` is differentiable and a small
+        move changes neither owners nor corners.
         """
-        count = len(self.positions)
-        site = np.flatnonzero(self.owner >= 0)
-        owner = self.owner[site]
-        pull = self.first_waypoints[site] - self.positions[owner]
-        length = compute_lengths(pull)
-        pull /= np.where(length > 0.0, length, 1.0)[:, None]
-        total_weight = float(len(site))
+        robot_count = len(self.positions)
+        sites = np.flatnonzero(self.owners >= 0)
+        owners = self.owners[sites]
+        pulls = self.first_waypoints[sites] - self.positions[owners]
+        lengths = compute_lengths(pulls)
+        pulls /= np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        total_weight = float(len(sites))
         if self.weights is not None:
-            pull *= self.weights[site, None]
-            total_weight = float(self.weights[site].sum())
-        # The value is the mean times the integral of φ, which is divided among the sites by weight.
+            pulls *= self.weights[sites, None]
+            total_weight = float(self.weights[sites].sum())
+        # The value is the mean times the integral of φ, of which each site has a share in proportion to its
+        # weight.
         mean = self.mean_distance if self.mean_time is None else self.mean_time
         mass_per_weight = 0.0
         if total_weight and mean:
             mass_per_weight = self.value / (mean * total_weight)
-        pull_x = np.bincount(owner, pull[:, 0], minlength=count)
-        pull_y = np.bincount(owner, pull[:, 1], minlength=count)
-        gradient = np.column_stack([pull_x, pull_y]) * -mass_per_weight
+        total_pull_x = np.bincount(owners, pulls[:, 0], minlength=robot_count)
+        total_pull_y = np.bincount(owners, pulls[:, 1], minlength=robot_count)
+        gradient = np.column_stack([total_pull_x, total_pull_y]) * -mass_per_weight
         if self.speeds is not None:
             gradient = gradient / self.speeds[:, None]
         return np.asarray(gradient)

@@ -1,10 +1,11 @@
-"""The nearest robot of every site, and the path to it: equation (22) without the mean.
+"""The robot that is nearest to each site, and the shortest path from there: equation (22) without the mean.
 
-Most sites see the robot that is nearest in a straight line. The others are called hidden. They are reached
-via a corner, or from another robot that they see, whichever path is shorter. If several robots are equally
-far away, the one with the lowest index owns the site.
+For most sites, the robot that is nearest in a straight line sees the site, and the path is straight. All
+other sites are called hidden. The path to a hidden site leads via a corner, or straight from another robot
+that sees the site, whichever is shorter. Of several robots at the same distance, the one with the lowest
+index owns the site.
 
-All lengths are in grid steps, except for the result.
+All lengths are in grid steps, except for those in `SitePaths`.
 """
 
 from __future__ import annotations
@@ -38,63 +39,70 @@ from robocov.geodesic.corner_graph import NO_CORNER, CornerGraph, CornerPaths, C
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 _MAX_SMALL_TEAM = 12
-"""Size of the largest team for which walls are indexed at any distance. In such a small team, each robot is
-tested with most sites anyway."""
+"""Number of robots up to which the walls at any distance from each robot are indexed. In such a small team,
+nearly every robot has to be tested with distant sites anyway."""
 
 NO_ROBOT = -1
 """Used in place of a robot if no path leads to a site."""
 
-_REACH_PADDING = 1e-9
-"""Relative margin added to the reach of a robot's view, far larger than rounding."""
+_RANGE_PADDING = 1e-9
+"""Relative margin by which the range of a wall index is enlarged, far larger than rounding errors."""
 
 
 class CostMap(NamedTuple):
     """The data of a map that do not depend on the robots."""
 
     walls: Walls
+    """The boundary of the free space."""
     graph: CornerGraph
+    """The links between the corners."""
     tiles: Tiles
+    """The sites."""
     views: CornerViews
+    """The sites that each corner sees."""
 
 
 class Search(NamedTuple):
-    """Scratch space and results of the search from n robots."""
+    """Scratch space and results of the search for paths from n robots to the sites in t tiles."""
 
     wall_index: AngularWallIndex
     """The walls around each robot."""
-    reach: Array
-    """(n,) Distance from each robot to the farthest site to which it is the nearest in a straight line."""
+    max_site_distances: Array
+    """(n,) Distance from each robot to the farthest of the sites to which it is nearest in a straight
+    line."""
     all_robots: IntArray
     """(n,) Indices of all robots."""
     group_robots: IntArray
-    """(n,) The robots that may own a site of the current group of tiles, or a corner of the current leaf."""
+    """(n,) The robots that may be nearest to a site of a group of tiles, or to a corner of a leaf."""
     tile_robots: IntArray
-    """(n,) The robots that may own a site of the current tile."""
+    """(n,) The robots that may be nearest to a site of a tile."""
     queue: CornerQueue
     """The corners from which paths to other corners may be shortened."""
     corner_paths: CornerPaths
     """The shortest paths from the robots to the corners."""
     hidden_slots: IntArray
     """(t,) Bit mask of the hidden sites of each tile: bit s is set if the site in slot s is hidden."""
-    nearest_robot: IntArray
+    nearest_robots: IntArray
     """(t, SLOTS) The robot that is nearest to each site in a straight line."""
-    site_length: Array
+    site_lengths: Array
     """(t, SLOTS) Length of the shortest path to each site; inf if there is none."""
-    site_robot: IntArray
+    site_robots: IntArray
     """(t, SLOTS) The robot where that path starts, or `NO_ROBOT`."""
-    site_corner: IntArray
+    site_corners: IntArray
     """(t, SLOTS) The last corner at which that path bends, or `NO_CORNER`."""
 
     @classmethod
     def allocate(
         cls, wall_index: AngularWallIndex, robot_count: int, corner_count: int, tile_count: int
     ) -> Search:
-        """Allocate a search.
+        """Allocate an uninitialized search.
 
         Parameters
         ----------
         wall_index : AngularWallIndex
+            An index with space for the walls around all robots.
         robot_count, corner_count, tile_count : int
+            Number of robots of a team, of corners and of tiles.
 
         Returns
         -------
@@ -102,35 +110,35 @@ class Search(NamedTuple):
         """
         return cls(
             wall_index=wall_index,
-            reach=np.empty(robot_count),
+            max_site_distances=np.empty(robot_count),
             all_robots=np.arange(robot_count),
             group_robots=np.empty(robot_count, np.int64),
             tile_robots=np.empty(robot_count, np.int64),
             queue=CornerQueue.allocate(corner_count),
             corner_paths=CornerPaths.allocate(corner_count),
             hidden_slots=np.empty(tile_count, np.int64),
-            nearest_robot=np.empty((tile_count, SLOTS), np.int64),
-            site_length=np.empty((tile_count, SLOTS)),
-            site_robot=np.empty((tile_count, SLOTS), np.int64),
-            site_corner=np.empty((tile_count, SLOTS), np.int64),
+            nearest_robots=np.empty((tile_count, SLOTS), np.int64),
+            site_lengths=np.empty((tile_count, SLOTS)),
+            site_robots=np.empty((tile_count, SLOTS), np.int64),
+            site_corners=np.empty((tile_count, SLOTS), np.int64),
         )
 
 
 class SitePaths(NamedTuple):
     """The shortest paths to m sites from the robots of r teams."""
 
-    distance: Array
-    """(r, m) Length of each path, m; inf if no robot can reach the site."""
-    owner: IntArray
-    """(r, m) The robot where the path starts, or `NO_ROBOT`."""
-    first_corner: IntArray
-    """(r, m) The first corner at which the path bends, or `NO_CORNER`."""
-    last_corner: IntArray
-    """(r, m) The last corner at which the path bends, or `NO_CORNER`."""
+    distances: Array
+    """(r, m) Length of each path in meters; inf if no robot can reach the site."""
+    owners: IntArray
+    """(r, m) The robot at which each path starts, or `NO_ROBOT`."""
+    first_corners: IntArray
+    """(r, m) The first corner at which each path bends, or `NO_CORNER`."""
+    last_corners: IntArray
+    """(r, m) The last corner at which each path bends, or `NO_CORNER`."""
 
     @classmethod
     def allocate(cls, team_count: int, site_count: int) -> SitePaths:
-        """Allocate paths for a given number of teams and sites.
+        """Allocate uninitialized paths for a given number of teams and sites.
 
         Parameters
         ----------
@@ -142,21 +150,23 @@ class SitePaths(NamedTuple):
         """
         shape = (team_count, site_count)
         return cls(
-            distance=np.empty(shape),
-            owner=np.empty(shape, np.int64),
-            first_corner=np.empty(shape, np.int64),
-            last_corner=np.empty(shape, np.int64),
+            distances=np.empty(shape),
+            owners=np.empty(shape, np.int64),
+            first_corners=np.empty(shape, np.int64),
+            last_corners=np.empty(shape, np.int64),
         )
 
 
 @kernel
 def find_site_paths(
-    cost_map: CostMap, search: Search, teams: Array, is_covered: BoolArray, unit: float, paths: SitePaths
+    cost_map: CostMap,
+    search: Search,
+    teams: Array,
+    is_covered: BoolArray,
+    grid_spacing: float,
+    paths: SitePaths,
 ) -> bool:
-    """Find the shortest paths to all sites from the robots of each of several teams.
-
-    The sites are the free cells of a lattice, which is divided into square tiles. Each tile has as
-    many slots as cells; the last ones contain `NO_SITE` if some of its cells are not free.
+    """Find the shortest path to each site from the robots of each of several teams.
 
     Parameters
     ----------
@@ -164,10 +174,10 @@ def find_site_paths(
     search : Search
         Scratch space.
     teams : (r, n, 2) array, grid steps
-        Positions of the robots.
+        Positions of the robots of each team.
     is_covered : (r, c) bool array
-        Whether each component of the free space contains robots of each team.
-    unit : float, m
+        For each team, which of the c components of the free space contain robots.
+    grid_spacing : float, m
         Length of a grid step.
     paths : SitePaths
         Result.
@@ -182,35 +192,35 @@ def find_site_paths(
         if not _find_team_paths(cost_map, search, teams[team], is_covered[team]):
             return False
         for tile in range(len(tiles.boxes)):
-            _write_tile_paths(tiles, search, tile, team, unit, paths)
+            _write_tile_paths(tiles, search, tile, team, grid_spacing, paths)
     return True
 
 
 @kernel
 def _write_tile_paths(
-    tiles: Tiles, search: Search, tile: int, team: int, unit: float, paths: SitePaths
+    tiles: Tiles, search: Search, tile: int, team: int, grid_spacing: float, paths: SitePaths
 ) -> None:
-    """Store the paths that a search has found to the sites of a tile in the row of a team in `paths`."""
+    """Write the paths that a search has found to the sites of a tile to the row of a team in `paths`."""
     for slot in range(SLOTS):
-        site = tiles.site[tile, slot]
+        site = tiles.sites[tile, slot]
         if site == NO_SITE:
             continue
-        last_corner = search.site_corner[tile, slot]
+        last_corner = search.site_corners[tile, slot]
         first_corner = NO_CORNER
         if last_corner != NO_CORNER:
-            first_corner = search.corner_paths.first_corner[last_corner]
-        paths.distance[team, site] = search.site_length[tile, slot] * unit
-        paths.owner[team, site] = search.site_robot[tile, slot]
-        paths.first_corner[team, site] = first_corner
-        paths.last_corner[team, site] = last_corner
+            first_corner = search.corner_paths.first_corners[last_corner]
+        paths.distances[team, site] = search.site_lengths[tile, slot] * grid_spacing
+        paths.owners[team, site] = search.site_robots[tile, slot]
+        paths.first_corners[team, site] = first_corner
+        paths.last_corners[team, site] = last_corner
 
 
 @kernel
 def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
-    """Find the paths from the robots of a team, (n, 2), to all sites.
+    """Find the shortest path to each site from the robots of a team, which are at (n, 2) grid positions.
 
     At first, each site belongs to the robot that is nearest in a straight line. Sites that this robot does
-    not see are hidden. Paths to them are searched via corners, and from other robots. `is_covered`, (c,),
+    not see are hidden. For these, paths via corners and from other robots are searched. `is_covered`, (c,),
     says which components of the free space contain robots. Return whether the index of the walls around the
     robots had enough entries.
     """
@@ -218,12 +228,14 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
     _find_nearest_robots(tiles, search, robots)
     entry_count = 0
     for i in range(len(robots)):
-        # In a large team, walls beyond the farthest site to which a robot is the nearest one hardly matter.
-        reach = np.inf
+        # In a large team, most visibility tests of a robot are those with the sites to which it is nearest.
+        # `is_visible` can do without an index of the walls beyond them.
+        wall_range = np.inf
         if len(robots) > _MAX_SMALL_TEAM:
-            reach = search.reach[i] * (1.0 + _REACH_PADDING)
+            wall_range = search.max_site_distances[i] * (1.0 + _RANGE_PADDING)
+        squared_range = wall_range * wall_range
         entry_count = add_walls(
-            cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], reach * reach, entry_count
+            cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], squared_range, entry_count
         )
         if entry_count == NO_SPACE:
             return False
@@ -241,10 +253,10 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
 def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
     """Find the robot that is nearest to each site in a straight line.
 
-    Most robots are too far from a group of neighboring tiles to be nearest to any of its sites. Such robots
-    are dropped once for each group, and those that are too far from a single tile once for each tile.
+    Robots that are too far away to be nearest to any site of a group of neighboring tiles are first excluded
+    for the whole group, and of the others, those that are too far away from a tile are excluded for the tile.
     """
-    search.reach[:] = 0.0
+    search.max_site_distances[:] = 0.0
     group_robot_count = 0
     for tile in range(len(tiles.boxes)):
         if tile % TILES_PER_GROUP == 0:
@@ -264,9 +276,9 @@ def _list_nearest_candidates(
 ) -> int:
     """Write the candidates that may be nearest to some point of a box to `result`; return their number.
 
-    The candidates are the robots in the first `candidate_count` entries of `candidates`. If one of them is at
-    most a distance d from every point of the box, then a robot farther than d from the box is not nearest to
-    any of its points. The smallest such d leaves the fewest candidates.
+    The candidates are the robots in the first `candidate_count` entries of `candidates`. If every point of
+    the box is at most a distance d from one of them, then a robot farther than d from the box is not nearest
+    to any of these points. The smallest such d leaves the fewest candidates.
     """
     max_squared_distance = np.inf
     for k in range(candidate_count):
@@ -309,70 +321,71 @@ def _find_nearest_robots_of_tile(
 ) -> None:
     """Find the robot that is nearest to each site of a tile in a straight line.
 
-    The candidates are the first `candidate_count` robots in `search.tile_robots`. Each slot of the tile
-    contains a site; an empty one repeats another site. The reach of a robot is its distance from the farthest
-    site to which it is the nearest robot.
+    The candidates are the first `candidate_count` robots in `search.tile_robots`. Empty slots of the tile
+    repeat another site, so that they need no special treatment.
     """
-    length = search.site_length
-    nearest_robot = search.nearest_robot
+    lengths = search.site_lengths
+    nearest_robots = search.nearest_robots
     for slot in range(SLOTS):
-        length[tile, slot] = np.inf
+        lengths[tile, slot] = np.inf
     for k in range(candidate_count):
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
-        # The loop has no branches, so that the compiler can vectorize it. Lengths are squared until it ends.
+        # This loop has no branches, so that the compiler can vectorize it. For the time being, `lengths`
+        # contains squared lengths.
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y
             squared_length = dx * dx + dy * dy
-            best_squared_length = length[tile, slot]
-            is_nearer = squared_length < best_squared_length
-            nearest_robot[tile, slot] = i if is_nearer else nearest_robot[tile, slot]
-            length[tile, slot] = squared_length if is_nearer else best_squared_length
+            min_squared_length = lengths[tile, slot]
+            is_nearer = squared_length < min_squared_length
+            nearest_robots[tile, slot] = i if is_nearer else nearest_robots[tile, slot]
+            lengths[tile, slot] = squared_length if is_nearer else min_squared_length
     for slot in range(SLOTS):
-        i = nearest_robot[tile, slot]
-        length[tile, slot] = np.sqrt(length[tile, slot])
-        search.site_robot[tile, slot] = i
-        search.site_corner[tile, slot] = NO_CORNER
-        search.reach[i] = max(search.reach[i], length[tile, slot])
+        i = nearest_robots[tile, slot]
+        lengths[tile, slot] = np.sqrt(lengths[tile, slot])
+        search.site_robots[tile, slot] = i
+        search.site_corners[tile, slot] = NO_CORNER
+        search.max_site_distances[i] = max(search.max_site_distances[i], lengths[tile, slot])
 
 
 @kernel
 def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
     """Find the hidden sites of a tile: those that a wall hides from their nearest robot.
 
-    They are marked in a bit mask with one bit for each slot of the tile. `is_covered`, (c,), says which
-    components of the free space contain robots; sites in the others have no path.
+    They are written to a bit mask with one bit for each slot of the tile. `is_covered`, (c,), says which
+    components of the free space contain robots. No path leads to the sites in the other components.
     """
     tiles = cost_map.tiles
     hidden_slots = 0
     for slot in range(SLOTS):
-        if not is_covered[tiles.component[tile, slot]]:
-            search.site_length[tile, slot] = np.inf
-            search.site_robot[tile, slot] = NO_ROBOT
-        elif tiles.site[tile, slot] != NO_SITE:
+        if not is_covered[tiles.components[tile, slot]]:
+            search.site_lengths[tile, slot] = np.inf
+            search.site_robots[tile, slot] = NO_ROBOT
+        elif tiles.sites[tile, slot] != NO_SITE:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
-            robot = search.nearest_robot[tile, slot]
-            # This test is faster, but does not recognize every visible site.
+            robot = search.nearest_robots[tile, slot]
+            # This test is faster than the next one, but does not recognize every visible site.
             if is_certainly_visible(search.wall_index, robot, x, y):
                 continue
             if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
                 # Infinite until a path via a corner, or from another robot, is found.
-                search.site_length[tile, slot] = np.inf
+                search.site_lengths[tile, slot] = np.inf
                 hidden_slots |= 1 << slot
     search.hidden_slots[tile] = hidden_slots
 
 
 @kernel
 def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
-    """Find the shortest paths from the robots to the corners.
+    """Find the shortest path to each corner from the robots.
 
-    Straight paths from robots are the start. Then paths via other corners are shortened along the graph of
-    corners that see each other.
+    A path starts with a straight segment from a robot to a corner that it sees, and continues along the graph
+    of the corners.
     """
-    # Trying only the robot nearest to each corner first finds short paths quickly.
+    # At first, only the robot nearest to each corner is tried. This finds short paths quickly, so that few
+    # other robots are near enough to shorten them.
     waiting_count = _try_nearest_robots(cost_map.walls, search, robots)
     relax_paths(cost_map.graph, search.corner_paths, search.queue, waiting_count)
     waiting_count = _try_closer_robots(cost_map.walls, search, robots)
@@ -381,26 +394,28 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 
 @kernel
 def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
-    """Try the straight path to each corner from the robot that is nearest to it.
+    """Try the straight path to each corner from the robot that is nearest to it in a straight line.
 
-    Robots that may be nearest to one of the corners are listed for each leaf of the corners' box tree, which
-    contains `LEAF_SIZE` consecutive corners. Return the number of corners in the queue.
+    The robots that may be nearest to a corner are listed once for each leaf of the box tree, which contains
+    `LEAF_SIZE` consecutive corners. Return the number of corners in the queue.
     """
-    boxes = walls.corner_boxes
+    tree = walls.corner_tree
     paths = search.corner_paths
-    # While corners are searched, there is no group of tiles, and its scratch space is free.
+    # This scratch space is not used for groups of tiles at the same time.
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
         is_first_in_leaf = corner % LEAF_SIZE == 0
         if is_first_in_leaf:
+            leaf = get_leaf(tree, corner)
             candidate_count = _list_nearest_candidates(
-                boxes, get_leaf(boxes, corner), robots, search.all_robots, len(robots), leaf_robots
+                tree, leaf, robots, search.all_robots, len(robots), leaf_robots
             )
-        # No path to the corner is known yet; its source is the index of no robot.
-        paths.length[corner] = np.inf
-        paths.source[corner] = len(robots)
+        # No path to the corner is known yet. Its source is larger than the index of any robot, so that every
+        # path is better.
+        paths.lengths[corner] = np.inf
+        paths.sources[corner] = len(robots)
         search.queue.is_waiting[corner] = False
         nearest = _find_nearest_candidate(
             robots,
@@ -415,25 +430,25 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
 
 @kernel
 def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
-    """Try the straight path to each corner from every robot that is near enough to shorten its path.
+    """Try the straight path to each corner from every robot that is near enough to shorten the path so far.
 
-    A robot at a larger distance than the length of the path so far cannot shorten it. Robots are listed for
-    each leaf of the corners' box tree, which contains `LEAF_SIZE` consecutive corners. Return the number of
-    corners in the queue.
+    The robots that are near enough are listed once for each leaf of the box tree, which contains `LEAF_SIZE`
+    consecutive corners. Return the number of corners in the queue.
     """
-    boxes = walls.corner_boxes
+    tree = walls.corner_tree
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
         is_first_in_leaf = corner % LEAF_SIZE == 0
         if is_first_in_leaf:
-            leaf = get_leaf(boxes, corner)
+            leaf = get_leaf(tree, corner)
+            # A robot farther away than this cannot shorten the path to any corner of the leaf.
             max_length = 0.0
             for leaf_corner in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
-                max_length = max(max_length, search.corner_paths.length[leaf_corner])
+                max_length = max(max_length, search.corner_paths.lengths[leaf_corner])
             candidate_count = _list_robots_within(
-                boxes, leaf, robots, max_length * max_length, search.all_robots, len(robots), leaf_robots
+                tree, leaf, robots, max_length * max_length, search.all_robots, len(robots), leaf_robots
             )
         for k in range(candidate_count):
             waiting_count = _try_straight_path_to_corner(walls, search, corner, leaf_robots[k], waiting_count)
@@ -461,11 +476,11 @@ def _find_nearest_candidate(
 def _try_straight_path_to_corner(
     walls: Walls, search: Search, corner: int, robot: int, waiting_count: int
 ) -> int:
-    """Use the straight path from a robot to a corner if it is the shortest so far.
+    """Use the straight path from a robot to a corner if it is the shortest path so far.
 
-    The robot must see the corner, and a shortest path from the robot must be able to bend there. The corner
-    then joins the queue of those from which paths to other corners may be shortened. Return the number of
-    corners in the queue, which was `waiting_count` before.
+    The robot must see the corner, and a shortest path from the robot must be able to bend there. If the path
+    is used, the corner joins the queue of the corners from which other paths may be shortened. Return the
+    number of corners in the queue, which was `waiting_count` before.
     """
     paths = search.corner_paths
     corner_x = walls.corners[corner, 0]
@@ -474,14 +489,14 @@ def _try_straight_path_to_corner(
     y = search.wall_index.positions[robot, 1]
     length = np.sqrt((corner_x - x) * (corner_x - x) + (corner_y - y) * (corner_y - y))
     if (
-        _is_better(length, robot, paths.length[corner], paths.source[corner])
+        _is_better(length, robot, paths.lengths[corner], paths.sources[corner])
         and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
         and is_visible(walls, search.wall_index, robot, corner_x, corner_y)
     ):
-        paths.length[corner] = length
-        paths.source[corner] = robot
-        paths.first_corner[corner] = corner
-        paths.previous_corner[corner] = NO_CORNER
+        paths.lengths[corner] = length
+        paths.sources[corner] = robot
+        paths.first_corners[corner] = corner
+        paths.previous_corners[corner] = NO_CORNER
         if not search.queue.is_waiting[corner]:
             search.queue.is_waiting[corner] = True
             search.queue.corners[waiting_count] = corner
@@ -493,8 +508,8 @@ def _try_straight_path_to_corner(
 def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
     """Find the paths to the hidden sites, which the robot that is nearest in a straight line does not see.
 
-    First, the shortest paths via corners are found. Their lengths limit which other robots can be near enough
-    to reach the sites on a shorter, straight path.
+    First, the shortest paths via corners are found. A straight path from another robot can be shorter only if
+    the robot is nearer than the length of these paths.
     """
     tiles = cost_map.tiles
     for group in range(len(tiles.group_boxes)):
@@ -517,8 +532,8 @@ def _try_other_robots(
 ) -> None:
     """Try the straight paths from other robots to the hidden sites of a group of tiles.
 
-    `max_length` is the length of the longest path to these sites so far. Robots that are farther away than
-    that from a tile cannot shorten a path to its sites.
+    `max_length` is the length of the longest path to these sites so far. A robot that is farther away cannot
+    shorten any path. The same holds for each tile, with the longest path to its own hidden sites.
     """
     tiles = cost_map.tiles
     group_robot_count = _list_robots_within(
@@ -549,42 +564,45 @@ def _try_other_robots(
 
 @kernel
 def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
-    """Find the shortest paths via a corner to the hidden sites of a tile.
+    """Find the shortest paths via corners to the hidden sites of a tile.
 
-    The last segment of such a path leads from a corner to a site that it sees. Each row of `cost_map.views`
-    belongs to a corner and a tile in which it sees sites. Sets of sites of a tile are bit masks, with one bit
-    for each slot.
+    The last segment of such a path leads from a corner to a site that it sees, as listed in `cost_map.views`.
+    Sets of sites of a tile are bit masks, with one bit for each slot.
     """
     tiles = cost_map.tiles
     views = cost_map.views
     corners = cost_map.walls.corners
     paths = search.corner_paths
     hidden_slots = search.hidden_slots[tile]
-    first_row = views.first_row[tile]
-    end_row = views.first_row[tile + 1]
-    # If a corner sees all hidden sites, none of their paths needs to be longer than the one via that corner.
+    first_row = views.row_starts[tile]
+    end_row = views.row_starts[tile + 1]
+    # If a corner sees all hidden sites, the path via that corner limits the length of all their paths.
     max_length = np.inf
     for row in range(first_row, end_row):
         unseen_slots = hidden_slots & ~views.visible_slots[row]
         if unseen_slots == 0:
-            max_length = min(max_length, paths.length[views.corner[row]] + views.farthest[row])
-    # Try each corner, unless even the nearest site that it sees is too far away.
+            max_length = min(max_length, paths.lengths[views.corners[row]] + views.max_distances[row])
+    # Try each corner, unless even the path to the nearest site that it sees is too long.
     for row in range(first_row, end_row):
-        corner = views.corner[row]
+        corner = views.corners[row]
         seen_slots = hidden_slots & views.visible_slots[row]
-        to_corner = paths.length[corner]
-        if seen_slots == 0 or to_corner + views.nearest[row] > max_length or to_corner == np.inf:
+        corner_length = paths.lengths[corner]
+        if (
+            seen_slots == 0
+            or corner_length + views.min_distances[row] > max_length
+            or corner_length == np.inf
+        ):
             continue
-        robot = paths.source[corner]
+        robot = paths.sources[corner]
         for slot in range(SLOTS):
             if _contains_slot(seen_slots, slot):
                 dx = tiles.x[tile, slot] - corners[corner, 0]
                 dy = tiles.y[tile, slot] - corners[corner, 1]
-                length = to_corner + np.sqrt(dx * dx + dy * dy)
-                if _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot]):
-                    search.site_length[tile, slot] = length
-                    search.site_robot[tile, slot] = robot
-                    search.site_corner[tile, slot] = corner
+                length = corner_length + np.sqrt(dx * dx + dy * dy)
+                if _is_better(length, robot, search.site_lengths[tile, slot], search.site_robots[tile, slot]):
+                    search.site_lengths[tile, slot] = length
+                    search.site_robots[tile, slot] = robot
+                    search.site_corners[tile, slot] = corner
 
 
 @kernel
@@ -595,7 +613,7 @@ def _contains_slot(slots: int, slot: int) -> bool:
 
 @kernel
 def _is_better(length: float, robot: int, best_length: float, best_robot: int) -> bool:
-    """Return whether a path is shorter than the best one, or equally long from a robot of a lower index."""
+    """Return whether a path is shorter than the best one, or as long, but from a robot with a lower index."""
     return length < best_length or (length == best_length and robot < best_robot)
 
 
@@ -606,16 +624,16 @@ def _compute_max_hidden_length(search: Search, tile: int) -> float:
     max_length = 0.0
     for slot in range(SLOTS):
         if _contains_slot(hidden_slots, slot):
-            max_length = max(max_length, search.site_length[tile, slot])
+            max_length = max(max_length, search.site_lengths[tile, slot])
     return max_length
 
 
 @kernel
 def _try_straight_paths_to_sites(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
-    """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest so far.
+    """Use the straight path from a robot to each hidden site of a tile if it is the shortest path so far.
 
-    Hidden sites are those that their nearest robot does not see. This robot may see them. The set of hidden
-    sites is a bit mask, with one bit for each slot of the tile.
+    Hidden sites are those that their nearest robot does not see; another robot may see them. The set of
+    hidden sites is a bit mask, with one bit for each slot of the tile.
     """
     tiles = cost_map.tiles
     wall_index = search.wall_index
@@ -630,11 +648,11 @@ def _try_straight_paths_to_sites(cost_map: CostMap, search: Search, tile: int, r
             dy = y - wall_index.positions[robot, 1]
             length = np.sqrt(dx * dx + dy * dy)
             if (
-                _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot])
-                # The nearest robot does not see the site, or it would not be hidden.
-                and robot != search.nearest_robot[tile, slot]
+                _is_better(length, robot, search.site_lengths[tile, slot], search.site_robots[tile, slot])
+                # If the nearest robot saw the site, it would not be hidden.
+                and robot != search.nearest_robots[tile, slot]
                 and is_visible(cost_map.walls, wall_index, robot, x, y)
             ):
-                search.site_length[tile, slot] = length
-                search.site_robot[tile, slot] = robot
-                search.site_corner[tile, slot] = NO_CORNER
+                search.site_lengths[tile, slot] = length
+                search.site_robots[tile, slot] = robot
+                search.site_corners[tile, slot] = NO_CORNER

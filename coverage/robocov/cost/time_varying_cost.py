@@ -15,20 +15,20 @@ from robocov.cost.result import CoverageResult
 from robocov.cost.site_paths import NO_ROBOT
 
 _MAX_CACHED_MAPS = 64
-"""Maximum number of maps whose costs are cached. The maps recur if obstacles move periodically."""
+"""Maximum number of maps whose costs are cached, because maps recur if obstacles move periodically."""
 
 
 class CostSummary(NamedTuple):
-    """The main results of a coverage cost.
+    """The main results of a coverage cost; see `CoverageResult`.
 
     Attributes
     ----------
     mean_distance : float, m
-        nan if no robot is available.
+        Mean geodesic distance from a site to its owner; nan if no robot is available.
     value : float, m³
-        The coverage cost, see `CoverageResult`; nan if no robot is available.
+        The coverage cost (22); nan if no robot is available.
     uncovered_area : float, m²
-        The entire free area if no robot is available.
+        Area that no robot can reach; all of the free space if no robot is available.
     """
 
     mean_distance: float
@@ -37,17 +37,18 @@ class CostSummary(NamedTuple):
 
 
 class TimeVaryingCost:
-    """The coverage cost (22) at any time, computed from the available robots.
+    """The coverage cost (22) of the available robots at any time.
 
-    A robot is available if it works and no moving obstacle covers it. Robots that have failed cannot go
-    anywhere, nor can robots that a moving obstacle has run over, until they are free again.
+    A robot is available if it works and is not covered by a moving obstacle. A robot that has failed cannot
+    go anywhere. Nor can a robot that a moving obstacle has run over, until the obstacle has moved on.
 
     Parameters
     ----------
     cost : CoverageCost
         The cost of the map at time zero.
     progress : callable, optional
-        See `CoverageCost`; used for the maps at other times.
+        Called with the completed fraction while the cost of the map at another time is prepared; see
+        `CoverageCost`.
 
     See Also
     --------
@@ -77,11 +78,12 @@ class TimeVaryingCost:
         Parameters
         ----------
         time : float, s
+            Simulation time.
 
         Returns
         -------
         CoverageCost
-            The one passed to the constructor if no obstacle moves.
+            If no obstacle moves, the one that was passed to the constructor.
         """
         environment = self._cost.environment
         if not environment.has_moving_obstacles:
@@ -105,13 +107,16 @@ class TimeVaryingCost:
         Parameters
         ----------
         time : float, s
+            Simulation time.
         positions : (n, 2) array, m
+            Positions of the robots.
         is_working : (n,) bool array, optional
             False for robots that have failed. By default, all robots work.
 
         Returns
         -------
         (n,) bool array
+            Whether each robot is available.
         """
         is_available = np.ones(len(positions), dtype=bool) if is_working is None else is_working.copy()
         if self._cost.environment.has_moving_obstacles:
@@ -124,21 +129,21 @@ class TimeVaryingCost:
     ) -> CoverageResult | None:
         """Compute the coverage cost of the available robots at a given time.
 
-        A robot is available if it works and is not covered by a moving obstacle.
-
         Parameters
         ----------
         time : float, s
+            Simulation time.
         positions : (n, 2) array, m
+            Positions of all robots.
         is_working : (n,) bool array, optional
             False for robots that have failed. By default, all robots work.
         speeds : (n,) array, m/s, optional
-            See `CoverageCost`.
+            Speeds of all robots, if the cost is to be based on travel times; see `CoverageCost`.
 
         Returns
         -------
         CoverageResult or None
-            None if no robot is available.
+            It contains only the available robots. None if no robot is available.
         """
         is_available = self.find_available_robots(time, positions, is_working)
         if not is_available.any():
@@ -149,36 +154,41 @@ class TimeVaryingCost:
     def evaluate_all_robots(
         self, time: float, positions: Array, is_working: BoolArray | None = None
     ) -> CoverageResult | None:
-        """Compute the coverage cost at a given time, with all robots in the result.
+        """Compute the coverage cost of the available robots, with a result that contains all robots.
 
         Parameters
         ----------
         time : float, s
+            Simulation time.
         positions : (n, 2) array, m
+            Positions of all robots.
         is_working : (n,) bool array, optional
             False for robots that have failed. By default, all robots work.
 
         Returns
         -------
         CoverageResult or None
-            Robots that are not available own no sites. None if no robot is available.
+            It contains all robots, so that they have their usual indices, but those that are not available
+            own no sites. None if no robot is available.
         """
         result = self(time, positions, is_working)
         if result is None or len(result.positions) == len(positions):
             return result
         available = np.flatnonzero(self.find_available_robots(time, positions, is_working))
-        owner = np.where(result.owner != NO_ROBOT, available[result.owner], NO_ROBOT)
-        return replace(result, positions=np.array(positions), owner=owner)
+        owners = np.where(result.owners != NO_ROBOT, available[result.owners], NO_ROBOT)
+        return replace(result, positions=np.array(positions), owners=owners)
 
     def compute_summary(
         self, time: float, positions: Array, is_working: BoolArray | None = None
     ) -> CostSummary:
-        """Compute mean distance, coverage cost (22) and uncovered area at a given time.
+        """Compute the mean distance, the coverage cost (22) and the uncovered area at a given time.
 
         Parameters
         ----------
         time : float, s
+            Simulation time.
         positions : (n, 2) array, m
+            Positions of the robots.
         is_working : (n,) bool array, optional
             False for robots that have failed. By default, all robots work.
 

@@ -1,9 +1,15 @@
-"""Visibility among walls: for each source, the walls that face it, sorted into angular bins.
+"""Visibility among walls: for each source, an index of the walls that face it, by direction.
 
-A wall a → b (free space on its left) hides a target q from a source p if and only if p is not behind it, q is
-behind it, and the segment from p to q meets it, ends included. A target may therefore be hidden by a vertex
-that the segment only touches; the path via that vertex is just as short. Walls that end at p are left out. If
-p is a vertex, its sectors decide in which directions there is free space.
+The directions from a source are divided into angular bins. Each bin has a list of the walls that face the
+source in these directions. To test whether the source sees a point, only the walls in one bin are examined,
+and mostly none: all points up to the *clear distance* of a bin are visible, and all points beyond its
+*horizon* are hidden.
+
+A wall from a to b, with free space on its left, hides a point q from a source p if and only if p is not
+behind the wall, q is behind it, and the segment from p to q meets it, ends included. A point may therefore be
+hidden by a vertex that the segment only touches; the path via that vertex is just as short. Walls that start
+or end at p are left out. If p is a vertex, its sectors (see `Walls`) say in which directions there is free
+space.
 """
 
 from __future__ import annotations
@@ -41,28 +47,29 @@ from robocov.geodesic.walls import (
 )
 
 _ANGLE_PADDING = 1e-9
-"""Margin by which the pseudo-angles that a wall or a box spans are widened, far larger than rounding."""
+"""Margin by which the range of pseudo-angles of a wall or a box is widened, far larger than rounding
+errors."""
 
 _DISTANCE_PADDING = 1e-9
-"""Relative margin by which squared distances are lowered or raised, far larger than rounding."""
+"""Relative margin by which squared distances are lowered or raised, far larger than rounding errors."""
 
-_MAX_CHAIN = 16
-"""Maximum number of walls that are followed after one that ends within a bin."""
+_MAX_CHAIN_WALLS = 16
+"""Maximum number of next walls that are examined to find out whether a chain of walls covers a bin."""
 
 _MAX_SIDE_ERROR = 2.0**55
-"""Bound on the rounding error of sums of products of grid coordinates."""
+"""Upper bound on the rounding error of a sum of two products of grid coordinates."""
 
-_MAX_TREE_DEPTH = 64
-"""Size of the stack of a tree search, which contains at most one node for each level of the tree."""
+_STACK_SIZE = 64
+"""Size of the stack of a tree search. It is enough for 2**60 walls: a search adds one node per level."""
 
 ONLY_SOURCE = 0
-"""Row of the source in an index that has only one."""
+"""Row of the source in an index that has only one source."""
 
 NO_ENTRY = -1
-"""Used in place of an entry where there is none."""
+"""Used in place of an entry if there is none."""
 
 NO_SPACE = -1
-"""Returned instead of a number of entries, or of rows, if there is not enough space for them."""
+"""Returned instead of a number of entries or rows if the array for them is too small."""
 
 _FULL_TURN = 4.0
 """Pseudo-angle of a full turn; see `compute_pseudo_angle`."""
@@ -71,42 +78,46 @@ _MIN_LENGTH = 1e-300
 """Smallest length used as a divisor, which prevents division by zero."""
 
 _MUST_CHECK_SECTORS = -1.0
-"""Squared clear distance in all bins of a source at a vertex; less than the square of any distance."""
+"""Squared clear distance in all bins of a source at a vertex. No squared distance is below it."""
 
 
 class AngularWallIndex(NamedTuple):
-    """The walls that face each of n sources, in angular bins, in grid steps."""
+    """The walls that face each of n sources, in angular bins, in grid steps.
+
+    The bins cover a full turn. Each contains a linked list of entries, one for each wall in these directions.
+    """
 
     positions: Array
     """(n, 2) Positions of the sources."""
-    squared_reach: Array
-    """(n,) Squares of the distances within which all walls are in the index."""
-    squared_clear_distance: Array
-    """(n, bins) Squared distances up to which nothing is hidden; `_MUST_CHECK_SECTORS` if the source is at a
-    vertex."""
-    squared_horizon: Array
-    """(n, bins) Squared distances beyond which everything is hidden."""
-    head: IntArray
-    """(n, bins) The last entry of each bin, or `NO_ENTRY` if it is empty."""
-    entry_wall: IntArray
+    squared_ranges: Array
+    """(n,) Squares of the distances up to which the walls around each source are in the index."""
+    squared_clear_distances: Array
+    """(n, bins) Squares of the distances up to which no point is hidden by a wall. If the source is at a
+    vertex, they are `_MUST_CHECK_SECTORS`."""
+    squared_horizons: Array
+    """(n, bins) Squares of the distances beyond which every point is hidden."""
+    heads: IntArray
+    """(n, bins) The entry that was last added to each bin, or `NO_ENTRY`."""
+    entry_walls: IntArray
     """(m,) The wall of each entry."""
-    entry_before: IntArray
-    """(m,) The previous entry in the same bin, or `NO_ENTRY`."""
+    previous_entries: IntArray
+    """(m,) The entry that was added to the same bin before each entry, or `NO_ENTRY`."""
     stack: IntArray
-    """Nodes of the box tree that are still to be visited."""
+    """Scratch space: the nodes of the box tree that a search still has to visit."""
 
     @classmethod
     def allocate(cls, source_count: int, bin_count: int, max_entries: int) -> AngularWallIndex:
-        """Allocate an index, to be filled by `add_walls`.
+        """Allocate an uninitialized index, to which `add_walls` adds one source after the other.
 
         Parameters
         ----------
         source_count : int
+            Number of sources.
         bin_count : int
             Number of angular bins of each source. It must be a power of 2, because a bit mask is used to wrap
             the indices of bins around after a full turn.
         max_entries : int
-            Maximum number of entries, for all sources together.
+            Maximum number of entries of all sources together.
 
         Returns
         -------
@@ -114,30 +125,31 @@ class AngularWallIndex(NamedTuple):
         """
         return cls(
             positions=np.empty((source_count, 2)),
-            squared_reach=np.empty(source_count),
-            squared_clear_distance=np.empty((source_count, bin_count)),
-            squared_horizon=np.empty((source_count, bin_count)),
-            head=np.empty((source_count, bin_count), np.int64),
-            entry_wall=np.empty(max_entries, np.int64),
-            entry_before=np.empty(max_entries, np.int64),
-            stack=np.empty(_MAX_TREE_DEPTH, np.int64),
+            squared_ranges=np.empty(source_count),
+            squared_clear_distances=np.empty((source_count, bin_count)),
+            squared_horizons=np.empty((source_count, bin_count)),
+            heads=np.empty((source_count, bin_count), np.int64),
+            entry_walls=np.empty(max_entries, np.int64),
+            previous_entries=np.empty(max_entries, np.int64),
+            stack=np.empty(_STACK_SIZE, np.int64),
         )
 
 
 class _SpannedBins(NamedTuple):
-    """The angular bins that a wall spans, seen from a source.
+    """The angular bins in which a wall lies, seen from a source.
 
-    The wall covers a bin if it crosses every direction of the bin.
+    The wall covers a bin if it lies in every direction of the bin. Bins beyond a full turn continue the
+    count.
     """
 
     first: int
-    """The first bin that contains a direction to the wall."""
+    """The first bin in which the wall lies."""
     last: int
-    """The last such bin (inclusive)."""
+    """The last bin in which the wall lies (inclusive)."""
     first_covered: int
     """The first bin that the wall covers."""
     end_covered: int
-    """The bin after the last one that the wall covers (exclusive)."""
+    """The end of the bins that the wall covers (exclusive)."""
 
 
 @kernel
@@ -147,11 +159,12 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
     Parameters
     ----------
     dx, dy : float
-        The direction, of any length.
+        The direction, as a vector of any length.
 
     Returns
     -------
     float
+        The pseudo-angle. It is 0 straight down and 1 to the right.
 
     Examples
     --------
@@ -163,18 +176,18 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
 
 
 @kernel
-def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int) -> bool:
-    """Return whether a box lies entirely beyond the horizon of a source, in every bin that it meets.
+def is_box_hidden(boxes: Array, box: int, index: AngularWallIndex, source: int) -> bool:
+    """Return whether a box is certainly hidden from a source by walls.
 
-    The directions from the source are divided into angular bins. In each bin, the horizon is the distance
-    beyond which walls hide everything. A few more bins may be tested than the box meets.
+    The directions from the source are divided into angular bins. In each bin, walls hide everything beyond
+    the horizon. The box is hidden if it is beyond the horizon in every bin in which it may lie.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array, grid steps
-        Boxes of a tree, as `box_tree` builds it.
-    node : int
-        The node of the box.
+    boxes : (m, 4) array, grid steps
+        A tree of `box_tree`, or other boxes with the same columns.
+    box : int
+        Row of the box.
     index : AngularWallIndex
     source : int
         Row of the source in the index.
@@ -182,19 +195,21 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     Returns
     -------
     bool
+        False does not mean that the source sees any part of the box.
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    squared_distance = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _DISTANCE_PADDING)
+    squared_distance = compute_squared_box_distance(boxes, box, x, y) * (1.0 - _DISTANCE_PADDING)
     if squared_distance == 0.0:
         return False
-    bin_count = index.squared_horizon.shape[1]
-    half_width = 0.5 * (boxes[node, HIGH_X] - boxes[node, LOW_X])
-    half_height = 0.5 * (boxes[node, HIGH_Y] - boxes[node, LOW_Y])
-    dx = boxes[node, LOW_X] + half_width - x
-    dy = boxes[node, LOW_Y] + half_height - y
-    # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
-    # divided by the distance to the center. A pseudo-angle grows at most as fast as the angle.
+    bin_count = index.squared_horizons.shape[1]
+    half_width = 0.5 * (boxes[box, HIGH_X] - boxes[box, LOW_X])
+    half_height = 0.5 * (boxes[box, HIGH_Y] - boxes[box, LOW_Y])
+    dx = boxes[box, LOW_X] + half_width - x
+    dy = boxes[box, LOW_Y] + half_height - y
+    # The sine of the angle between the direction of the center and that of any point of the box is at most
+    # the half diagonal divided by the distance to the center. An angle is at most pi/2 times its sine, and a
+    # pseudo-angle grows at most as fast as the angle.
     squared_sine = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
     half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _ANGLE_PADDING
     angle = compute_pseudo_angle(dx, dy)
@@ -203,16 +218,17 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     last_bin = int(np.floor((angle + half_angle) * bins_per_unit))
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
         k = _wrap_bin(unwrapped_bin, bin_count)
-        if index.squared_horizon[source, k] >= squared_distance:
+        if index.squared_horizons[source, k] >= squared_distance:
             return False
     return True
 
 
 @kernel
 def _wrap_bin(unwrapped_bin: int, bin_count: int) -> int:
-    """Return the bin that has the same directions, whole turns apart, from 0 up to `bin_count`.
+    """Return the bin from 0 up to `bin_count` that contains the same directions, whole turns apart.
 
-    `bin_count` is a power of 2, so that this is the remainder of the division by it, also of negative bins.
+    Since `bin_count` is a power of 2, the bit mask gives the remainder of the division by it, also for a
+    negative bin.
     """
     return unwrapped_bin & (bin_count - 1)
 
@@ -224,12 +240,12 @@ def add_walls(
     source: int,
     x: float,
     y: float,
-    squared_reach: float,
+    squared_range: float,
     entry_count: int,
 ) -> int:
     """Add a source to an index, with the walls around it.
 
-    A search in the box tree of the walls visits nearby boxes first, and skips those that are out of reach or
+    A search in the box tree of the walls visits nearby boxes first. It skips boxes that are out of range or
     hidden by the walls found so far.
 
     Parameters
@@ -240,58 +256,58 @@ def add_walls(
     source : int
         Row of the source in the index.
     x, y : float, grid steps
-        Its position, not inside an obstacle.
-    squared_reach : float
-        Squared distance up to which walls are added.
+        Position of the source, not inside an obstacle.
+    squared_range : float, grid steps²
+        Square of the distance up to which walls are added.
     entry_count : int
         Number of entries that other sources already use.
 
     Returns
     -------
     int
-        New number of entries, or `NO_SPACE`.
+        The new number of entries, or `NO_SPACE`.
     """
-    boxes = walls.boxes
+    tree = walls.tree
     stack = index.stack
-    bin_count = index.head.shape[1]
-    _reset_source(index, source, x, y, squared_reach)
+    bin_count = index.heads.shape[1]
+    _reset_source(index, source, x, y, squared_range)
     stack[0] = ROOT
     stack_size = 1
     while stack_size > 0:
         stack_size -= 1
         node = stack[stack_size]
-        if compute_squared_box_distance(boxes, node, x, y) >= squared_reach:
+        if compute_squared_box_distance(tree, node, x, y) >= squared_range:
             continue
-        if is_box_hidden(boxes, node, index, source):
+        if is_box_hidden(tree, node, index, source):
             continue
-        if not is_leaf(boxes, node):
-            stack_size = _push_children(stack, stack_size, boxes, node, x, y)
+        if not is_leaf(tree, node):
+            stack_size = _push_children(stack, stack_size, tree, node, x, y)
             continue
-        first_wall = get_first_item(boxes, node)
+        first_wall = get_first_item(tree, node)
         for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
             # A wall may need an entry in every bin.
-            if entry_count + bin_count > len(index.entry_wall):
+            if entry_count + bin_count > len(index.entry_walls):
                 return NO_SPACE
             if walls.can_hide_free_space[wall]:
                 entry_count = _add_wall(walls, wall, index, source, entry_count)
-    # At a vertex, some directions lead into the obstacle: no clear distance may skip that test.
+    # At a vertex, some directions lead into the obstacle. This value makes `is_visible` check the direction.
     if find_vertex(walls.vertices, x, y) != NO_VERTEX:
         for k in range(bin_count):
-            index.squared_clear_distance[source, k] = _MUST_CHECK_SECTORS
+            index.squared_clear_distances[source, k] = _MUST_CHECK_SECTORS
     return entry_count
 
 
 @kernel
-def _push_children(stack: IntArray, stack_size: int, boxes: Array, node: int, x: float, y: float) -> int:
+def _push_children(stack: IntArray, stack_size: int, tree: Array, node: int, x: float, y: float) -> int:
     """Push the two children of a node on the stack, the nearer one last; return the new size of the stack.
 
-    The last node on the stack is visited first. Boxes that its walls hide need not be visited.
+    The nearer child is then visited first, because its walls may hide the box of the other child.
     """
     nearer = get_first_child(node)
     farther = nearer + 1
-    nearer_distance = compute_squared_box_distance(boxes, nearer, x, y)
-    farther_distance = compute_squared_box_distance(boxes, farther, x, y)
-    if farther_distance < nearer_distance:
+    nearer_squared_distance = compute_squared_box_distance(tree, nearer, x, y)
+    farther_squared_distance = compute_squared_box_distance(tree, farther, x, y)
+    if farther_squared_distance < nearer_squared_distance:
         nearer, farther = farther, nearer
     stack[stack_size] = farther
     stack[stack_size + 1] = nearer
@@ -300,13 +316,13 @@ def _push_children(stack: IntArray, stack_size: int, boxes: Array, node: int, x:
 
 @kernel
 def index_walls(walls: Walls, index: AngularWallIndex, x: float, y: float) -> int:
-    """Index the walls around a single source, `ONLY_SOURCE`, at any distance.
+    """Index the walls at any distance around a single source.
 
     Parameters
     ----------
     walls : Walls
     index : AngularWallIndex
-        Overwritten; it has space for one source.
+        An index of one source, which is overwritten. The row of the source is `ONLY_SOURCE`.
     x, y : float, grid steps
         Position of the source, not inside an obstacle.
 
@@ -315,45 +331,44 @@ def index_walls(walls: Walls, index: AngularWallIndex, x: float, y: float) -> in
     int
         Number of entries, or `NO_SPACE`.
     """
-    squared_reach = np.inf
+    squared_range = np.inf
     entry_count = 0
-    return add_walls(walls, index, ONLY_SOURCE, x, y, squared_reach, entry_count)
+    return add_walls(walls, index, ONLY_SOURCE, x, y, squared_range, entry_count)
 
 
 @kernel
-def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squared_reach: float) -> None:
+def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squared_range: float) -> None:
     """Set the position of a source, with no walls around it yet."""
     index.positions[source, 0] = x
     index.positions[source, 1] = y
-    index.squared_reach[source] = squared_reach
-    for k in range(index.head.shape[1]):
-        index.squared_clear_distance[source, k] = squared_reach
-        index.squared_horizon[source, k] = np.inf
-        index.head[source, k] = NO_ENTRY
+    index.squared_ranges[source] = squared_range
+    for k in range(index.heads.shape[1]):
+        index.squared_clear_distances[source, k] = squared_range
+        index.squared_horizons[source, k] = np.inf
+        index.heads[source, k] = NO_ENTRY
 
 
 @kernel
 def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, entry_count: int) -> int:
-    """Add a wall to the bins that it spans if it faces the source; return the new number of entries.
+    """Add a wall to the bins in which it lies if it faces the source; return the new number of entries.
 
-    The directions from the source are divided into angular bins, each with a list of the walls in it.
-    Nothing is hidden up to the clear distance of a bin, which is at most the smallest distance of each wall
-    in the bin. Everything is hidden beyond the horizon of a bin, which is at most the largest distance of
-    each wall that covers the whole bin. A wall beyond the horizon of a bin is not added to the bin. Distances
-    and angles are padded to allow for rounding.
+    The clear distance of a bin is at most the distance of the nearest point of each wall in the bin. The
+    horizon of a bin is at most the distance of the farthest point of each wall that covers the bin. A wall
+    beyond the horizon of a bin is not added to the bin. Distances and angles are padded to allow for
+    rounding.
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
-    # A wall in line with the source hides nothing, unless the source is in its interior.
+    # A wall that does not face the source hides nothing that the walls in front of it do not hide.
     if not _faces(walls.ends, wall, x, y):
         return entry_count
     min_squared_distance = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _DISTANCE_PADDING)
-    if min_squared_distance >= index.squared_reach[source]:
+    if min_squared_distance >= index.squared_ranges[source]:
         return entry_count
     max_squared_distance = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _DISTANCE_PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
-    bin_count = index.head.shape[1]
+    bin_count = index.heads.shape[1]
     start_angle = compute_pseudo_angle(ax, ay)
     end_angle = compute_pseudo_angle(bx, by)
     if end_angle < start_angle:
@@ -361,30 +376,31 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
     bins = _span_bins(start_angle, end_angle, bin_count)
     for unwrapped_bin in range(bins.first, bins.last + 1):
         k = _wrap_bin(unwrapped_bin, bin_count)
-        if min_squared_distance > index.squared_horizon[source, k]:
+        if min_squared_distance > index.squared_horizons[source, k]:
             continue
         _add_to_bin(index, source, k, wall, min_squared_distance, entry_count)
         entry_count += 1
         if bins.first_covered <= unwrapped_bin < bins.end_covered:
-            index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_distance)
-    # The wall covers only the first part of the bin in which it ends. If the next walls cover the rest, the
-    # chain of these walls covers the bin, and its largest distance limits the horizon.
+            index.squared_horizons[source, k] = min(index.squared_horizons[source, k], max_squared_distance)
+    # The wall covers only the beginning of the bin in which it ends. If the walls after it cover the rest,
+    # the chain of these walls covers the bin, and the farthest point of the chain limits the horizon.
     k = _wrap_bin(bins.end_covered, bin_count)
     has_partial_bin = bins.first_covered <= bins.end_covered < bins.first + bin_count
-    if has_partial_bin and max_squared_distance < index.squared_horizon[source, k]:
+    if has_partial_bin and max_squared_distance < index.squared_horizons[source, k]:
         bin_end_angle = (bins.end_covered + 1) / (bin_count / _FULL_TURN)
         max_squared_chain_distance = _compute_max_squared_chain_distance(
             walls, wall, x, y, end_angle, bin_end_angle, max_squared_distance
         )
-        index.squared_horizon[source, k] = min(index.squared_horizon[source, k], max_squared_chain_distance)
+        index.squared_horizons[source, k] = min(index.squared_horizons[source, k], max_squared_chain_distance)
     return entry_count
 
 
 @kernel
 def _span_bins(start_angle: float, end_angle: float, bin_count: int) -> _SpannedBins:
-    """Return the bins between two pseudo-angles. Bins beyond a full turn are not wrapped around.
+    """Return the bins between the pseudo-angles of the start and the end of a wall.
 
-    Spanned bins are rounded outward and covered bins inward, so that rounding errors of angles do no harm.
+    The bins in which the wall lies are rounded outward, and those that it covers inward, so that rounding
+    errors of the angles do no harm.
     """
     bins_per_unit = bin_count / _FULL_TURN
     first = int(np.floor((start_angle - _ANGLE_PADDING) * bins_per_unit))
@@ -403,11 +419,11 @@ def _add_to_bin(
     index: AngularWallIndex, source: int, k: int, wall: int, min_squared_distance: float, entry: int
 ) -> None:
     """Add a wall to bin k of a source as a new entry, and limit the clear distance of the bin."""
-    index.entry_wall[entry] = wall
-    index.entry_before[entry] = index.head[source, k]
-    index.head[source, k] = entry
-    index.squared_clear_distance[source, k] = min(
-        index.squared_clear_distance[source, k], min_squared_distance
+    index.entry_walls[entry] = wall
+    index.previous_entries[entry] = index.heads[source, k]
+    index.heads[source, k] = entry
+    index.squared_clear_distances[source, k] = min(
+        index.squared_clear_distances[source, k], min_squared_distance
     )
 
 
@@ -432,26 +448,27 @@ def _compute_max_squared_chain_distance(
     bin_end_angle: float,
     max_squared_distance: float,
 ) -> float:
-    """Return the largest squared distance from (x, y) to a chain of consecutive walls.
+    """Return the squared distance from (x, y) to the farthest point of a chain of consecutive walls.
 
-    Where one wall ends within an angular bin, the next one usually continues, and the two together hide
-    everything behind them. The chain starts with `wall`, which ends in the direction `end_angle`; its largest
-    squared distance is `max_squared_distance`. The walls that follow are added, as long as they face (x, y),
-    until one ends at or beyond the end of the bin, at `bin_end_angle`. The result is inf if none does.
-    Directions are given as pseudo-angles, which grow with the angle; see `compute_pseudo_angle`.
+    If a wall ends within an angular bin, the next wall usually starts there, and the two together hide
+    everything behind them. The chain starts with `wall`, which ends in the direction `end_angle` and whose
+    farthest point is at the squared distance `max_squared_distance`. The next walls are added to the chain as
+    long as they face (x, y), until one ends at or beyond `bin_end_angle`, the end of the bin. The result is
+    inf if none does. All directions are pseudo-angles; see `compute_pseudo_angle`.
     """
-    for _ in range(_MAX_CHAIN):
-        # The next wall leads from (ax, ay), where this one ends, to (bx, by), relative to the point.
+    for _ in range(_MAX_CHAIN_WALLS):
+        # The next wall leads from (ax, ay), where this one ends, to (bx, by), both relative to (x, y).
         ax = walls.ends[wall, END_X] - x
         ay = walls.ends[wall, END_Y] - y
-        wall = walls.following[wall]
+        wall = walls.next_walls[wall]
         if wall == NO_WALL:
             break
         bx = walls.ends[wall, END_X] - x
         by = walls.ends[wall, END_Y] - y
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
-        # The direction in which the wall ends, at or after the end of the wall before.
+        # A wall that faces (x, y) runs counter-clockwise, so its end has the larger pseudo-angle. After the
+        # direction in which pseudo-angles start again at 0, whole turns are added.
         previous_end_angle = end_angle
         end_angle = compute_pseudo_angle(bx, by)
         while end_angle < previous_end_angle - _ANGLE_PADDING:
@@ -472,18 +489,19 @@ def find_bin(bin_count: int, dx: float, dy: float) -> int:
     bin_count : int
         Number of bins in a full turn.
     dx, dy : float
-        The direction, of any length.
+        The direction, as a vector of any length.
 
     Returns
     -------
     int
+        Index of the bin, from 0 to ``bin_count - 1``.
     """
     return min(int(compute_pseudo_angle(dx, dy) * (bin_count / _FULL_TURN)), bin_count - 1)
 
 
 @kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether a source sees a point, that is, no wall lies between them. The range is unlimited.
+    """Return whether a source sees a point at any distance, that is, whether no wall lies between them.
 
     A source at a vertex of the walls sees only points in directions that lead into free space.
 
@@ -494,7 +512,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     source : int
         Row of the source in the index.
     x, y : float, grid steps
-        Coordinates of the point.
+        The point.
 
     Returns
     -------
@@ -503,19 +521,19 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
     squared_distance = dx * dx + dy * dy
-    k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
-    # In this angular bin around the source, no point within the clear distance is hidden, and every point
-    # beyond the horizon is. These two comparisons decide most cases.
-    if squared_distance <= index.squared_clear_distance[source, k]:
+    k = find_bin(index.squared_clear_distances.shape[1], dx, dy)
+    # In angular bin k around the source, every point up to the clear distance is visible, and every point
+    # beyond the horizon is hidden. These two comparisons decide most cases.
+    if squared_distance <= index.squared_clear_distances[source, k]:
         return True
-    if squared_distance > index.squared_horizon[source, k]:
+    if squared_distance > index.squared_horizons[source, k]:
         return False
     return _is_visible_past_walls(walls, index, source, k, dx, dy)
 
 
 @kernel
 def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether a point is so close to a source that nothing can hide it.
+    """Return whether a point is so close to a source that no wall can hide it.
 
     Loops that test many points call this before `is_visible`, which is too large for the compiler to inline.
 
@@ -530,11 +548,12 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
     Returns
     -------
     bool
+        False does not mean that the point is hidden.
     """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
-    k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
-    is_clear: bool = dx * dx + dy * dy <= index.squared_clear_distance[source, k]
+    k = find_bin(index.squared_clear_distances.shape[1], dx, dy)
+    is_clear: bool = dx * dx + dy * dy <= index.squared_clear_distances[source, k]
     return is_clear
 
 
@@ -542,26 +561,23 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
 def _is_visible_past_walls(
     walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
 ) -> bool:
-    """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k.
-
-    The walls of a bin are a linked list: `head` is its last entry, and `entry_before` leads to the one
-    before.
-    """
+    """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    if index.squared_clear_distance[source, k] == _MUST_CHECK_SECTORS:
+    if index.squared_clear_distances[source, k] == _MUST_CHECK_SECTORS:
         # The source is at a vertex, where some directions lead into the obstacle.
         vertex = find_vertex(walls.vertices, x, y)
         if not contains_direction(walls, vertex, dx, dy):
             return False
-    if dx * dx + dy * dy > index.squared_reach[source]:
-        # The bins may lack walls that are this far away.
+    if dx * dx + dy * dy > index.squared_ranges[source]:
+        # Walls that are as far away as the point may be missing in the index.
         return _is_segment_free(walls, x, y, dx, dy)
-    entry = index.head[source, k]
+    # The walls of a bin are a linked list, from the last entry to the first one.
+    entry = index.heads[source, k]
     while entry != NO_ENTRY:
-        if _hides(walls.ends, index.entry_wall[entry], x, y, dx, dy):
+        if _hides(walls.ends, index.entry_walls[entry], x, y, dx, dy):
             return False
-        entry = index.entry_before[entry]
+        entry = index.previous_entries[entry]
     return True
 
 
@@ -589,17 +605,17 @@ def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
 def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether no wall hides the point at offset (dx, dy) from (x, y).
 
-    Only walls whose boxes in the tree meet the segment between the two points are tested.
+    A search in the box tree of the walls skips boxes that do not meet the segment between the two points.
     """
-    boxes = walls.boxes
+    tree = walls.tree
     node = ROOT
     while node != END_OF_TREE:
-        if _is_box_off_segment(boxes, node, x, y, dx, dy):
+        if _is_box_off_segment(tree, node, x, y, dx, dy):
             node = skip_subtree(node)
-        elif not is_leaf(boxes, node):
+        elif not is_leaf(tree, node):
             node = get_first_child(node)
         else:
-            first_wall = get_first_item(boxes, node)
+            first_wall = get_first_item(tree, node)
             for wall in range(first_wall, min(first_wall + LEAF_SIZE, len(walls.ends))):
                 if (
                     walls.can_hide_free_space[wall]
@@ -612,20 +628,21 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
 
 @kernel
-def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a box certainly does not meet the segment from (x, y) to (x + dx, y + dy).
+def _is_box_off_segment(tree: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
+    """Return whether the box of a node certainly does not meet the segment from (x, y) to (x + dx, y + dy).
 
-    That is so if the two are apart in x, in y, or across the segment (separating axes).
+    By the separating axis theorem, the two do not meet if they are apart in x, in y, or in the direction
+    perpendicular to the segment.
     """
-    if boxes[node, LOW_X] > x + max(dx, 0.0) or boxes[node, HIGH_X] < x + min(dx, 0.0):
+    if tree[node, LOW_X] > x + max(dx, 0.0) or tree[node, HIGH_X] < x + min(dx, 0.0):
         return True
-    if boxes[node, LOW_Y] > y + max(dy, 0.0) or boxes[node, HIGH_Y] < y + min(dy, 0.0):
+    if tree[node, LOW_Y] > y + max(dy, 0.0) or tree[node, HIGH_Y] < y + min(dy, 0.0):
         return True
-    half_width = 0.5 * (boxes[node, HIGH_X] - boxes[node, LOW_X])
-    half_height = 0.5 * (boxes[node, HIGH_Y] - boxes[node, LOW_Y])
-    # Compare the distance from the line to the center with the extent of the box across the line, both
-    # multiplied by the length of the segment.
-    side = dx * (boxes[node, LOW_Y] + half_height - y) - dy * (boxes[node, LOW_X] + half_width - x)
+    half_width = 0.5 * (tree[node, HIGH_X] - tree[node, LOW_X])
+    half_height = 0.5 * (tree[node, HIGH_Y] - tree[node, LOW_Y])
+    # Compare the distance of the center of the box from the line of the segment with half the extent of the
+    # box perpendicular to that line. Both are multiplied by the length of the segment.
+    side = dx * (tree[node, LOW_Y] + half_height - y) - dy * (tree[node, LOW_X] + half_width - x)
     half_extent: float = abs(dx) * half_height + abs(dy) * half_width
     distance: float = abs(side) * (1.0 - _DISTANCE_PADDING)
     return distance > half_extent * (1.0 + _DISTANCE_PADDING) + _MAX_SIDE_ERROR

@@ -1,8 +1,9 @@
 """Trees of bounding boxes, which let searches skip everything that is far away.
 
-A tree is a (nodes, 4) array. Row i is the box of node i, with the columns `LOW_X`, `LOW_Y`, `HIGH_X` and
-`HIGH_Y`. Node 1 is the root, and node i has the children 2 i and 2 i + 1. The second half of the nodes are
-leaves of `LEAF_SIZE` consecutive items each; the boxes of empty leaves start at infinity. Row 0 is not used.
+The items of a tree, such as walls, are numbered. A tree is a (nodes, 4) array. Row i is the bounding box of
+node i, with the columns `LOW_X`, `LOW_Y`, `HIGH_X` and `HIGH_Y`. Node 1 is the root, and node i has the
+children 2 i and 2 i + 1. The second half of the nodes are leaves, which contain `LEAF_SIZE` consecutive items
+each. The lower bounds of an empty leaf are infinite. Row 0 is not used.
 
 A search starts at the `ROOT`. It descends from a node to its first child (`get_first_child`), and skips the
 nodes below a box that is too far away: `skip_subtree` returns the next node, or `END_OF_TREE`.
@@ -16,7 +17,7 @@ from robocov.compiled import kernel
 ROOT = 1
 """The node that contains all items."""
 END_OF_TREE = 0
-"""Returned instead of a node at the end of a search."""
+"""Used in place of a node when a search has visited the whole tree."""
 LEAF_SIZE = 8
 """Number of items per leaf."""
 LOW_X = 0
@@ -32,12 +33,13 @@ Z_ORDER_BITS = 16
 
 
 def build_box_tree(low: Array, high: Array) -> Array:
-    """Build the box tree of items: a binary tree, in which each box contains those of its two children.
+    """Build a binary tree of bounding boxes, in which each box contains the boxes of its two children.
 
     Parameters
     ----------
     low, high : (m, 2) array
-        Lower left and upper right corners of the items, in an order in which neighbors are close together.
+        Lower left and upper right corners of the boxes of the items. A search is fast if items with nearby
+        indices are close together.
 
     Returns
     -------
@@ -48,11 +50,11 @@ def build_box_tree(low: Array, high: Array) -> Array:
     leaf_count = 1
     while leaf_count * LEAF_SIZE < len(low):
         leaf_count *= 2
-    # With the upper bounds negated, all four bounds are minima.
-    items = np.full((leaf_count * LEAF_SIZE, 4), np.inf)
-    items[: len(low)] = np.hstack([low, -high])
-    # Each level has half as many boxes as the one below: one for each pair. The last level is the root.
-    level = items.reshape(-1, LEAF_SIZE, 4).min(axis=1)
+    # With the upper bounds negated, the bounds of a box that contains others are minima of theirs.
+    item_boxes = np.full((leaf_count * LEAF_SIZE, 4), np.inf)
+    item_boxes[: len(low)] = np.hstack([low, -high])
+    # Each level has one box for each pair of boxes of the level below. The last level is the root.
+    level = item_boxes.reshape(-1, LEAF_SIZE, 4).min(axis=1)
     levels = [level]
     while len(level) > 1:
         level = level.reshape(-1, 2, 4).min(axis=1)
@@ -63,16 +65,17 @@ def build_box_tree(low: Array, high: Array) -> Array:
 
 
 def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
-    """Compute positions along a Z-curve, on which neighbors in the plane are close together.
+    """Compute the positions of cells along a Z-order curve, which mostly puts neighbors close together.
 
     Parameters
     ----------
     column, row : (n,) int array
-        Coordinates from 0 to ``2**Z_ORDER_BITS - 1``.
+        Coordinates of the cells, from 0 to ``2**Z_ORDER_BITS - 1``.
 
     Returns
     -------
     (n,) int array
+        Sorting the cells by these numbers puts them in the order of the curve.
 
     Examples
     --------
@@ -88,55 +91,61 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
 
 
 @kernel
-def is_leaf(boxes: Array, node: int) -> bool:
+def _get_first_leaf(tree: Array) -> int:
+    """Return the first node that is a leaf: the leaves are the second half of the nodes."""
+    return len(tree) // 2
+
+
+@kernel
+def is_leaf(tree: Array, node: int) -> bool:
     """Return whether a node is a leaf.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array
+    tree : (nodes, 4) array
     node : int
 
     Returns
     -------
     bool
     """
-    first_leaf = len(boxes) // 2
-    return node >= first_leaf
+    return node >= _get_first_leaf(tree)
 
 
 @kernel
-def get_first_item(boxes: Array, leaf: int) -> int:
+def get_first_item(tree: Array, leaf: int) -> int:
     """Return the index of the first of the `LEAF_SIZE` items of a leaf.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array
+    tree : (nodes, 4) array
     leaf : int
+        The node of the leaf.
 
     Returns
     -------
     int
-        It may exceed the last item of the tree.
+        If the leaf is empty, this is not the index of an item, but a larger one.
     """
-    first_leaf = len(boxes) // 2
-    return (leaf - first_leaf) * LEAF_SIZE
+    return (leaf - _get_first_leaf(tree)) * LEAF_SIZE
 
 
 @kernel
-def get_leaf(boxes: Array, item: int) -> int:
+def get_leaf(tree: Array, item: int) -> int:
     """Return the leaf that contains an item.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array
+    tree : (nodes, 4) array
     item : int
+        Index of the item.
 
     Returns
     -------
     int
+        The node of the leaf.
     """
-    first_leaf = len(boxes) // 2
-    return first_leaf + item // LEAF_SIZE
+    return _get_first_leaf(tree) + item // LEAF_SIZE
 
 
 @kernel
@@ -161,28 +170,30 @@ def skip_subtree(node: int) -> int:
     Parameters
     ----------
     node : int
+        The node to skip.
 
     Returns
     -------
     int
-        The node, or `END_OF_TREE`.
+        The next node, or `END_OF_TREE`.
     """
-    # The children of node i are 2 i and 2 i + 1. After a second child, whose number is odd, the search
-    # continues after the subtree of its parent; after a first child, with the second one.
+    # The children of node i are 2 i and 2 i + 1. After a first child, the search continues with the second
+    # one. After a second child, whose number is odd, it continues after the subtree of the parent.
     while node & 1:
         node >>= 1
     return node + 1 if node != 0 else END_OF_TREE
 
 
 @kernel
-def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) -> float:
+def compute_squared_box_distance(boxes: Array, box: int, x: float, y: float) -> float:
     """Compute the squared distance from a point to a box.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array, grid steps
-    node : int
-        The node of the box.
+    boxes : (m, 4) array, grid steps
+        A tree, or other boxes with the same columns.
+    box : int
+        Row of the box.
     x, y : float, grid steps
         The point.
 
@@ -191,6 +202,6 @@ def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) ->
     float, grid steps²
         0 inside the box.
     """
-    dx: float = max(boxes[node, LOW_X] - x, x - boxes[node, HIGH_X], 0.0)
-    dy: float = max(boxes[node, LOW_Y] - y, y - boxes[node, HIGH_Y], 0.0)
+    dx: float = max(boxes[box, LOW_X] - x, x - boxes[box, HIGH_X], 0.0)
+    dy: float = max(boxes[box, LOW_Y] - y, y - boxes[box, HIGH_Y], 0.0)
     return dx * dx + dy * dy

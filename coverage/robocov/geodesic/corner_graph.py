@@ -33,31 +33,34 @@ NO_CORNER = -1
 
 
 class CornerGraph(NamedTuple):
-    """The pairs of corners that see each other and can follow each other on a shortest path."""
+    """A visibility graph: links between the corners that can follow each other on a shortest path.
 
-    first_link: IntArray
-    """(k + 1,) The links of corner i are those from ``first_link[i]`` up to ``first_link[i + 1]``."""
-    neighbor: IntArray
+    A link is a straight segment between two corners that see each other. There is a link in each direction.
+    """
+
+    link_starts: IntArray
+    """(k + 1,) The links of corner i are those from ``link_starts[i]`` up to ``link_starts[i + 1]``."""
+    neighbors: IntArray
     """(l,) The corner to which each link leads."""
-    length: Array
+    lengths: Array
     """(l,) Length of each link, grid steps."""
 
 
 class CornerPaths(NamedTuple):
-    """The shortest paths from the nearest of several sources to all corners."""
+    """Paths from several sources to all k corners, one for each corner; in the end, the shortest ones."""
 
-    length: Array
-    """(k,) Length, grid steps; inf if no path leads there."""
-    source: IntArray
-    """(k,) The source where the path starts."""
-    first_corner: IntArray
-    """(k,) The first corner at which the path bends, or where it ends if it is straight."""
-    previous_corner: IntArray
-    """(k,) The last corner at which the path bends before its end, or `NO_CORNER` if it is straight."""
+    lengths: Array
+    """(k,) Length of each path, grid steps; inf if there is none."""
+    sources: IntArray
+    """(k,) The source at which each path starts."""
+    first_corners: IntArray
+    """(k,) The first corner of each path. If the path is straight, it is the corner where the path ends."""
+    previous_corners: IntArray
+    """(k,) The last corner of each path before its end, or `NO_CORNER` if the path is straight."""
 
     @classmethod
     def allocate(cls, corner_count: int) -> CornerPaths:
-        """Allocate paths to a given number of corners.
+        """Allocate uninitialized paths to a given number of corners.
 
         Parameters
         ----------
@@ -68,18 +71,19 @@ class CornerPaths(NamedTuple):
         CornerPaths
         """
         return cls(
-            length=np.empty(corner_count),
-            source=np.empty(corner_count, np.int64),
-            first_corner=np.empty(corner_count, np.int64),
-            previous_corner=np.empty(corner_count, np.int64),
+            lengths=np.empty(corner_count),
+            sources=np.empty(corner_count, np.int64),
+            first_corners=np.empty(corner_count, np.int64),
+            previous_corners=np.empty(corner_count, np.int64),
         )
 
 
 class CornerQueue(NamedTuple):
-    """The corners whose neighbors may be reached by a shorter path; a ring buffer."""
+    """A queue of the corners from which the paths to neighboring corners may be shortened."""
 
     corners: IntArray
-    """(k + 1,)"""
+    """(k + 1,) The corners in the queue: a ring buffer with one unused slot, which shows where the queue
+    ends."""
     is_waiting: BoolArray
     """(k,) Whether each corner is in the queue."""
 
@@ -99,27 +103,29 @@ class CornerQueue(NamedTuple):
 
 
 def build_corner_graph(corner_count: int, pairs: IntArray, lengths: Array) -> CornerGraph:
-    """Build the graph of corners from its links.
+    """Build the graph of corners from the pairs of linked corners.
 
     Parameters
     ----------
     corner_count : int
-    pairs : (l, 2) int array
-        The two corners of each link, each pair once.
-    lengths : (l,) array, grid steps
+        Number of corners.
+    pairs : (p, 2) int array
+        The linked corners, each pair once.
+    lengths : (p,) array, grid steps
+        Distance between the corners of each pair.
 
     Returns
     -------
     CornerGraph
-        Each link appears in both directions.
+        It has two links for each pair, one in each direction.
     """
-    start = np.concatenate([pairs[:, 0], pairs[:, 1]])
-    end = np.concatenate([pairs[:, 1], pairs[:, 0]])
-    order = np.lexsort((end, start))
+    starts = np.concatenate([pairs[:, 0], pairs[:, 1]])
+    ends = np.concatenate([pairs[:, 1], pairs[:, 0]])
+    order = np.lexsort((ends, starts))
     return CornerGraph(
-        first_link=np.searchsorted(start[order], np.arange(corner_count + 1)),
-        neighbor=end[order],
-        length=np.tile(lengths, 2)[order],
+        link_starts=np.searchsorted(starts[order], np.arange(corner_count + 1)),
+        neighbors=ends[order],
+        lengths=np.tile(lengths, 2)[order],
     )
 
 
@@ -133,13 +139,13 @@ def find_visible_corners(
     ----------
     walls : Walls
     index : AngularWallIndex
-        Its reach must be unlimited.
+        The walls around the source, at any distance.
     source : int
         Row of the source in the index.
     first_corner : int
-        The first corner to consider; those before it are skipped.
+        Only this corner and those with higher indices are considered.
     visible : (k,) int array
-        Result: the corners that were found.
+        Result: the corners that were found, at the beginning of the array.
 
     Returns
     -------
@@ -147,19 +153,19 @@ def find_visible_corners(
         Number of corners that were found.
     """
     corners = walls.corners
-    boxes = walls.corner_boxes
+    tree = walls.corner_tree
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     count = 0
     node = ROOT
     while node != END_OF_TREE:
-        is_empty = boxes[node, LOW_X] == np.inf
-        if is_empty or is_box_hidden(boxes, node, index, source):
+        is_empty = tree[node, LOW_X] == np.inf
+        if is_empty or is_box_hidden(tree, node, index, source):
             node = skip_subtree(node)
-        elif not is_leaf(boxes, node):
+        elif not is_leaf(tree, node):
             node = get_first_child(node)
         else:
-            first_in_leaf = get_first_item(boxes, node)
+            first_in_leaf = get_first_item(tree, node)
             end_of_leaf = min(first_in_leaf + LEAF_SIZE, len(corners))
             for corner in range(max(first_in_leaf, first_corner), end_of_leaf):
                 if can_bend_at_corner(corners, walls.corner_walls, corner, x, y) and is_visible(
@@ -181,9 +187,9 @@ def find_links(
     pairs: IntArray,
     lengths: Array,
 ) -> int:
-    """Find the links from a range of corners to the corners after them.
+    """Find the corners with higher indices to which each corner of a range is linked.
 
-    Two corners are linked if they see each other and a shortest path can bend at both of them.
+    Two corners are linked if they see each other and a shortest path through both can bend at both of them.
 
     Parameters
     ----------
@@ -191,18 +197,18 @@ def find_links(
     visible : (k,) int array
         Scratch space.
     first, end : int
-        The corners are those from `first` up to `end`.
+        The range of corners, from `first` up to but not including `end`.
     index : AngularWallIndex
         Scratch space for one source.
     pairs : (m, 2) int array
-        Result: the two corners of each link.
+        Result: the linked corners, the one of the range first.
     lengths : (m, 1) array, grid steps
-        Result: the length of each link.
+        Result: the distance between the corners of each pair.
 
     Returns
     -------
     int
-        Number of links, or `NO_SPACE`.
+        Number of pairs, or `NO_SPACE` if they do not fit into the result, or the walls into the index.
     """
     corners = walls.corners
     link_count = 0
@@ -217,8 +223,8 @@ def find_links(
         for k in range(count):
             visible_x = corners[visible[k], 0]
             visible_y = corners[visible[k], 1]
-            # The visible corners are those at which a path from this one can bend. A path from there must
-            # also be able to bend at this one.
+            # A path from `corner` can bend at each of the visible corners. A path from the visible corner
+            # must also be able to bend at `corner`.
             if can_bend_at_corner(corners, walls.corner_walls, corner, visible_x, visible_y):
                 dx = visible_x - x
                 dy = visible_y - y
@@ -231,22 +237,23 @@ def find_links(
 
 @kernel
 def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting_count: int) -> None:
-    """Shorten the paths to corners via other corners until none can be shortened further.
+    """Shorten the paths to corners via other corners until all of them are shortest paths.
 
-    A corner whose path has become shorter waits in a queue until the paths to its neighbors are tested. If
-    paths are equally short, the one from the first source is taken.
+    A corner to which the path has become shorter waits in a queue until the paths from there to its neighbors
+    have been tried (the Bellman-Ford algorithm with a queue). Of two paths of the same length, the one from
+    the source with the lower index is taken.
 
     Parameters
     ----------
     graph : CornerGraph
     paths : CornerPaths
-        On entry, the straight paths from the sources; their length is infinite where there is none.
+        Modified in place. On entry, the paths found so far, of infinite length where there is none.
     queue : CornerQueue
-        On entry, the corners to which there are straight paths, at the beginning of the queue.
+        On entry, the corners whose paths may shorten other ones, at the beginning of the queue.
     waiting_count : int
-        Number of corners in the queue.
+        Number of corners in the queue on entry.
     """
-    # The queue is a ring: the corners from `head` up to `tail` wait, and indices wrap around at its end.
+    # Corners join the queue at `tail` and leave it at `head`. It is empty if both are the same slot.
     size = len(queue.corners)
     head = 0
     tail = waiting_count
@@ -254,15 +261,17 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
         corner = queue.corners[head]
         head = _get_next_slot(head, size)
         queue.is_waiting[corner] = False
-        for link in range(graph.first_link[corner], graph.first_link[corner + 1]):
-            neighbor = graph.neighbor[link]
-            length = paths.length[corner] + graph.length[link]
-            is_tie = length == paths.length[neighbor]
-            if length < paths.length[neighbor] or (is_tie and paths.source[corner] < paths.source[neighbor]):
-                paths.length[neighbor] = length
-                paths.source[neighbor] = paths.source[corner]
-                paths.first_corner[neighbor] = paths.first_corner[corner]
-                paths.previous_corner[neighbor] = corner
+        for link in range(graph.link_starts[corner], graph.link_starts[corner + 1]):
+            neighbor = graph.neighbors[link]
+            length = paths.lengths[corner] + graph.lengths[link]
+            is_tie = length == paths.lengths[neighbor]
+            if length < paths.lengths[neighbor] or (
+                is_tie and paths.sources[corner] < paths.sources[neighbor]
+            ):
+                paths.lengths[neighbor] = length
+                paths.sources[neighbor] = paths.sources[corner]
+                paths.first_corners[neighbor] = paths.first_corners[corner]
+                paths.previous_corners[neighbor] = corner
                 if not queue.is_waiting[neighbor]:
                     queue.is_waiting[neighbor] = True
                     queue.corners[tail] = neighbor

@@ -30,60 +30,67 @@ from robocov.geodesic.walls import Walls, build_walls, count_windings
 _Result = TypeVar("_Result")
 
 SOURCE_BINS = 128
-"""Number of angular bins per source."""
+"""Number of angular bins for a source."""
 _CORNER_BINS = 256
-"""Number of angular bins for a corner. There are more, since many targets are tested from it."""
-_CORNERS_PER_REPORT = 64
+"""Number of angular bins for a corner. There are more of them, because many points are tested from a
+corner."""
+_CORNERS_PER_BATCH = 64
 """Number of corners that are processed between two progress reports."""
 _TARGETS_PER_BLOCK = 1024
-"""Number of targets that are indexed at the same time, which limits the memory."""
+"""Number of targets that are indexed at the same time, to limit memory."""
 _INITIAL_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
 """Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
 _MAX_DEPTH_M = 2.0 * GRID_M
-"""Points up to this depth in an obstacle are moved to free space; see also `_MAX_RELATIVE_DEPTH`."""
+"""Points outside the free space by at most this distance, plus `_MAX_RELATIVE_DEPTH`, are moved inside."""
 _MAX_RELATIVE_DEPTH = 1e-9
-"""The same for large maps, as a fraction of the size of the map."""
+"""Addition to `_MAX_DEPTH_M` for large maps, as a fraction of the size of the map."""
 _SNAP_STEPS = 2
-"""Number of grid steps around the nearest point of a slanted wall where a free point is searched for."""
+"""Number of grid steps around the nearest point of a slanted wall in which a free grid point is searched
+for."""
 
 
 class CornerComputation(Protocol):
-    """A computation that produces rows for the corners from `first` up to `end`.
+    """A function that computes rows of two tables for the corners from `first` up to `end`.
 
-    It writes whole numbers, such as the indices of corners, to `indices`, and the lengths that belong to them
-    to `lengths`. It chooses the columns of both. It returns the number of rows that it has written, or
-    `NO_SPACE` if there was not enough space for them or in the index.
+    It writes whole numbers, such as the indices of corners, to the rows of `indices`, and lengths to the same
+    rows of `lengths`. The function decides what the columns mean. It returns the number of rows that it has
+    written, or `NO_SPACE` if these tables or the wall index are too small.
     """
 
     def __call__(
-        self, first: int, end: int, index: AngularWallIndex, indices: IntArray, lengths: Array, /
+        self, first: int, end: int, wall_index: AngularWallIndex, indices: IntArray, lengths: Array, /
     ) -> int:
-        """Write rows of `indices` and `lengths`."""
+        """Write rows of `indices` and `lengths`, and return their number."""
 
 
 class Geodesics:
     """The shortest paths in the free space of one environment.
 
-    The distance between two points is the infimum over the paths in the *open* free space, extended to its
-    closure: no path leads through a point or along an edge where two obstacles touch. A shortest path is a
-    chain of segments that bends only at corners.
+    The distance between two points is the infimum of the lengths of the paths in the *open* free space,
+    extended to its closure: no path leads through a point or along an edge where two obstacles touch. A
+    shortest path is a chain of segments that bends only at corners.
 
     Parameters
     ----------
     environment : Environment
+        The map.
     heartbeat : callable, optional
         Called regularly while the graph of the corners is computed. It may raise an exception to stop.
 
     Attributes
     ----------
     grid : Grid
+        The grid to whose points all coordinates are rounded.
     size : float, m
         Side of the square around the region's bounding box.
     free : shapely.MultiPolygon, grid steps
         The free space, one polygon for each component.
     walls : Walls
+        The boundary of the free space.
     corners : (k, 2) array, m
+        All points where a shortest path can bend.
     graph : CornerGraph
+        The links between the corners.
 
     Examples
     --------
@@ -113,15 +120,15 @@ class Geodesics:
 
     def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
         """Build the graph of the corners that see each other."""
-        count = len(self.corners)
-        visible_buffer = np.empty(count, np.int64)  # Scratch space of `find_links`.
+        corner_count = len(self.corners)
+        visible_buffer = np.empty(corner_count, np.int64)  # Scratch space of `find_links`.
         pairs, lengths = self.run_for_corners(
             partial(find_links, self.walls, visible_buffer),
             index_columns=2,
             length_columns=1,
             progress=None if heartbeat is None else lambda _: heartbeat(),
         )
-        return build_corner_graph(count, pairs, lengths[:, 0])
+        return build_corner_graph(corner_count, pairs, lengths[:, 0])
 
     def run_for_corners(
         self,
@@ -130,12 +137,13 @@ class Geodesics:
         length_columns: int,
         progress: Callable[[float], None] | None = None,
     ) -> tuple[IntArray, Array]:
-        """Run a computation for all corners, a batch at a time.
+        """Compute two tables with rows for all corners, in batches of corners.
 
         Parameters
         ----------
         compute : callable
-            See `CornerComputation`. The index that it is called with has space for one source.
+            Computes the rows for one batch of corners; see `CornerComputation`. Its wall index has space for
+            one source.
         index_columns, length_columns : int
             Number of columns of `indices` and of `lengths`.
         progress : callable, optional
@@ -144,16 +152,17 @@ class Geodesics:
         Returns
         -------
         indices : (r, index_columns) int array
+            All rows that `compute` has written to its table of whole numbers.
         lengths : (r, length_columns) array, grid steps
-            All rows that `compute` has written.
+            All rows that `compute` has written to its table of lengths.
         """
-        count = len(self.corners)
+        corner_count = len(self.corners)
         all_indices = [np.empty((0, index_columns), np.int64)]
         all_lengths = [np.empty((0, length_columns))]
-        for first in range(0, count, _CORNERS_PER_REPORT):
+        for first in range(0, corner_count, _CORNERS_PER_BATCH):
             if progress is not None:
-                progress(first / count)
-            end = min(first + _CORNERS_PER_REPORT, count)
+                progress(first / corner_count)
+            end = min(first + _CORNERS_PER_BATCH, corner_count)
             compute_batch = partial(compute, first, end)
             indices, lengths = self._run_for_batch(compute_batch, index_columns, length_columns)
             all_indices.append(indices)
@@ -166,18 +175,19 @@ class Geodesics:
         index_columns: int,
         length_columns: int,
     ) -> tuple[IntArray, Array]:
-        """Return the rows that a computation writes for one batch of corners.
+        """Return the rows of `indices` and `lengths` that a computation writes for one batch of corners.
 
-        The computation fills `indices` and `lengths`, and returns the number of rows, or `NO_SPACE` if they
-        or the wall index are too small. It is then repeated with more space.
+        The computation returns the number of rows, or `NO_SPACE` if the tables or the wall index are too
+        small. It is then repeated with more space.
         """
 
-        def compute_rows(index: AngularWallIndex) -> tuple[IntArray, Array] | None:
+        def compute_rows(wall_index: AngularWallIndex) -> tuple[IntArray, Array] | None:
             """Return the indices and lengths; None if there is not enough space."""
-            max_rows = len(index.entry_wall)
+            # The tables get as many rows as the index has entries, so that all of them grow together.
+            max_rows = len(wall_index.entry_walls)
             indices = np.empty((max_rows, index_columns), np.int64)
             lengths = np.empty((max_rows, length_columns))
-            row_count = compute(index, indices, lengths)
+            row_count = compute(wall_index, indices, lengths)
             if row_count == NO_SPACE:
                 return None
             return indices[:row_count].copy(), lengths[:row_count].copy()
@@ -187,21 +197,21 @@ class Geodesics:
     def run_with_index(
         self, source_count: int, bin_count: int, compute: Callable[[AngularWallIndex], _Result | None]
     ) -> _Result:
-        """Run a computation with a new index; repeat it with a larger one until there is enough space.
+        """Run a computation with a new wall index; repeat it with a larger one until there is enough space.
 
         Parameters
         ----------
         source_count : int
             Number of sources of the index.
         bin_count : int
-            Number of bins of each source.
+            Number of angular bins of each source: `SOURCE_BINS`, for example.
         compute : callable
-            Called with the index. It returns None if there was not enough space.
+            Called with the index, which is not initialized. It returns None if the index was too small.
 
         Returns
         -------
         object
-            What `compute` has returned.
+            The result of `compute`.
         """
         while True:
             # `add_walls` keeps one entry per bin free for the wall that it adds.
@@ -214,14 +224,15 @@ class Geodesics:
     def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
         """Convert points of the free space to grid coordinates.
 
-        Points that are outside by no more than rounding (2 µm plus 1e-9 of the map's size) are moved to the
-        nearest point inside.
+        Points that are only slightly outside the free space (2 µm plus 1e-9 of the map's size) are moved to
+        the nearest grid point inside.
 
         Parameters
         ----------
         points : (n, 2) array, m
+            The points.
         name : str
-            Name of the points in messages.
+            Name of the points in error messages.
 
         Returns
         -------
@@ -240,7 +251,7 @@ class Geodesics:
                 f"{name}: expected an array of shape (n, 2), [x, y] in meters each, got shape {points.shape}"
             )
         grid_positions = self.grid.snap(points)
-        # A point that is not finite counts as outside, like a point to the right of all walls, or above them.
+        # The winding number of a point that is not finite is 0, so it counts as outside.
         is_inside = self.count_windings(grid_positions) > 0
         for i in np.flatnonzero(~is_inside.any(axis=1)).tolist():
             grid_positions[i] = self._move_inside(points[i], f"{name}[{i}]")
@@ -254,7 +265,7 @@ class Geodesics:
             raise InputError(f"{name}: expected finite numbers, got {coordinates}")
         grid_position = self.grid.snap(point)
         nearest = self._find_nearest_free(grid_position)
-        depth = float(np.hypot(*(nearest - grid_position))) * self.grid.unit
+        depth = float(np.hypot(*(nearest - grid_position))) * self.grid.spacing
         if depth > _MAX_DEPTH_M + _MAX_RELATIVE_DEPTH * self.size:
             raise InputError(
                 f"{name}: expected a point inside the boundary and outside every obstacle of map "
@@ -263,49 +274,51 @@ class Geodesics:
         return nearest
 
     def count_windings(self, grid_positions: Array) -> IntArray:
-        """Compute the winding numbers of the boundaries of the c components of the free space.
+        """Compute the winding number of the boundary of each component of the free space around points.
 
         Parameters
         ----------
         grid_positions : (n, 2) array, grid steps
+            The points.
 
         Returns
         -------
         (n, c) int array
-            Number of times that the boundary of each component winds around each point: 0 outside the
-            component, 1 inside, and more than 1 on the boundary.
+            For each point and each of the c components: 0 outside the component, 1 inside, and more than 1 on
+            its boundary.
         """
         windings = np.empty((len(grid_positions), len(self.free.geoms)), dtype=np.int64)
         count_windings(self.walls, np.ascontiguousarray(grid_positions), windings)
         return windings
 
     def _find_nearest_free(self, grid_position: Array) -> Array:
-        """Return the nearest grid point of the closed free space, accurate to a few steps."""
+        """Return the nearest grid point of the closed free space, or one that is a few steps farther away."""
         line = shapely.shortest_line(self.free, shapely.Point(grid_position))
         foot = np.rint(shapely.get_coordinates(line)[0])
-        # The nearest point of a slanted wall is rarely a grid point, and rounded it may be behind the wall.
-        # Take the nearest of the free grid points around it.
+        # The nearest point of a slanted wall is rarely a grid point, and after rounding it may be behind the
+        # wall. Take the nearest of the free grid points around it.
         steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        free = around[(self.count_windings(around) > 0).any(axis=1)]
-        if len(free) == 0:
-            # The vertices of walls are grid points of the closed free space in any case.
-            free = self.walls.vertices
-        distance = compute_lengths(free - grid_position)
-        return np.asarray(free[distance.argmin()])
+        free_points = around[(self.count_windings(around) > 0).any(axis=1)]
+        if len(free_points) == 0:
+            # The vertices of the walls are grid points of the closed free space in any case.
+            free_points = self.walls.vertices
+        distances = compute_lengths(free_points - grid_position)
+        return np.asarray(free_points[distances.argmin()])
 
     def compute_distances(self, sources: Array, targets: Array) -> Array:
-        """Compute the geodesic distances between points.
+        """Compute the geodesic distances from each source to each target.
 
         Parameters
         ----------
         sources : (n, 2) array, m
         targets : (m, 2) array, m
+            Points in the free space.
 
         Returns
         -------
         (n, m) array, m
-            inf if no path leads from the source to the target.
+            Lengths of the shortest paths; inf if no path leads from the source to the target.
 
         Raises
         ------
@@ -314,21 +327,23 @@ class Geodesics:
         """
         starts, _ = self.snap_to_free_space(sources, "sources")
         ends, _ = self.snap_to_free_space(targets, "targets")
-        return self.compute_grid_distances(starts, ends) * self.grid.unit
+        return self.compute_grid_distances(starts, ends) * self.grid.spacing
 
     def compute_grid_distances(self, sources: Array, targets: Array) -> Array:
-        """Compute the geodesic distances between points of the free space in grid coordinates.
+        """Compute the geodesic distances from each source to each target, in grid coordinates.
 
         Parameters
         ----------
         sources : (n, 2) array, grid steps
         targets : (m, 2) array, grid steps
+            Points in the free space, which is not checked.
 
         Returns
         -------
         (n, m) array, grid steps
+            inf if no path leads from the source to the target.
         """
-        # A shortest path that is not straight leads from the source to its last corner, possibly via other
+        # A shortest path that is not straight leads from the source to a last corner, possibly via other
         # corners, and from there straight to the target.
         index, from_sources, _ = self._compute_corner_distances(sources, must_be_straight=False)
         distances = np.empty((len(sources), len(targets)))
@@ -345,9 +360,9 @@ class Geodesics:
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
         """Compute the geodesic distances from n grid points to the k corners of the walls.
 
-        With `must_be_straight`, the distance is infinite if the straight line from a point to a corner is
-        blocked. Return an angular index of the walls, with the points as its sources, the distances, (n, k)
-        in grid steps, and the paths from the last point to the corners.
+        With `must_be_straight`, the distance is infinite unless a straight path leads from the point to the
+        corner. Return an index of the walls around the points, the distances, (n, k) grid steps, and the
+        paths from the last point to the corners.
         """
         corner_count = len(self.corners)
         distances = np.empty((len(grid_positions), corner_count))
@@ -371,11 +386,13 @@ class Geodesics:
         Parameters
         ----------
         source, target : (2,) array, m
+            The ends of the path, in the free space.
 
         Returns
         -------
         (w, 2) array, m
-            Its ends and the corners between them; of shape (0, 2) if there is no path.
+            The source, the corners at which the path bends, and the target; of shape (0, 2) if there is no
+            path.
 
         Raises
         ------
@@ -389,20 +406,20 @@ class Geodesics:
         _combine_distances(self.walls, index, from_source, ends[1:], to_target, distance)
         if np.isinf(distance[0, 0]):
             return np.empty((0, 2))
-        # The lengths of the paths that bend last at each corner. If none is a shortest path, the straight
-        # line is.
+        # The length of the shortest path that bends last at each corner. If none of them is as short as the
+        # distance, the shortest path is straight.
         lengths = from_source[0] + to_target[0]
         corner = NO_CORNER
         if lengths.min(initial=np.inf) <= distance[0, 0]:
             corner = int(lengths.argmin())
-        # Follow the path backwards from its last corner.
-        bends = []
+        # Follow the path backward from its last corner.
+        path_corners = []
         while corner != NO_CORNER:
-            bends.append(corner)
-            corner = int(paths.previous_corner[corner])
-        bends.reverse()
-        points = self.grid.to_meters(ends)
-        return np.concatenate([points[:1], self.corners[bends], points[1:]])
+            path_corners.append(corner)
+            corner = int(paths.previous_corners[corner])
+        path_corners.reverse()
+        end_points = self.grid.to_meters(ends)
+        return np.concatenate([end_points[:1], self.corners[path_corners], end_points[1:]])
 
 
 @kernel
@@ -417,23 +434,23 @@ def _find_corner_distances(
 ) -> bool:
     """Write the distances from (n, 2) points to the corners, (n, k), along shortest paths around the walls.
 
-    A path is straight, or leads from one of the corners that the point sees along links of the corner graph.
-    With `must_be_straight`, only straight paths count, and other corners are infinitely far away. `paths` is
-    overwritten for each point, and finally contains the paths from the last one. Return whether the index has
-    enough space.
+    A path is straight, or leads to one of the corners that the point sees, and on along links of the corner
+    graph. With `must_be_straight`, only straight paths count, and the distance to all other corners is
+    infinite. `paths` is overwritten for each point, and finally contains the paths from the last one. Return
+    whether the index has enough space.
     """
     corner_count = len(walls.corners)
     queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))
-    squared_reach = np.inf
+    squared_range = np.inf
     entry_count = 0
     for i in range(len(points)):
-        entry_count = add_walls(walls, index, i, points[i, 0], points[i, 1], squared_reach, entry_count)
+        entry_count = add_walls(walls, index, i, points[i, 0], points[i, 1], squared_range, entry_count)
         if entry_count == NO_SPACE:
             return False
         visible_count = _start_straight_paths(walls, index, i, paths, queue)
         if not must_be_straight:
             relax_paths(graph, paths, queue, visible_count)
-        distances[i] = paths.length
+        distances[i] = paths.lengths
     return True
 
 
@@ -441,16 +458,16 @@ def _find_corner_distances(
 def _start_straight_paths(
     walls: Walls, index: AngularWallIndex, source: int, paths: CornerPaths, queue: CornerQueue
 ) -> int:
-    """Write the straight paths from a source to the corners that it sees; return their number.
+    """Write the straight paths from a source to the corners that it sees; return the number of these corners.
 
-    The length of the paths to all other corners is infinite. The queue of corners from which paths continue
-    starts with those that the source sees.
+    The length of the paths to all other corners is infinite. The visible corners are the first in the queue
+    of corners from which other paths may be shortened.
     """
     for corner in range(len(walls.corners)):
-        paths.length[corner] = np.inf
-        paths.source[corner] = 0
-        paths.first_corner[corner] = corner
-        paths.previous_corner[corner] = NO_CORNER
+        paths.lengths[corner] = np.inf
+        paths.sources[corner] = 0
+        paths.first_corners[corner] = corner
+        paths.previous_corners[corner] = NO_CORNER
         queue.is_waiting[corner] = False
     first_corner = 0
     visible_count = find_visible_corners(walls, index, source, first_corner, queue.corners)
@@ -458,7 +475,7 @@ def _start_straight_paths(
         corner = queue.corners[k]
         dx = walls.corners[corner, 0] - index.positions[source, 0]
         dy = walls.corners[corner, 1] - index.positions[source, 1]
-        paths.length[corner] = np.sqrt(dx * dx + dy * dy)
+        paths.lengths[corner] = np.sqrt(dx * dx + dy * dy)
         queue.is_waiting[corner] = True
     return visible_count
 
@@ -474,27 +491,27 @@ def _combine_distances(
 ) -> None:
     """Write the distances from the sources of an index to (m, 2) targets, (n, m).
 
-    A path is either straight, or bends last at a corner. Its length is then the sum of the distance from the
-    source to that corner, in `from_sources`, (n, k), and the straight distance from there to the target, in
-    `to_targets`, (m, k).
+    A path is either straight, or bends last at some corner. In the second case, its length is the distance
+    from the source to that corner, in `from_sources`, (n, k), plus the straight distance from the corner to
+    the target, in `to_targets`, (m, k).
     """
-    corners = np.empty(to_targets.shape[1], np.int64)
+    last_corners = np.empty(to_targets.shape[1], np.int64)
     for j in range(len(targets)):
         x = targets[j, 0]
         y = targets[j, 1]
         # List the corners from which there is a straight path to the target.
-        corner_count = 0
-        for corner in range(len(corners)):
+        last_corner_count = 0
+        for corner in range(len(last_corners)):
             if to_targets[j, corner] < np.inf:
-                corners[corner_count] = corner
-                corner_count += 1
+                last_corners[last_corner_count] = corner
+                last_corner_count += 1
         for i in range(len(from_sources)):
             min_length = np.inf
             if is_visible(walls, index, i, x, y):
                 dx = x - index.positions[i, 0]
                 dy = y - index.positions[i, 1]
                 min_length = np.sqrt(dx * dx + dy * dy)
-            for k in range(corner_count):
-                corner = corners[k]
+            for k in range(last_corner_count):
+                corner = last_corners[k]
                 min_length = min(min_length, from_sources[i, corner] + to_targets[j, corner])
             distances[i, j] = min_length

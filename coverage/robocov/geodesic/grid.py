@@ -1,4 +1,4 @@
-"""Integer coordinates, which decide exactly on which side of a line a point lies."""
+"""Integer coordinates, with which one can decide exactly on which side of a line a point lies."""
 
 from __future__ import annotations
 
@@ -11,34 +11,36 @@ from robocov.arrays import Array
 from robocov.compiled import kernel
 
 GRID_BITS = 48
-"""The square that contains the map is at most 2**48 grid steps wide.
+"""Number of bits of a coordinate: the square around the map is at most 2**48 grid steps wide.
 
-A step is then 4e-15 of the side, which is less than the rounding of doubles in a map away from the origin. At
-the same time, the coordinates are short enough for `cross` to be exact.
+A grid step is then at most 7e-15 of the side of the square, far less than any length that matters. At the
+same time, the coordinates are small enough for `cross` to be exact.
 """
 
 _MAX_CROSS_ERROR = 2.0**48
-"""Bound on the rounding error of a cross product of two differences, whose products are below 2**98."""
+"""Upper bound on the rounding error of a cross product: its two products are at most 2**98 in magnitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Integer coordinates, stored as floats, for the points of one map.
+    """A fine square grid over one map, whose points have whole coordinates.
+
+    Grid coordinates are numbers of grid steps from the origin, stored as floats.
 
     Attributes
     ----------
     origin : (2,) array, m
         Lower left corner of the map.
-    unit : float, m
-        Length of a grid step, a power of two: multiplying by it does not round.
+    spacing : float, m
+        Length of a grid step. It is a power of two, so that multiplying by it does not round.
     """
 
     origin: Array
-    unit: float
+    spacing: float
 
     @classmethod
     def from_square(cls, low: Array, side: float) -> Grid:
-        """Build the finest grid on which a square is at most 2**48 grid steps wide.
+        """Build the finest grid on which a square is at most 2**48 steps wide; the step is a power of two.
 
         Parameters
         ----------
@@ -50,19 +52,19 @@ class Grid:
         Returns
         -------
         Grid
-            Its unit is the side, rounded up to a power of two, divided by 2**48.
+            Its spacing is the side, rounded up to a power of two, divided by 2**48.
 
         Examples
         --------
         >>> grid = Grid.from_square(np.array([0.0, 0.0]), side=8.0)
-        >>> grid.unit == 8.0 / 2.0**48
+        >>> grid.spacing == 8.0 / 2.0**48
         True
         """
         side_exponent = math.ceil(math.log2(side))
-        return cls(origin=np.asarray(low, dtype=float), unit=2.0 ** (side_exponent - GRID_BITS))
+        return cls(origin=np.asarray(low, dtype=float), spacing=2.0 ** (side_exponent - GRID_BITS))
 
     def snap(self, points: Array) -> Array:
-        """Convert points to grid coordinates, rounded to whole steps.
+        """Round points to the grid.
 
         Parameters
         ----------
@@ -71,8 +73,9 @@ class Grid:
         Returns
         -------
         (..., 2) array, grid steps
+            Grid coordinates of the nearest grid points.
         """
-        return np.rint((points - self.origin) / self.unit)
+        return np.rint((points - self.origin) / self.spacing)
 
     def to_meters(self, points: Array) -> Array:
         """Convert points from grid coordinates to meters.
@@ -85,7 +88,7 @@ class Grid:
         -------
         (..., 2) array, m
         """
-        return np.asarray(points * self.unit + self.origin)
+        return np.asarray(points * self.spacing + self.origin)
 
 
 @kernel
@@ -116,15 +119,17 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
 
 
 def compute_crosses(u: Array, v: Array) -> Array:
-    """Compute `cross` for many pairs of vectors.
+    """Compute the cross products of many pairs of vectors with their exact signs; see `cross`.
 
     Parameters
     ----------
     u, v : (n, 2) array, grid steps
+        The first and the second vector of each pair.
 
     Returns
     -------
     (n,) array
+        Positive where v points to the left of u.
     """
     value = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     whole_u = u.astype(np.int64)

@@ -33,20 +33,20 @@ MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
 
 _ROUGH_SMOOTHINGS = (0.02, 0.007)
-"""Smoothing of the maximal profit in the first searches for prices, as fractions of the cost."""
+"""Smoothing of the maximum profit in the first searches for prices, as fractions of the cost per robot."""
 
-_SMOOTHING = 0.0025
-"""Smoothing before the first proof. It is halved before each later proof."""
+_FIRST_SMOOTHING = 0.0025
+"""The same in the search before the first proof. It is halved before each later proof."""
 
 _FINAL_SMOOTHING = 0.125
-"""Smoothing of the last search for prices, as a fraction of the requested precision."""
+"""The same in the last search for prices, as a fraction of the requested precision."""
 
-_SLACK = 0.3
+_RELATIVE_TOLERANCE = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
 
 _MIN_SCALE = 1e-9
 """Smallest cost by which a search divides the dual, because the cost of a placement may be zero. It is a
-fraction of the cost that would result if every site were as far away as the map is large."""
+fraction of the cost that would result if the distance of every site were the size of the map."""
 
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
@@ -58,7 +58,7 @@ _CANDIDATES_PER_ROBOT = 60
 """Approximate minimum number of positions in the table per robot."""
 
 _MAX_PRICE_RANK = 4
-"""The price of a site is at most its distance to the robot of this rank, here the fourth-nearest one."""
+"""The price of a site is at most its distance from the robot of this rank, the fourth-nearest one."""
 
 _CANDIDATES_PER_BLOCK = 256
 """Number of positions whose distances are computed at the same time, to limit memory."""
@@ -67,14 +67,15 @@ _MAX_TRIANGLES = 1_000_000
 """A proof ends after this number of triangles, with the bound that it has reached."""
 
 _EROSION = 0.98
-"""Fraction of the radius by which the free space is eroded.
+"""Distance by which the free space is eroded, as a fraction of the radius.
 
 Before GEOS offsets walls, it simplifies them by up to 1 % of the offset. Eroding by less ensures that no
 possible position is lost.
 """
 
-_ROUNDING = 1e-10
-"""Allowance per robot and site, as a fraction of the map's size, far larger than all rounding errors."""
+_ROUNDING_ALLOWANCE = 1e-10
+"""By how much the bound is lowered to allow for rounding errors, per robot and site of weight 1, as a
+fraction of the map's size. It is far larger than all rounding errors."""
 
 _PROGRESS_BEFORE_TABLE = 0.1
 """Fraction of the work before the table of distances is built."""
@@ -90,7 +91,7 @@ class LowerBound:
     Attributes
     ----------
     mean_distance : float, m
-        Lower bound on the mean distance of any placement; see `CoverageResult`.
+        Lower bound on the mean distance (see `CoverageResult`) of any placement.
     value : float, m³
         Lower bound on the cost (22) of any placement.
     placement_mean_distance : float, m
@@ -135,10 +136,10 @@ def compute_lower_bound(
 ) -> LowerBound:
     """Compute a lower bound on the coverage cost of every placement of a team.
 
-    The bound holds for as many robots as there are positions, anywhere in the free space where a disc of the
-    given radius fits. If the free space has several components, it covers only those that contain positions:
-    it bounds the cost of these components for all placements in them. Gaps that are narrower than a robot
-    separate components; see `CoverageCost`. Robots may overlap each other.
+    The bound holds for every placement of as many robots as there are positions, anywhere in the free space
+    where a disc of the given radius fits. The robots may overlap each other. If the free space has several
+    components, the bound is on the cost of those that contain positions, and holds for placements in them.
+    Gaps that are narrower than a robot separate components; see `CoverageCost`.
 
     Parameters
     ----------
@@ -147,13 +148,13 @@ def compute_lower_bound(
     positions : (n, 2) array, m
         A placement of low cost, such as that of `find_optimum`. The lower its cost, the smaller the gap.
     radius : float, m
-        Radius of the robots, at least 1 µm. A robot without extent could be in two rooms at once, at a point
-        where their walls touch.
+        Radius of the robots, at least 1 µm. (If it were 0, a robot at a point where two rooms touch could be
+        in both rooms at once.)
     lattice : int
         Number of cells along a side of the lattice; see `CoverageCost`.
     precision : float
-        The search ends if the gap is at most this fraction of the cost, or if the bound is within about this
-        fraction of the best one that the dual problem can give.
+        The search ends when the gap is at most this fraction of the cost of the placement, or when the bound
+        is within about this fraction of the best bound that the method can give.
     progress : callable, optional
         Called regularly with the completed fraction of the work. It may raise an exception to stop.
 
@@ -175,7 +176,8 @@ def compute_lower_bound(
 
     Notes
     -----
-    The bound is lowered by 1e-10 of the map's size per robot and site, far more than all rounding errors.
+    To allow for rounding errors, the bound is lowered by 1e-10 of the map's size per robot and site, which is
+    far more than all of them.
 
     Examples
     --------
@@ -195,11 +197,11 @@ def compute_lower_bound(
         progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction),
     )
     dual = _Dual.build(cost, np.asarray(positions, dtype=float), radius)
-    best = _search_best_prices(dual, precision, report)
+    proof = _search_best_proof(dual, precision, report)
     report(1.0)
-    mean_distance = max(best.bound, 0.0) / dual.total_weight
+    mean_distance = max(proof.bound, 0.0) / dual.total_weight
     all_prices = np.full(len(cost.points), np.nan)
-    all_prices[dual.site_numbers] = best.prices
+    all_prices[dual.site_numbers] = proof.prices
     mass = float(cost.closed_environment.free_masses[dual.is_covered].sum())
     return LowerBound(
         mean_distance=mean_distance,
@@ -210,49 +212,50 @@ def compute_lower_bound(
 
 
 class _Proof(NamedTuple):
-    """The result of a branch and bound."""
+    """A lower bound that was proved for some prices by branch and bound."""
 
     bound: float
     """Lower bound on the cost, as a weighted sum over the sites, m."""
     prices: Array
-    """(m,) m, prices of the sites that prove the bound."""
+    """(m,) Prices of the sites that prove the bound, m."""
     better_candidates: Array
-    """(p, 2) grid steps, positions with a higher profit than any in the table."""
+    """(p, 2) Positions with a higher profit than any position in the table, grid steps."""
 
 
 class _ProfitBounds(NamedTuple):
     """Profits in t triangles."""
 
     centers: Array
-    """(t, 2) grid steps, a point of the free space in each triangle."""
+    """(t, 2) A point of the free space in each triangle, grid steps."""
     center_profits: Array
-    """(t,) m, profits of these points."""
+    """(t,) Profits of these points, m."""
     bounds: Array
-    """(t,) m, an upper bound on the profit of every point of each triangle."""
+    """(t,) An upper bound on the profit of every point of each triangle, m."""
 
 
-def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
-    """Alternate between searching for prices and proving bounds; return the best proof.
+def _search_best_proof(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
+    """Alternate between searching for prices and proving bounds; return the proof of the highest bound.
 
-    A search maximizes the dual over a table of candidate positions. The dual is smoothed, because it has no
-    gradient where two positions are equally profitable. A proof bounds the dual over all positions, and finds
-    positions with a higher profit than any in the table. These are added to the table, and the smoothing is
-    halved for the next round.
+    A search finds prices that maximize the dual if only the positions in a table are possible. The maximum
+    profit is smoothed, because it has no gradient where two positions are equally profitable. A proof then
+    bounds the dual for these prices and all positions. It also finds positions with a higher profit than any
+    in the table. They are added to the table, and the smoothing is halved for the next round.
 
-    `precision` is the relative gap between the bound and the cost of the placement at which the search ends.
+    The search ends when the gap between the bound and the cost of the placement is at most `precision`, as a
+    fraction of that cost.
     """
     prices = dual.initial_prices
     for smoothing in _ROUGH_SMOOTHINGS:
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
     best: _Proof | None = None
-    smoothing = _SMOOTHING
-    # As many rounds as it takes to reach the final smoothing, if each one halves it.
+    smoothing = _FIRST_SMOOTHING
+    # Each round halves the smoothing. After this number of rounds, it has reached the final one.
     round_count = max(1, math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision))))
     for k in range(round_count):
         fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / round_count
         heartbeat = partial(report, fraction)
         prices = dual.improve_prices(prices, smoothing, heartbeat)
-        proof = dual.prove(prices, _SLACK * smoothing, heartbeat)
+        proof = dual.prove(prices, _RELATIVE_TOLERANCE * smoothing, heartbeat)
         if best is None or proof.bound > best.bound:
             best = proof
         if best.bound >= (1.0 - precision) * dual.placement_cost:
@@ -268,34 +271,35 @@ class _Dual:
     """The dual problem of one map and team. Costs are weighted sums over the sites, not means.
 
     Each site c of weight w_c offers a robot at position p its price u_c minus the distance d(c, p). The
-    profit of a position is sum_c w_c max(0, u_c - d(c, p)). For any prices, the dual
-    sum_c w_c u_c - n max_p profit(p) is a lower bound on the cost of every placement of n robots. The largest
-    profit is searched on a table of candidate positions, and then bounded on triangles that cover all
-    positions.
+    profit of a position is sum_c w_c max(0, u_c - d(c, p)). For any prices, the dual sum_c w_c u_c - n max_p
+    profit(p) is a lower bound on the cost of every placement of n robots. During the search for prices, the
+    maximum profit is taken over a table of candidate positions. In a proof, it is bounded on triangles that
+    cover all possible positions.
 
     Attributes
     ----------
     geodesics : Geodesics
-        Distances on the map.
+        The shortest paths of the map.
     robot_count : int
+        Number of robots, n.
     is_covered : (c,) bool array
         Whether each component of the free space contains robots.
     site_numbers : (m,) int array
-        The sites in these components, as indices into the points of the cost.
+        The sites in these components, as rows of `CoverageCost.points`.
     site_data : SiteData
-        The same sites for kernels.
+        Data of these sites for kernels.
     placement_cost : float, m
         Cost of the placement from which the dual was built.
     max_prices : (m,) array, m
-        Largest prices of the searches, which limit the number of entries in the table.
+        Maximum price of each site in a search. It limits the number of entries in the table.
     initial_prices : (m,) array, m
-        Prices with which the search starts.
+        Prices with which the first search starts.
     candidate_spacing : float, grid steps
-        Spacing of the candidates among the sites.
+        Approximate spacing of the candidate positions.
     triangles : (t, 3, 2) array, grid steps
-        Triangles that cover all positions. A proof replaces them by those that it ends with.
+        Triangles that cover all possible positions. A proof replaces them by smaller ones.
     table : PriceTable
-        Distances from the candidates to the sites.
+        Distances from the candidate positions to the sites.
     """
 
     geodesics: Geodesics
@@ -314,12 +318,14 @@ class _Dual:
     def build(cls, cost: CoverageCost, positions: Array, radius: float) -> _Dual:
         """Build the dual problem for a team with as many robots as a placement.
 
-        The placement should have a low cost: the initial prices are derived from it, and its robots are among
-        the first candidate positions. The dual covers the components of the free space that contain them.
+        The placement should have a low cost, because the initial prices are derived from it, and its
+        positions are among the first candidate positions. The dual is limited to the components of the free
+        space that contain these positions.
 
         Parameters
         ----------
         cost : CoverageCost
+            The coverage cost of the map.
         positions : (n, 2) array, m
             The placement.
         radius : float, m
@@ -331,11 +337,11 @@ class _Dual:
         """
         geodesics = cost.geodesics
         result = cost(positions)
-        # `robots` are the positions in grid steps, (n, 2), and `is_inside`, (n, c), is true where a robot is
-        # in a component.
+        # `robots` are the positions in grid steps, (n, 2), and `is_inside`, (n, c), says in which components
+        # each robot is.
         robots, is_inside = geodesics.snap_to_free_space(positions)
         is_covered = np.asarray(is_inside.any(axis=0))
-        site_numbers = np.flatnonzero(result.owner >= 0)
+        site_numbers = np.flatnonzero(result.owners >= 0)
         site_data = _build_site_data(cost, site_numbers)
         configuration_space = _build_configuration_space(cost, is_covered, radius)
         max_prices, initial_prices = _compute_initial_prices(geodesics, robots, site_data.sites)
@@ -349,7 +355,7 @@ class _Dual:
             placement_cost=float(site_data.weights @ result.distances[site_numbers]),
             max_prices=max_prices,
             initial_prices=initial_prices,
-            candidate_spacing=stride * cost.spacing / geodesics.grid.unit,
+            candidate_spacing=stride * cost.spacing / geodesics.grid.spacing,
             triangles=geodesics.grid.snap(_triangulate(configuration_space)),
             table=PriceTable.build_empty(),
         )
@@ -358,18 +364,18 @@ class _Dual:
         return dual
 
     def _choose_site_candidates(self, configuration_space: shapely.Geometry, site_positions: Array) -> Array:
-        """Return evenly spread sites where the center of a robot can be, (p, 2) grid steps.
+        """Return evenly spread sites at which the center of a robot can be, (p, 2) grid steps.
 
-        The positions of all sites, (m, 2), are in meters, like the configuration space.
+        `site_positions` are the positions of all sites, (m, 2), in meters like the configuration space.
         """
         x, y = site_positions.T
         is_candidate = shapely.intersects_xy(configuration_space, x, y)
         return self._thin_out(self.site_data.sites[is_candidate])
 
     @property
-    def unit(self) -> float:
+    def grid_spacing(self) -> float:
         """Length of a grid step, m."""
-        return self.geodesics.grid.unit
+        return self.geodesics.grid.spacing
 
     @property
     def weights(self) -> Array:
@@ -382,36 +388,34 @@ class _Dual:
         return float(self.weights.sum())
 
     def _thin_out(self, candidates: Array) -> Array:
-        """Return the first position in each square of a grid with half the spacing `candidate_spacing`."""
+        """Return the first candidate in each square of a grid with half the candidate spacing."""
         squares = np.floor(candidates / (self.candidate_spacing / 2.0))
         _, first = np.unique(squares, axis=0, return_index=True)
         in_original_order = np.sort(first)
         return candidates[in_original_order]
 
     def add_candidates(self, candidates: Array) -> None:
-        """Add positions, (p, 2) grid steps, to the table."""
+        """Add candidate positions, (p, 2) grid steps, to the table."""
         for first in range(0, len(candidates), _CANDIDATES_PER_BLOCK):
             block = candidates[first : first + _CANDIDATES_PER_BLOCK]
-            distances = self.geodesics.compute_grid_distances(block, self.site_data.sites) * self.unit
+            distances = self.geodesics.compute_grid_distances(block, self.site_data.sites) * self.grid_spacing
             self.table = self.table.append(distances, self.max_prices)
 
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
-        """Search for prices, (m,) m, that increase the dual over the positions in the table.
+        """Search for prices, (m,) m, that maximize the dual over the positions in the table.
 
         The dual is the sum of the weighted prices minus n times the maximum profit of a position. The maximum
-        has no gradient, so that the search replaces it by the smooth function ``s log sum exp(profit / s)``.
-        `smoothing` is s as a fraction of the cost per robot. The gradient of that function is the mean of the
-        gradients of the profits, weighted by the shares exp(profit / s).
+        has no gradient where several positions are equally profitable. The search therefore replaces it by
+        the smooth function ``s log sum exp(profit / s)``, where `smoothing` is s as a fraction of the cost
+        per robot. The gradient of this function is the mean of the gradients of the profits, weighted by
+        ``exp(profit / s)``.
         """
         weights = self.weights
         scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self.geodesics.size)
         s = smoothing * scale / self.robot_count
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
-            """Return minus the smoothed dual at given prices, and its gradient, both divided by `scale`.
-
-            The smoothing s is that of `improve_prices`.
-            """
+            """Return minus the smoothed dual for given prices, and its gradient, both divided by `scale`."""
             heartbeat()
             profits = self.table.compute_profits(prices, weights)
             # Subtracting the maximum prevents an overflow of the exponential function.
@@ -419,9 +423,9 @@ class _Dual:
             shares = np.exp((profits - max_profit) / s)
             smooth_max = max_profit + s * math.log(shares.sum())
             dual = float(weights @ prices) - self.robot_count * smooth_max
-            # In the gradient, the n robots are divided among the positions in proportion to the shares.
-            # Raising the price of a site by 1 adds its weight to the dual once, and subtracts it once for
-            # each robot that the site pays for, that is, each robot that is nearer than its price.
+            # In the gradient, the n robots are divided among the positions in proportion to their shares. If
+            # the price of a site is raised by 1, the dual changes by the weight of the site times one minus
+            # the number of robots that the site pays for, which are those nearer than its price.
             robot_shares = shares * (self.robot_count / shares.sum())
             paid_shares = np.zeros(len(prices))
             add_paid_shares(self.table, prices, robot_shares, paid_shares)
@@ -438,23 +442,25 @@ class _Dual:
         return np.asarray(solution.x)
 
     def bound_triangle_profits(self, prices: Array, triangles: Array) -> _ProfitBounds:
-        """Compute upper bounds on the profits of all points of triangles.
+        """Compute an upper bound on the profit of all points of each of several triangles.
 
         Parameters
         ----------
         prices : (m,) array, m
+            Prices of the sites.
         triangles : (t, 3, 2) array, grid steps
+            Vertices of the triangles.
 
         Returns
         -------
         _ProfitBounds
         """
-        # The centroid of a triangle may be outside the free space by rounding. The center is the point of the
-        # free space that is nearest to it.
+        # The centroid of a triangle may be slightly outside the free space due to rounding. The nearest point
+        # of the free space is used instead.
         centroids = self.geodesics.grid.to_meters(triangles.mean(axis=1))
         centers, _ = self.geodesics.snap_to_free_space(centroids)
         scratch = TriangleScratch.allocate(len(self.geodesics.corners))
-        grid_prices = prices / self.unit
+        grid_prices = prices / self.grid_spacing
 
         def run_kernel(wall_index: AngularWallIndex) -> Array | None:
             """Return the profits and their bounds, (2, t); None if the wall index is too small."""
@@ -464,11 +470,10 @@ class _Dual:
             )
             return profits if has_space else None
 
-        # The index of the walls around a center is enlarged until it is large enough.
         grid_profits = self.geodesics.run_with_index(
             source_count=1, bin_count=SOURCE_BINS, compute=run_kernel
         )
-        profits = grid_profits * self.unit
+        profits = grid_profits * self.grid_spacing
         return _ProfitBounds(
             centers=centers, center_profits=profits[CENTER_PROFIT], bounds=profits[PROFIT_BOUND]
         )
@@ -477,11 +482,12 @@ class _Dual:
         """Prove a lower bound on the cost by branch and bound over triangles.
 
         The lower bound is the sum of the weighted prices minus n times an upper bound on the profit of any
-        position. It falls short of the best one for these prices by at most `tolerance` times the cost of the
-        placement, unless the limit `_MAX_TRIANGLES` is reached. A triangle is a leaf if no robot in it can
-        earn much more than one at the best position found so far. All other triangles are halved.
+        position. It is lower than the best bound for these prices by at most `tolerance` times the cost of
+        the placement, unless the limit `_MAX_TRIANGLES` is reached. A triangle is a leaf if the profit of no
+        position in it can be much higher than the highest profit found so far. All other triangles are
+        halved.
         """
-        # n times the slack is the allowed fraction of the cost.
+        # A profit that is too high by this slack lowers the bound by n times as much.
         slack = tolerance * self.placement_cost / self.robot_count
         best_table_profit = self.table.compute_profits(prices, self.weights).max()
         profit_bound = 0.0
@@ -503,9 +509,9 @@ class _Dual:
             profit_bound = max(profit_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
             triangles = halve_triangles(triangles[~is_leaf])
-        # The next proof starts with these triangles.
+        # The prices of the next proof are similar, so it starts with these triangles.
         self.triangles = np.concatenate(leaves)
-        rounding_allowance = _ROUNDING * self.geodesics.size * self.total_weight * self.robot_count
+        rounding_allowance = _ROUNDING_ALLOWANCE * self.geodesics.size * self.total_weight * self.robot_count
         bound = float(self.weights @ prices) - self.robot_count * profit_bound - rounding_allowance
         # The highest profits come first, because `_thin_out` keeps the first candidate in each square.
         by_profit = np.argsort(-np.concatenate(better_profits), kind="stable")
@@ -517,7 +523,7 @@ class _Dual:
 
 
 def _build_site_data(cost: CoverageCost, site_numbers: IntArray) -> SiteData:
-    """Return the data of the sites with the given numbers; raise ParameterError if none has a weight."""
+    """Return the data of the sites with the given numbers; raise ParameterError if all weights are 0."""
     geodesics = cost.geodesics
     weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
     weights = weights[site_numbers]
@@ -537,18 +543,18 @@ def _build_site_data(cost: CoverageCost, site_numbers: IntArray) -> SiteData:
 
 
 def _choose_candidate_stride(site_count: int, robot_count: int) -> int:
-    """Return the spacing of the candidates, in spacings of the sites, that leaves enough of them."""
+    """Return the spacing of the candidates, in cells of the lattice, with which there are enough of them."""
     min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robot_count)
     return max(1, int(math.sqrt(site_count / min_candidates)))
 
 
 def _build_configuration_space(cost: CoverageCost, is_covered: BoolArray, radius: float) -> shapely.Geometry:
-    """Return the region of the covered components in which the center of a robot may lie, in meters.
+    """Return the area of the covered components in which the center of a robot may lie, in meters.
 
-    The region may be slightly too large but is never too small, so the bound holds for every placement.
+    The area may be slightly too large, but is never too small, so that the bound holds for every placement.
     """
-    # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which makes
-    # the area larger.
+    # The arcs around corners are replaced by two chords each. These are closer to the corners than the arcs,
+    # which makes the area larger.
     areas = compute_center_areas(
         cost.environment.free, cost.closed_environment.free, _EROSION * radius, edges_per_quarter=2
     )
@@ -561,7 +567,7 @@ def _build_configuration_space(cost: CoverageCost, is_covered: BoolArray, radius
 
 
 def _triangulate(area: shapely.Geometry) -> Array:
-    """Return triangles that cover an area, (t, 3, 2) m."""
+    """Return triangles that cover an area, (t, 3, 2), in meters."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     assert math.isclose(shapely.area(triangles).sum(), area.area, rel_tol=1e-9)
     rings = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
@@ -569,19 +575,19 @@ def _triangulate(area: shapely.Geometry) -> Array:
 
 
 def _compute_initial_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
-    """Return maximum and initial prices, (m,) m each, for robots and sites in grid steps.
+    """Return the maximum and the initial prices of the sites, (m,) m each.
 
-    The maximum price of a site is its distance to the robot of rank `_MAX_PRICE_RANK`, and infinite if there
-    are fewer robots.
+    The positions of the n robots and the m sites are in grid steps. The maximum price of a site is its
+    distance from the robot of rank `_MAX_PRICE_RANK`; it is infinite if there are fewer robots.
     """
-    distances = geodesics.compute_grid_distances(robots, sites) * geodesics.grid.unit
-    # Infinitely distant robots are added, so that there is one of every rank.
+    distances = geodesics.compute_grid_distances(robots, sites) * geodesics.grid.spacing
+    # Robots at an infinite distance are added, so that there is one of every rank.
     missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
     distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
     nearest = distances[0]
     second = distances[1]
-    # An initial price is halfway between the distances of the nearest robot and the next one. If there is
-    # only one robot, it exceeds the distances of all sites.
+    # An initial price is halfway between the distances of the nearest and the second-nearest robot. If there
+    # is only one robot, the price is larger than the distances of all sites.
     single_robot_prices = nearest + nearest.max()
     initial_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
     return distances[_MAX_PRICE_RANK - 1], initial_prices

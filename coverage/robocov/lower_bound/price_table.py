@@ -1,4 +1,4 @@
-"""A table of distances from some positions, used to search for prices of the sites."""
+"""A table of distances from some positions to the sites, used to search for prices of the sites."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_SHARE = 1e-9
-"""Smaller shares of a robot are ignored, which saves most of the work."""
+"""Smaller shares of a robot at a position are ignored, which saves most of the work."""
 
 
 class PriceTable(NamedTuple):
-    """Distances from p positions to the sites that may pay for a robot there, one entry per pair."""
+    """Distances from p positions to the sites that may pay for a robot there.
 
-    first_entry: IntArray
-    """(p + 1,) The entries of position k are those from ``first_entry[k]`` up to ``first_entry[k + 1]``."""
-    site: NDArray[np.int32]
+    There is an entry for each pair of a position and such a site. The entries are sorted by position.
+    """
+
+    entry_starts: IntArray
+    """(p + 1,) The entries of position k are those from ``entry_starts[k]`` up to ``entry_starts[k + 1]``."""
+    sites: NDArray[np.int32]
     """(e,) The site of each entry."""
-    distance: NDArray[np.float32]
-    """(e,) Distance from the position to the site, m."""
+    distances: NDArray[np.float32]
+    """(e,) Distance from the position of each entry to its site, m."""
 
     @classmethod
     def build_empty(cls) -> PriceTable:
@@ -34,26 +37,28 @@ class PriceTable(NamedTuple):
         """
         return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
 
-    def append(self, distances: Array, max_distance: Array) -> PriceTable:
-        """Return the table with more positions at the end.
+    def append(self, distances: Array, max_distances: Array) -> PriceTable:
+        """Return a table with more positions at the end.
 
         Parameters
         ----------
         distances : (p, m) array, m
             Distances from the new positions to all sites.
-        max_distance : (m,) array, m
-            Only smaller distances get an entry.
+        max_distances : (m,) array, m
+            Only smaller distances to a site get an entry.
 
         Returns
         -------
         PriceTable
         """
-        position, site = np.nonzero((distances < max_distance) & np.isfinite(distances))
-        count = np.bincount(position, minlength=len(distances))
+        positions, sites = np.nonzero((distances < max_distances) & np.isfinite(distances))
+        entry_counts = np.bincount(positions, minlength=len(distances))
+        new_starts = self.entry_starts[-1] + np.cumsum(entry_counts)
+        new_distances = distances[positions, sites].astype(np.float32)
         return PriceTable(
-            first_entry=np.append(self.first_entry, self.first_entry[-1] + np.cumsum(count)),
-            site=np.append(self.site, site.astype(np.int32)),
-            distance=np.append(self.distance, distances[position, site].astype(np.float32)),
+            entry_starts=np.append(self.entry_starts, new_starts),
+            sites=np.append(self.sites, sites.astype(np.int32)),
+            distances=np.append(self.distances, new_distances),
         )
 
     def compute_profits(self, prices: Array, weights: Array) -> Array:
@@ -73,7 +78,7 @@ class PriceTable(NamedTuple):
         -------
         (p,) array, m
         """
-        profits = np.empty(len(self.first_entry) - 1)
+        profits = np.empty(len(self.entry_starts) - 1)
         _compute_profits(self, prices, weights, profits)
         return profits
 
@@ -86,9 +91,9 @@ def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: 
     """
     for position in range(len(profits)):
         profit = 0.0
-        for entry in range(table.first_entry[position], table.first_entry[position + 1]):
-            site = table.site[entry]
-            profit += weights[site] * max(prices[site] - table.distance[entry], 0.0)
+        for entry in range(table.entry_starts[position], table.entry_starts[position + 1]):
+            site = table.sites[entry]
+            profit += weights[site] * max(prices[site] - table.distances[entry], 0.0)
         profits[position] = profit
 
 
@@ -96,21 +101,22 @@ def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: 
 def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid_shares: Array) -> None:
     """Add up the shares of robots that each site pays for.
 
-    The smoothed search divides the robots among the positions of the table. A site pays for a robot if its
-    price is above the distance to the robot.
+    The smoothed search divides the robots among the positions of the table. A site pays for a robot if the
+    price of the site is higher than its distance to the robot.
 
     Parameters
     ----------
     table : PriceTable
     prices : (m,) array, m
+        Prices of the sites.
     shares : (p,) array
-        The share of a robot that is at each position of the table.
+        Number of robots at each position of the table, in general a fraction.
     paid_shares : (m,) array
-        Result: the sum for each site is added to its value.
+        Result: for each site, the sum of the shares is added to the value that it has on entry.
     """
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:
-            for entry in range(table.first_entry[position], table.first_entry[position + 1]):
-                site = table.site[entry]
-                if prices[site] > table.distance[entry]:
+            for entry in range(table.entry_starts[position], table.entry_starts[position + 1]):
+                site = table.sites[entry]
+                if prices[site] > table.distances[entry]:
                     paid_shares[site] += shares[position]

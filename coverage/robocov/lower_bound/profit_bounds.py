@@ -1,4 +1,4 @@
-"""Upper bounds on the profits of positions in a triangle, by tangents of distances; see `lower_bound`."""
+"""Upper bounds on the profits of the points of a triangle, from tangents of distances; see `lower_bound`."""
 
 from __future__ import annotations
 
@@ -13,31 +13,37 @@ from robocov.geodesic.corner_graph import find_visible_corners
 from robocov.geodesic.walls import Walls
 
 CENTER_PROFIT = 0
-"""Row of the result of `bound_profits`: the profits of the centers."""
+"""Row of the result of `bound_profits`: the profits of the centers of the triangles."""
 PROFIT_BOUND = 1
-"""Row of the result of `bound_profits`: the upper bounds on the profits of all points."""
+"""Row of the result of `bound_profits`: the upper bounds on the profits of all points of the triangles."""
 
 _MIN_SEGMENT_LENGTH = 1.0
-"""Length of the shortest segment that is not empty, grid steps: all points have whole coordinates."""
+"""Length of the shortest segment between different points, in grid steps: all coordinates are whole
+numbers."""
 
 
 class SiteData(NamedTuple):
-    """The walls of a map, and the sites with their weights and distances, in grid steps."""
+    """The walls of a map, and the sites with their weights and distances from the corners, in grid steps."""
 
     walls: Walls
+    """The boundary of the free space."""
     sites: Array
-    """(m, 2) Positions."""
+    """(m, 2) Positions of the sites."""
     weights: Array
     """(m,) Weights of the sites."""
     from_corners: Array
-    """(m, k) Distances from the corners to the sites."""
+    """(m, k) Geodesic distance of each site from each corner."""
 
 
 class TriangleScratch(NamedTuple):
-    """Scratch space for one triangle, in grid steps."""
+    """Scratch space for one triangle, in grid steps.
+
+    Bounds at a vertex use, in place of the distances to the sites, the minimum of their tangents at the
+    center.
+    """
 
     corners: IntArray
-    """(k,) The corners that are visible from the center."""
+    """(k,) The corners that are visible from the center, at the beginning of the array."""
     corner_distances: Array
     """(k,) Distances from the center to these corners."""
     vertices: Array
@@ -45,7 +51,7 @@ class TriangleScratch(NamedTuple):
     min_distances: Array
     """(3,) A lower bound on the distance from each vertex to the current site."""
     max_profits: Array
-    """(3,) An upper bound on the profit of each vertex."""
+    """(3,) An upper bound on the profit of each vertex, from the sites so far."""
 
     @classmethod
     def allocate(cls, corner_count: int) -> TriangleScratch:
@@ -69,12 +75,12 @@ class TriangleScratch(NamedTuple):
 
 
 class _Center(NamedTuple):
-    """The center of a triangle, in grid steps."""
+    """The point of a triangle at which distances are replaced by their tangents, in grid steps."""
 
     x: float
     y: float
     radius: float
-    """Distance to the farthest vertex."""
+    """Distance from the center to the farthest vertex."""
     corner_count: int
     """Number of corners that are visible from the center."""
 
@@ -91,10 +97,10 @@ def bound_profits(
 ) -> bool:
     """Compute the profit of the center of each triangle, and an upper bound on the profit of all its points.
 
-    The profit of a point is the sum over the sites of weight * max(price - distance, 0). In a triangle, a
-    distance is never below the smallest of the tangents, at the center, of the lengths of the paths to the
-    site. With these tangents in place of the distances, the profit is convex, and therefore largest at one of
-    the three vertices.
+    The profit of a point is the sum over the sites of weight * max(price - distance, 0). In a triangle, the
+    distance of a site is never below the minimum of the tangents, at the center, of the lengths of the paths
+    to the site. If this minimum replaces the distance, the profit becomes convex, and therefore has its
+    maximum at one of the three vertices.
 
     Parameters
     ----------
@@ -102,9 +108,11 @@ def bound_profits(
     wall_index : AngularWallIndex
         Scratch space for one source.
     prices : (m,) array, grid steps
+        Prices of the sites.
     triangles : (t, 3, 2) array, grid steps
+        Vertices of the triangles.
     centers : (t, 2) array, grid steps
-        A point in each triangle.
+        A point of the free space in each triangle.
     scratch : TriangleScratch
     profits : (2, t) array, grid steps
         Result: the profits of the centers in row `CENTER_PROFIT`, the bounds in row `PROFIT_BOUND`.
@@ -136,7 +144,7 @@ def _set_triangle(
 ) -> _Center:
     """Write a triangle, and the corners that are visible from its center, to the scratch space.
 
-    The profits of the vertices start at 0; `_add_site` adds to them.
+    The profit bounds of the vertices are set to 0; `_add_site` adds to them.
     """
     x = center[0]
     y = center[1]
@@ -146,9 +154,8 @@ def _set_triangle(
         scratch.vertices[vertex, 1] = triangle[vertex, 1] - y
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
         scratch.max_profits[vertex] = 0.0
-    # All corners are considered, from the first one on. `scratch.corners` receives those that are visible.
     corners = site_data.walls.corners
-    first_corner = 0
+    first_corner = 0  # No corner is left out.
     corner_count = find_visible_corners(
         site_data.walls, wall_index, ONLY_SOURCE, first_corner, scratch.corners
     )
@@ -169,19 +176,20 @@ def _add_site(
 ) -> float:
     """Add the payment of a site to the profit bounds of the vertices; return its payment at the center.
 
-    A site pays weight * max(price - distance, 0) to a robot. For each vertex, the distance is bounded from
-    below by tangents of path lengths at the center: of the straight path, if the site is visible from the
-    center, and of the paths via the corners that are visible from there.
+    A site pays weight * max(price - distance, 0) to a robot. At each vertex, the distance is replaced by the
+    minimum of the tangents of the path lengths: of the straight path, if the site is visible from the center,
+    and of the paths via the corners that are visible from the center.
     """
     site_x = site_data.sites[site, 0]
     site_y = site_data.sites[site, 1]
     dx = center.x - site_x
     dy = center.y - site_y
     straight_length = np.sqrt(dx * dx + dy * dy)
-    # The whole triangle is within `radius` of its center, so no point of it is nearer to the site than this.
+    # No point of the triangle is farther than the radius from the center. If even a point that is nearer to
+    # the site by the radius is too far away, the site pays nothing in the whole triangle.
     if straight_length - center.radius >= price:
         return 0.0
-    # The distance bounds start at the price: a site pays nothing to a robot at that distance or beyond.
+    # A site pays nothing to a robot at a distance of its price or more, so larger bounds make no difference.
     for vertex in range(3):
         scratch.min_distances[vertex] = price
     distance = np.inf
@@ -197,9 +205,10 @@ def _add_site(
 
 @kernel
 def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Center, site: int) -> float:
-    """Lower the distance bounds of a site by the tangents of its paths via corners visible from the center.
+    """Lower the distance bounds of a site to the tangents of its paths via corners.
 
-    Return the length of the shortest of these paths from the center.
+    The corners are those visible from the center. Return the length of the shortest of these paths from the
+    center; inf if there is none.
     """
     corners = site_data.walls.corners
     min_distances = scratch.min_distances
@@ -208,6 +217,7 @@ def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Ce
         corner = scratch.corners[k]
         length = scratch.corner_distances[k] + site_data.from_corners[site, corner]
         min_length = min(min_length, length)
+        # At a vertex, a tangent is lower than at the center by at most the radius, because its slope is 1.
         if length - center.radius < max(min_distances[0], min_distances[1], min_distances[2]):
             dx = center.x - corners[corner, 0]
             dy = center.y - corners[corner, 1]
@@ -219,16 +229,16 @@ def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Ce
 def _apply_tangent_bound(
     scratch: TriangleScratch, length: float, dx: float, dy: float, first_length: float
 ) -> None:
-    """Replace the distance bound of each vertex by the tangent of a path length if that is smaller.
+    """Lower the distance bound of each vertex to the tangent of a path length if the tangent is smaller.
 
-    The length of a path is a convex function of its start. Its tangent at the center of the triangle is
-    therefore a lower bound on the length of the path from any other point, here from each vertex.
+    The length of a path is a convex function of the point where it starts. Its tangent at the center of the
+    triangle is therefore never larger than the length of the path from any other point, here from a vertex.
 
-    The path from the center has the given length. Its first segment has the length `first_length`, and runs
-    from the center to the point at -(dx, dy). The tangent rises in the direction (dx, dy), away from the end
-    of this segment, with slope 1.
+    The path from the center has the given length. Its first segment leads from the center to the point at
+    offset (-dx, -dy), and has the length `first_length`. The tangent rises with slope 1 in the direction (dx,
+    dy), away from the end of this segment.
     """
-    # If the segment is empty, its direction (dx, dy) is zero, and the divisor does not matter.
+    # If the segment has no length, (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)
     for vertex in range(3):
         vertex_x = scratch.vertices[vertex, 0]
@@ -243,12 +253,14 @@ def halve_triangles(triangles: Array) -> Array:
     Parameters
     ----------
     triangles : (t, 3, 2) array
+        Vertices of the triangles.
 
     Returns
     -------
     (2 t, 3, 2) array
+        The first halves of all triangles, then the second halves.
     """
-    # The apex is the vertex opposite to the longest edge.
+    # The longest edge leads from `start` to `end`, and the apex is the vertex opposite to it.
     edges = triangles - np.roll(triangles, -1, axis=1)
     longest = (edges * edges).sum(axis=2).argmax(axis=1)
     rows = np.arange(len(triangles))

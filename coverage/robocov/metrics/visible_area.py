@@ -158,7 +158,7 @@ def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tupl
     x, y = position
     entries = index_walls(walls, index, x, y)
     while entries == NO_SPACE:
-        index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
+        index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_walls))
         entries = index_walls(walls, index, x, y)
     return index, entries
 
@@ -169,7 +169,7 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position:
     The visible wall can only change in the directions of the ends of walls. In each sector between two such
     directions, the visible wall is therefore the one that a ray through the middle hits first.
     """
-    facing_walls = np.unique(index.entry_wall[:entries])
+    facing_walls = np.unique(index.entry_walls[:entries])
     ends = walls.ends[facing_walls].reshape(-1, 2) - position
     start = np.unique(np.arctan2(ends[:, 1], ends[:, 0]))
     end = np.append(start[1:], start[0] + 2.0 * np.pi)
@@ -196,9 +196,9 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
         nearest[m] = NO_WALL
         min_distance = np.inf
         # The walls of a bin are a linked list, from its last entry to the first one.
-        entry = index.head[ONLY_SOURCE, find_bin(_BINS, x, y)]
+        entry = index.heads[ONLY_SOURCE, find_bin(_BINS, x, y)]
         while entry != NO_ENTRY:
-            wall = index.entry_wall[entry]
+            wall = index.entry_walls[entry]
             # From the source to the start a of the wall, and from there along the wall u.
             ax = ends[wall, START_X] - index.positions[ONLY_SOURCE, 0]
             ay = ends[wall, START_Y] - index.positions[ONLY_SOURCE, 1]
@@ -212,7 +212,7 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
                 if 0.0 <= s <= 1.0 and 0.0 < t < min_distance:
                     min_distance = t
                     nearest[m] = wall
-            entry = index.entry_before[entry]
+            entry = index.previous_entries[entry]
 
 
 def _intersect(walls: Array, angles: Array) -> Array:

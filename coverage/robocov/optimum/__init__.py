@@ -1,8 +1,8 @@
-"""The centralized reference solution: the best positions for a team that knows the whole map.
+"""The centralized reference solution: the best positions that were found for a team that knows the whole map.
 
-- `search`: the best of many restarts
-- `descent`: descent of the exact cost to a local minimum
-- `configuration_space`: positions at which robots fit
+- `search`: the search for the best positions by many restarts
+- `descent`: the descent of the exact cost to a local minimum
+- `configuration_space`: the positions at which robots fit
 """
 
 from robocov.optimum.configuration_space import ConfigurationSpace

@@ -1,4 +1,4 @@
-"""The positions at which robots fit: clear of walls and of each other."""
+"""The positions at which robots fit: far enough from walls and from each other."""
 
 from __future__ import annotations
 
@@ -18,36 +18,40 @@ from robocov.environment import (
 from robocov.potential import compute_spread_directions
 
 _EDGES_PER_QUARTER = 32
-"""Edges per quarter circle around corners. They cut off 3e-4 of the radius, less than the gap to walls."""
+"""Number of edges that replace a quarter circle around a corner. They are closer to the corner than the
+circle by at most 3e-4 of the radius, which is less than the gap between robot and wall."""
 
 _MAX_PUSHES = 60
 """Maximum number of times that overlapping robots are pushed apart before the search gives up."""
 
 _OVERSHOOT = 1.005
-"""Robots are pushed apart to this multiple of their spacing. With a factor of 1, they would only converge."""
+"""Robots are pushed apart to this multiple of their spacing. With a factor of 1, they would approach the
+spacing more and more slowly."""
 
 _RELATIVE_ROUNDING = 1e-9
-"""Tolerance of the spacing for rounding errors, as a fraction."""
+"""Tolerance of the spacing for rounding errors, as a fraction of the spacing."""
 
 
 class ConfigurationSpace:
     """The free configuration space of robots of the same radius.
 
-    Robots keep the same gaps to walls and to each other as at the start of a simulation.
+    The gaps between robots, and between robots and walls, are at least as wide as at the start of a
+    simulation.
 
     Parameters
     ----------
     free : shapely.MultiPolygon, m
         The free space, one polygon for each component.
     radius : float, m
+        Radius of the robots.
     closed : shapely.MultiPolygon, optional, m
-        The free space with closed gaps, if a component may consist of several parts between which a robot
-        cannot move. By default no gap is closed.
+        The free space with closed gaps; see `Environment.close_gaps`. Its components are then used instead of
+        those of `free`.
 
     Attributes
     ----------
     clearance : float, m
-        Minimum distance of a robot's center from walls.
+        Minimum distance between the center of a robot and a wall.
     spacing : float, m
         Minimum distance between the centers of two robots.
     components : tuple of shapely geometries, m
@@ -57,7 +61,7 @@ class ConfigurationSpace:
     Examples
     --------
     >>> space = ConfigurationSpace(MultiPolygon([shapely.box(0, 0, 4, 4)]), radius=1.0)
-    >>> space.find_nearest(np.array([[0.0, 2.0]]), component=np.array([0])).round(2)
+    >>> space.find_nearest(np.array([[0.0, 2.0]]), robot_components=np.array([0])).round(2)
     array([[1.02, 2.  ]])
     """
 
@@ -73,21 +77,25 @@ class ConfigurationSpace:
         self.components: tuple[BaseGeometry, ...] = tuple(areas)
         shapely.prepare(list(self.components))
 
-    def find_nearest(self, positions: Array, component: IntArray) -> Array | None:
-        """Find positions where all robots fit, near the given ones.
+    def find_nearest(self, positions: Array, robot_components: IntArray) -> Array | None:
+        """Find positions at which all robots fit, near the given ones.
+
+        Each robot moves to the nearest position clear of walls. Robots that are too close together are then
+        pushed apart, until no pair is too close.
 
         Parameters
         ----------
         positions : (n, 2) array, m
-        component : (n,) int array
-            The component of the free space in which each robot stays.
+            Positions of the robots.
+        robot_components : (n,) int array
+            Index of the component of the free space in which each robot stays.
 
         Returns
         -------
         (n, 2) array, m, or None
             None if no such positions were found.
         """
-        areas = np.array(self.components, dtype=object)[component]
+        areas = np.array(self.components, dtype=object)[robot_components]
         positions = find_nearest_inside(areas, positions)
         for _ in range(_MAX_PUSHES):
             max_distance = self.spacing * (1.0 - _RELATIVE_ROUNDING)
@@ -99,23 +107,23 @@ class ConfigurationSpace:
         return None
 
     def _push_apart(self, positions: Array, pairs: IntArray) -> Array:
-        """Return the (n, 2) positions after the robots of each of the (p, 2) pairs are pushed apart.
+        """Return the positions, (n, 2), after the two robots of each of the pairs, (p, 2), are pushed apart.
 
         Both robots of a pair move by the same distance.
         """
         first = pairs[:, 0]
         second = pairs[:, 1]
-        offset = positions[second] - positions[first]
-        distance = compute_lengths(offset)
+        offsets = positions[second] - positions[first]
+        distances = compute_lengths(offsets)
         # The direction between coincident robots is undefined: use a fixed one that differs between pairs.
-        is_coincident = distance == 0.0
+        is_coincident = distances == 0.0
         pair_numbers = first[is_coincident] + second[is_coincident] * len(positions)
-        offset[is_coincident] = compute_spread_directions(pair_numbers)
+        offsets[is_coincident] = compute_spread_directions(pair_numbers)
         # The offsets of coincident robots are unit vectors now.
-        offset_length = np.where(is_coincident, 1.0, distance)
-        fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / offset_length
-        push = offset * fraction[:, None]
+        offset_lengths = np.where(is_coincident, 1.0, distances)
+        fractions = (_OVERSHOOT * self.spacing - distances) / 2.0 / offset_lengths
+        pushes = offsets * fractions[:, None]
         new_positions = positions.copy()
-        np.subtract.at(new_positions, first, push)
-        np.add.at(new_positions, second, push)
+        np.subtract.at(new_positions, first, pushes)
+        np.add.at(new_positions, second, pushes)
         return new_positions

@@ -14,28 +14,29 @@ from robocov.cost import CoverageCost, CoverageResult
 from robocov.optimum.configuration_space import ConfigurationSpace
 
 _MAX_STEPS = 300
-"""Maximum number of steps. A few dozen are typical."""
+"""Maximum number of steps of a descent. A few dozen are typical."""
 
-_MEMORY = 8
-"""Number of recent steps from which the curvature is estimated."""
+_MAX_CURVATURE_PAIRS = 8
+"""Maximum number of recent steps from which the curvature is estimated."""
 
 _SUFFICIENT_DECREASE = 1e-4
-"""Fraction of the decrease predicted by the gradient that a step must achieve (Armijo's condition)."""
+"""Fraction of the decrease predicted by the gradient that a step must achieve (the Armijo condition)."""
 
 _MAX_QUASI_NEWTON_TRIALS = 4
 """Maximum number of trial steps along the quasi-Newton direction, each half as long as the previous one."""
 
 _MAX_GRADIENT_TRIALS = 14
-"""Maximum number of trial steps along the scaled gradient."""
+"""The same along the scaled gradient."""
 
 _STALL_STEPS = 5
-"""Number of steps over which the decrease is summed to detect a stall."""
+"""Number of the last steps whose decreases are added up to detect a stall."""
 
 _STALL_DECREASE = 1e-7
-"""The descent ends if that sum is below this fraction of the cost."""
+"""The descent ends when this sum is below this fraction of the cost."""
 
 _MIN_CURVATURE = 1e-10
-"""Minimum curvature along a step, relative to the change of the gradient."""
+"""A step is recorded only if its scalar product with the change of the gradient is larger than this fraction
+of the squared change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ def descend(
     cost: CoverageCost,
     space: ConfigurationSpace,
     positions: Array,
-    component: IntArray,
+    robot_components: IntArray,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> CoverageResult:
     """Move robots to a local minimum of the coverage cost.
@@ -60,30 +61,31 @@ def descend(
     Parameters
     ----------
     cost : CoverageCost
+        The cost to minimize.
     space : ConfigurationSpace
-        Positions at which robots fit.
+        The positions at which robots fit.
     positions : (n, 2) array, m
         Positions from which the descent starts.
-    component : (n,) int array
-        The component of the free space in which each robot stays.
+    robot_components : (n,) int array
+        Index of the component of the free space in which each robot stays.
     heartbeat : callable, optional
         Called before each step. It may raise an exception to stop.
 
     Returns
     -------
     CoverageResult
-        Its mean distance is never larger than at the start.
+        The cost of the final positions. Its mean distance is never larger than that of the initial positions.
 
     Notes
     -----
     The descent takes projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*,
-    algorithm 7.4), scaled by the curvature that Weiszfeld's iteration for the geometric median uses. Each
-    step is projected onto the configuration space and halved until the cost decreases enough. The cost is
-    only piecewise smooth, since sites change owners and paths, and a wall may stop a robot. If the
-    quasi-Newton direction does not lead downhill, the descent follows the scaled gradient and estimates the
-    curvature again.
+    algorithm 7.4), with an initial Hessian that contains the curvature of Weiszfeld's iteration for the
+    geometric median. Each step is projected onto the configuration space, and halved until the cost decreases
+    enough. The cost is only piecewise smooth, since sites change owners and paths, and a wall may stop a
+    robot. If no step along the quasi-Newton direction decreases the cost enough, the descent forgets the
+    curvature and follows the gradient, divided by the initial Hessian.
     """
-    descent = _Descent(cost, space, component, cost(positions))
+    descent = _Descent(cost, space, robot_components, cost(positions))
     decreases: deque[float] = deque(maxlen=_STALL_STEPS)
     for _ in range(_MAX_STEPS):
         heartbeat()
@@ -99,18 +101,32 @@ def descend(
 
 @dataclass
 class _Descent:
-    """The state of a descent."""
+    """The state of a descent.
+
+    Attributes
+    ----------
+    cost : CoverageCost
+        The cost to minimize.
+    space : ConfigurationSpace
+        The positions at which robots fit.
+    robot_components : (n,) int array
+        Index of the component of the free space in which each robot stays.
+    result : CoverageResult
+        The cost of the current positions.
+    recent_pairs : deque of _CurvaturePair
+        The last steps, from which the curvature is estimated.
+    """
 
     cost: CoverageCost
     space: ConfigurationSpace
-    component: IntArray
+    robot_components: IntArray
     result: CoverageResult
-    recent_pairs: deque[_CurvaturePair] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+    recent_pairs: deque[_CurvaturePair] = field(default_factory=lambda: deque(maxlen=_MAX_CURVATURE_PAIRS))
 
     def step(self) -> bool:
         """Move the robots to positions of lower cost; return whether that was possible."""
         gradient = _compute_gradient(self.result)
-        # Distances less than half the spacing of the sites are below the resolution of the cost.
+        # The cost does not resolve distances below half the spacing of the sites.
         curvature = _compute_curvature(self.result, min_distance=self.cost.spacing / 2.0)[:, None]
         improved = None
         if self.recent_pairs:
@@ -122,26 +138,32 @@ class _Descent:
         if improved is None:
             return False
         move = improved.positions - self.result.positions
-        change = _compute_gradient(improved) - gradient
-        # Quasi-Newton directions lead downhill only if the cost is convex along all recorded steps.
-        if (move * change).sum() > _MIN_CURVATURE * (change * change).sum():
-            self.recent_pairs.append(_CurvaturePair(move, change))
+        gradient_change = _compute_gradient(improved) - gradient
+        # Quasi-Newton directions lead downhill only if the cost has a positive curvature along each recorded
+        # step.
+        if (move * gradient_change).sum() > _MIN_CURVATURE * (gradient_change * gradient_change).sum():
+            self.recent_pairs.append(_CurvaturePair(move, gradient_change))
         self.result = improved
         return True
 
     def _search_line(self, gradient: Array, direction: Array, max_trials: int) -> CoverageResult | None:
-        """Return the result of the longest trial step that lowers the cost enough, or None if none does."""
+        """Return the result of the longest trial step that lowers the cost enough, or None if none does.
+
+        The first trial step is the whole `direction`, (n, 2) m. Each later one is half as long as the
+        previous one.
+        """
         start = self.result
         for k in range(max_trials):
-            positions = self.space.find_nearest(start.positions + 0.5**k * direction, self.component)
+            desired_positions = start.positions + 0.5**k * direction
+            positions = self.space.find_nearest(desired_positions, self.robot_components)
             if positions is None:
                 continue
             predicted_change = float((gradient * (positions - start.positions)).sum())
             if not predicted_change < 0.0:
                 continue
-            after = self.cost(positions)
-            if after.mean_distance <= start.mean_distance + _SUFFICIENT_DECREASE * predicted_change:
-                return after
+            end = self.cost(positions)
+            if end.mean_distance <= start.mean_distance + _SUFFICIENT_DECREASE * predicted_change:
+                return end
         return None
 
 
@@ -153,23 +175,27 @@ def _compute_gradient(result: CoverageResult) -> Array:
 
 
 def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
-    """Return the curvature of the cost by robot, (n,) 1/m: the mean inverse distance to first waypoints."""
-    site = np.flatnonzero(result.owner >= 0)
-    owner = result.owner[site]
-    offset = result.first_waypoints[site] - result.positions[owner]
-    # Without a minimum, a site at the position of a robot would hold it in place.
-    distance = np.maximum(compute_lengths(offset), min_distance)
-    pull = 1.0 / distance
-    total_weight = float(max(len(site), 1))
+    """Return the curvature of the cost for each robot, (n,) 1/m, as in Weiszfeld's iteration.
+
+    It is the sum of the weights of the robot's sites, each divided by the distance from the robot to its
+    first waypoint, divided by the sum of the weights of all sites. For a robot without sites, it is 1.
+    """
+    sites = np.flatnonzero(result.owners >= 0)
+    owners = result.owners[sites]
+    offsets = result.first_waypoints[sites] - result.positions[owners]
+    # Without a minimum, a site at the position of a robot would keep the robot from moving.
+    distances = np.maximum(compute_lengths(offsets), min_distance)
+    site_curvatures = 1.0 / distances
+    total_weight = float(max(len(sites), 1))
     if result.weights is not None:
-        pull *= result.weights[site]
-        total_weight = float(result.weights[site].sum()) or 1.0
-    curvature = np.bincount(owner, pull, minlength=len(result.positions)) / total_weight
-    return np.where(curvature > 0.0, curvature, 1.0)
+        site_curvatures *= result.weights[sites]
+        total_weight = float(result.weights[sites].sum()) or 1.0
+    curvatures = np.bincount(owners, site_curvatures, minlength=len(result.positions)) / total_weight
+    return np.where(curvatures > 0.0, curvatures, 1.0)
 
 
 def _compute_quasi_newton_direction(gradient: Array, curvature: Array, pairs: deque[_CurvaturePair]) -> Array:
-    """Return the L-BFGS direction, (n, 2) m, for an initial curvature by robot, (n, 1) 1/m."""
+    """Return the L-BFGS direction, (n, 2) m, for an initial curvature of each robot, (n, 1) 1/m."""
     moves = np.array([pair.move for pair in pairs]).reshape(len(pairs), -1)
     changes = np.array([pair.gradient_change for pair in pairs]).reshape(len(pairs), -1)
     # SciPy's recursion starts from a Hessian equal to the identity. It therefore runs in coordinates

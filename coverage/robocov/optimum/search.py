@@ -35,23 +35,24 @@ _MIN_CANDIDATES = 600
 _CANDIDATES_PER_ROBOT = 20
 """Approximate minimum number of candidate positions per robot."""
 
-_MAX_TARGETS = 1000
+_MAX_GROUPS = 1000
 """Approximate maximum number of groups of sites in the distance table."""
 
 _MAX_GRID_POINTS = 200_000
-"""Maximum number of grid points, in the box around a component, from which candidates are chosen."""
+"""Approximate maximum number of points of the fine grid from which candidates are chosen, in the bounding box
+of a component."""
 
 _STEPS_PER_SPACING = 3
-"""Number of steps of that grid from one candidate to the next."""
+"""Number of steps of the fine grid from one candidate to the next."""
 
 _UNREACHABLE_SIZES = 1e4
-"""Distance to a site that cannot be reached, in multiples of the size of the map."""
+"""Distance that the table contains if a site cannot be reached, as a multiple of the size of the map."""
 
 _PROGRESS_AFTER_COST = 0.3
-"""Fraction of the work that is done when the cost has been prepared."""
+"""Completed fraction of the work when the cost has been prepared."""
 
 _PROGRESS_AFTER_TABLE = 0.5
-"""Fraction of the work that is done when the table has been computed."""
+"""Completed fraction of the work when the table has been computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +62,11 @@ class Optimum:
     Attributes
     ----------
     positions : (n, 2) array, m
-        From left to right, in the free space, clear of walls and of each other.
+        Positions of the robots from left to right, at which they fit between walls and other robots.
     mean_distance : float, m
-        See `CoverageResult`.
+        Mean geodesic distance from a site to the nearest robot; see `CoverageResult`.
     value : float, m³
-        See `CoverageResult`.
+        Coverage cost (22); see `CoverageResult`.
     uncovered_area : float, m²
         Area of the components of the free space without a robot.
     costs : (r,) array, m
@@ -73,7 +74,7 @@ class Optimum:
     costs_before_descent : (r,) array, m
         Mean distance of each restart before the descent of the exact cost.
     restart : int
-        The restart that found the positions, the first one if several did.
+        Index of the restart that found the positions; the first one if several restarts found them.
 
     See Also
     --------
@@ -98,12 +99,12 @@ class Optimum:
     restart: int
 
     def compute_agreement(self, within: float = 0.005) -> float:
-        """Compute the fraction of restarts that ended close to the best one.
+        """Compute the fraction of restarts that ended with nearly the same mean distance as the best one.
 
         Parameters
         ----------
         within : float
-            Maximum excess of their mean distance, relative to the best one.
+            Maximum excess of the mean distance, as a fraction of that of the best restart.
 
         Returns
         -------
@@ -149,16 +150,17 @@ def find_optimum(
     lattice : int
         Number of cells along a side of the lattice; see `CoverageCost`.
     restarts : int
-        Number of restarts. Each depends only on the seed and its own number, so more restarts never give a
-        higher cost.
+        Number of restarts. Each depends only on the seed and its own index, so that more restarts never give
+        a higher cost.
     seed : int
-        Seed of all restarts.
+        Seed of the random numbers of all restarts.
     progress : callable, optional
-        Called regularly with the fraction that is done. It may raise an exception to stop.
+        Called regularly with the completed fraction of the work. It may raise an exception to stop.
 
     Returns
     -------
     Optimum
+        The best positions that were found, and their cost.
 
     Raises
     ------
@@ -172,16 +174,16 @@ def find_optimum(
 
     Notes
     -----
-    The coverage cost (22) has many local minima. Each restart draws positions by k-median++ and improves them
-    on a table of geodesic distances from several hundred candidate positions: first by Lloyd's iteration,
-    then by interchange, which escapes most of these minima. Finally, it descends the exact cost. The best of
-    all restarts is not proven to be the global minimum, but the more restarts agree on it, the more likely
-    it is.
+    The coverage cost (22) has many local minima. Each restart first chooses from several hundred candidate
+    positions, between which and the sites it knows the geodesic distances: it draws positions at random by
+    k-median++, and improves them by Lloyd's iteration and then by interchange, which escapes most of the
+    local minima. From the chosen positions, it descends the exact cost. The best of all restarts is not
+    proven to be the global minimum. The more restarts agree on it, the more likely it is.
 
-    If the free space has several components, the robots first cover as much area as possible by occupying the
-    largest components, and then minimize the cost there. (The cost alone would be lowest with all robots in
-    the smallest room.) Gaps that are narrower than a robot separate components; see `CoverageCost`.
-    Components that are too small for a robot, or contain no site of the lattice, are ignored.
+    If the free space has several components, the robots occupy the largest ones, to cover as much area as
+    possible, and minimize the cost there. (The cost alone would be lowest with all robots in the smallest
+    room.) Gaps that are narrower than a robot separate components; see `CoverageCost`. Components that are
+    too small for a robot, or contain no site of the lattice, are ignored.
 
     Examples
     --------
@@ -222,18 +224,18 @@ def find_optimum(
 
 
 class _Outcome(NamedTuple):
-    """The outcome of a restart."""
+    """The outcome of a restart; see `Optimum`."""
 
     mean_distance_before_descent: float
-    """m"""
+    """Mean distance before the descent of the exact cost, m."""
     positions: Array
-    """(n, 2) m"""
+    """(n, 2) Positions of the robots, m."""
     mean_distance: float
-    """m"""
+    """Mean geodesic distance from a site to the nearest robot, m."""
     value: float
-    """m³"""
+    """Coverage cost (22), m³."""
     uncovered_area: float
-    """m²"""
+    """Area of the components of the free space without a robot, m²."""
 
 
 def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> None:
@@ -247,31 +249,36 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
 
 
 def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
-    """Return the sort key of a result: the uncovered area, then the mean distance."""
+    """Return the key by which results are compared: the uncovered area, then the mean distance."""
     return result.uncovered_area, result.mean_distance
 
 
 class _SiteGroups(NamedTuple):
-    """Groups of neighboring sites; each group is one row of the distance table."""
+    """Groups of neighboring sites; each group has a row in the distance table."""
 
     representatives: IntArray
-    """(t,) The site of each group at which distances are measured."""
+    """(t,) The site of each group from which distances are measured."""
     weights: Array | IntArray
     """(t,) Sum of the weights of each group's sites; their number if all weights are equal."""
 
 
 class _Search:
-    """The data that all restarts share.
+    """The search for the best positions, with the data that all restarts share.
 
     Attributes
     ----------
+    cost : CoverageCost
+        The cost to minimize.
+    robot_count : int
+        Number of robots.
     space : ConfigurationSpace
+        The positions at which robots fit.
     candidates : (c, 2) array, m
         Candidate positions for robots, which are the sources of the table.
-    component : (c,) int array
-        The component of the free space that contains each candidate.
+    candidate_components : (c,) int array
+        Index of the component of the free space that contains each candidate.
     table : (t, c) array, m
-        Distances from groups of sites to the candidates, times the weights of the groups.
+        Distances from the groups of sites to the candidates, times the weights of the groups.
     """
 
     def __init__(self, cost: CoverageCost, robot_count: int) -> None:
@@ -282,42 +289,56 @@ class _Search:
         )
         _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
         # A site on the border of two components belongs to the first one.
-        site_component = is_inside.argmax(axis=1)
+        site_components = is_inside.argmax(axis=1)
         areas = self.space.components
-        site_counts = np.bincount(site_component, minlength=len(areas))
+        site_counts = np.bincount(site_components, minlength=len(areas))
         usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
-        # The robots occupy the largest components; these come first.
+        # The components are sorted by area. The robots occupy the largest ones.
         covered = usable[:robot_count]
         candidates = self._spread_candidates(covered)
-        self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
-        if len(self.component) < robot_count:
+        candidate_counts = [len(points) for points in candidates]
+        self.candidate_components = np.repeat(covered, candidate_counts).astype(np.intp)
+        if len(self.candidate_components) < robot_count:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
                 f"robots: expected at most about {capacity}, as many as fit with radius {cost.radius:g} m in "
                 f"map {cost.environment.name!r}, got {robot_count}"
             )
         self.candidates = np.concatenate(candidates)
-        groups = self._group_sites(site_component, np.isin(site_component, covered))
+        groups = self._group_sites(site_components, np.isin(site_components, covered))
         self.table = self._compute_table(groups)
-        # Many restarts find the same sources; the descent from them is computed only once.
+        # Many restarts find the same sources. The descent from these is computed only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
 
     def _spread_candidates(self, covered: list[int]) -> list[Array]:
-        """Return candidate positions in each of the covered components, (c, 2) m each."""
+        """Return the candidate positions in each of the covered components, (c, 2) m each."""
         areas = [self.space.components[k] for k in covered]
         total_area = sum(area.area for area in areas)
-        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robot_count)
+        min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robot_count)
         # Each candidate gets a square of the same area, but robots at adjacent candidates must not overlap.
-        spacing = max(math.sqrt(total_area / count), self.space.spacing)
+        spacing = max(math.sqrt(total_area / min_candidates), self.space.spacing)
         return [_spread_points(area, spacing) for area in areas]
 
     def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
-        """Find sources and descend from them."""
+        """Find good sources of the table, and descend the exact cost from their positions.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers of this restart.
+        heartbeat : callable
+            Called regularly. It may raise an exception to stop.
+
+        Returns
+        -------
+        _Outcome
+        """
         sources = self._find_sources(rng, heartbeat)
         key = tuple(sources.tolist())
         if key not in self._outcome_by_sources:
             positions = self.candidates[sources]
-            result = descend(self.cost, self.space, positions, self.component[sources], heartbeat)
+            components = self.candidate_components[sources]
+            result = descend(self.cost, self.space, positions, components, heartbeat)
             self._outcome_by_sources[key] = _Outcome(
                 mean_distance_before_descent=self.cost(positions).mean_distance,
                 positions=result.positions,
@@ -327,39 +348,43 @@ class _Search:
             )
         return self._outcome_by_sources[key]
 
-    def _group_sites(self, site_component: IntArray, is_covered: BoolArray) -> _SiteGroups:
-        """Group the covered sites by component, in square blocks of lattice cells."""
+    def _group_sites(self, site_components: IntArray, is_covered: BoolArray) -> _SiteGroups:
+        """Group the covered sites: those of the same component in the same square block of lattice cells."""
         cost = self.cost
-        # The side of a block, in cells.
-        side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
-        row, column = np.divmod(cost.cells, cost.lattice)
-        # A group is numbered by its block, and within a block by its component.
-        block = row // side * cost.lattice + column // side
-        group = block * len(self.space.components) + site_component
+        block_side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_GROUPS)))
+        rows, columns = np.divmod(cost.cells, cost.lattice)
+        # The number of a group is composed of the number of its block and of its component.
+        blocks = rows // block_side * cost.lattice + columns // block_side
+        groups = blocks * len(self.space.components) + site_components
         # A group is represented by the site nearest to the middle of its block. Ties, such as between all
         # cells of a two by two block, are broken at random.
-        squared_offset = _compute_offsets(row, side) ** 2 + _compute_offsets(column, side) ** 2
-        tie_breaker = np.random.default_rng(0).random(len(group))
+        row_offsets = _compute_offsets(rows, block_side)
+        column_offsets = _compute_offsets(columns, block_side)
+        squared_offsets = row_offsets**2 + column_offsets**2
+        tie_breakers = np.random.default_rng(0).random(len(groups))
         # Sort the covered sites by group (`lexsort` expects the most important key last). The first site of
         # each group is its representative.
         sites = np.flatnonzero(is_covered)
-        sites = sites[np.lexsort((tie_breaker[sites], squared_offset[sites], group[sites]))]
-        _, starts, counts = np.unique(group[sites], return_index=True, return_counts=True)
-        weights = counts if cost.weights is None else np.add.reduceat(cost.weights[sites], starts)
-        return _SiteGroups(representatives=sites[starts], weights=weights)
+        sites = sites[np.lexsort((tie_breakers[sites], squared_offsets[sites], groups[sites]))]
+        _, first_sites, site_counts = np.unique(groups[sites], return_index=True, return_counts=True)
+        weights = site_counts
+        if cost.weights is not None:
+            weights = np.add.reduceat(cost.weights[sites], first_sites)
+        return _SiteGroups(representatives=sites[first_sites], weights=weights)
 
     def _compute_table(self, groups: _SiteGroups) -> Array:
-        """Compute the table of weighted distances from groups of sites to the candidates."""
+        """Compute the table of weighted distances from the groups of sites to the candidates, (t, c) m."""
         cost = self.cost
         distances = cost.geodesics.compute_distances(self.candidates, cost.points[groups.representatives])
         distances[np.isinf(distances)] = _UNREACHABLE_SIZES * cost.geodesics.size
         return np.ascontiguousarray((distances * groups.weights).T)
 
     def _find_sources(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> IntArray:
-        """Return the sources that one restart finds on the table, sorted, (n,).
+        """Return the sources of the table that one restart finds, (n,), in ascending order.
 
-        Since the table only approximates the cost, the result of an earlier stage is used if its exact cost
-        is lower.
+        There are three stages, each of which starts from the result of the previous one. Since the table only
+        approximates the cost, a later stage may make the exact cost higher. The sources of the stage with the
+        lowest exact cost are returned.
         """
         first_sources = seed_sources(self.table, self.robot_count, rng)
         lloyd_sources = run_lloyd(self.table, first_sources, heartbeat=heartbeat)
@@ -368,19 +393,19 @@ class _Search:
         return min(stages, key=lambda sources: _get_rank(self.cost(self.candidates[sources])))
 
 
-def _compute_offsets(index: IntArray, side: int) -> IntArray:
-    """Return the offsets of rows, or of columns, from the middles of their blocks of `side` cells.
+def _compute_offsets(indices: IntArray, block_side: int) -> IntArray:
+    """Return the offsets of rows, or of columns, from the middle of their blocks, in half cells.
 
-    They are counted in half cells, so that they are whole numbers, and equal distances are exactly equal.
+    In half cells, the offsets are whole numbers, so that equal distances are exactly equal.
     """
-    return 2 * (index % side) - (side - 1)
+    return 2 * (indices % block_side) - (block_side - 1)
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:
-    """Return points in an area, (p, 2), at least `spacing` apart: a coarse grid with its gaps filled.
+    """Return points in an area, (p, 2), at least `spacing` apart, with no large gaps between them.
 
-    Every third row and column of a fine grid form the coarse grid. The other points of the fine grid fill the
-    gaps between the coarse grid and the walls.
+    Every third row and column of a fine grid form a coarse grid. The gaps between the coarse grid and the
+    walls are filled by other points of the fine grid.
     """
     low_x, low_y, high_x, high_y = area.bounds
     min_step = math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS)
@@ -389,30 +414,34 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     max_column = int((high_x - low_x) / 2.0 / step)
     max_row = int((high_y - low_y) / 2.0 / step)
     row_grid, column_grid = np.mgrid[-max_row : max_row + 1, -max_column : max_column + 1]
-    row = row_grid.ravel()
-    column = column_grid.ravel()
-    x = (low_x + high_x) / 2.0 + column * step
-    y = (low_y + high_y) / 2.0 + row * step
-    points = np.column_stack([x, y])
+    rows = row_grid.ravel()
+    columns = column_grid.ravel()
+    x = (low_x + high_x) / 2.0 + columns * step
+    y = (low_y + high_y) / 2.0 + rows * step
+    fine_points = np.column_stack([x, y])
     is_inside = shapely.contains_xy(area, x, y)
-    is_on_coarse_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
-    chosen = points[is_on_coarse_grid]
-    if len(chosen) == 0:
+    is_on_coarse_grid = (rows % _STEPS_PER_SPACING == 0) & (columns % _STEPS_PER_SPACING == 0)
+    coarse_points = fine_points[is_inside & is_on_coarse_grid]
+    if len(coarse_points) == 0:
         point = area.representative_point()
-        chosen = np.array([[point.x, point.y]])
-    return _fill_gaps(chosen, points[is_inside & ~is_on_coarse_grid], _STEPS_PER_SPACING * step)
+        coarse_points = np.array([[point.x, point.y]])
+    other_points = fine_points[is_inside & ~is_on_coarse_grid]
+    return _fill_gaps(coarse_points, other_points, _STEPS_PER_SPACING * step)
 
 
 def _fill_gaps(points: Array, candidates: Array, spacing: float) -> Array:
-    """Repeatedly add the candidate farthest from all points, while it is at least `spacing` away."""
+    """Add candidates to points, (p, 2), as long as one is at least `spacing` away from all of them.
+
+    Each time, the candidate that is farthest from the nearest point is added.
+    """
     if len(candidates) == 0:
         return points
-    distance = np.asarray(cKDTree(points).query(candidates)[0])
-    farthest = int(distance.argmax())
+    distances = np.asarray(cKDTree(points).query(candidates)[0])
+    farthest = int(distances.argmax())
     added = []
-    while distance[farthest] >= spacing:
+    while distances[farthest] >= spacing:
         added.append(candidates[farthest])
-        offset = candidates - candidates[farthest]
-        distance = np.minimum(distance, compute_lengths(offset))
-        farthest = int(distance.argmax())
+        offsets = candidates - candidates[farthest]
+        distances = np.minimum(distances, compute_lengths(offsets))
+        farthest = int(distances.argmax())
     return np.vstack([points, *added])

@@ -33,7 +33,7 @@ def test_times_are_the_minimum_of_path_length_over_speed(seed: int, n: int, spee
     distances = COST.geodesics.compute_distances(COST.points[sites], robots)
     times = distances / speed
     np.testing.assert_allclose(result.times[sites], times.min(axis=1), rtol=1e-6)
-    owner = result.owner[sites]
+    owner = result.owners[sites]
     np.testing.assert_allclose(times[np.arange(30), owner], times.min(axis=1), rtol=1e-6)
     np.testing.assert_allclose(result.distances[sites], distances[np.arange(30), owner], rtol=1e-6)
     assert result.mean_time == pytest.approx(result.times.mean(), rel=1e-12)
@@ -45,7 +45,7 @@ def test_equal_speeds_only_change_the_unit(seed: int, n: int, speed: float) -> N
     robots = draw_positions(n, np.random.default_rng(seed))
     plain = COST(robots)
     timed = COST(robots, speeds=np.full(n, speed))
-    np.testing.assert_array_equal(timed.owner, plain.owner)
+    np.testing.assert_array_equal(timed.owners, plain.owners)
     np.testing.assert_array_equal(timed.distances, plain.distances)
     assert timed.mean_distance == plain.mean_distance
     assert timed.mean_time == pytest.approx(plain.mean_distance / speed, rel=1e-12)
@@ -66,7 +66,7 @@ def test_the_gradient_is_that_of_the_value(seed: int) -> None:
     shift[i, axis] = step
     low = COST(robots - shift, speeds=speeds)
     high = COST(robots + shift, speeds=speeds)
-    if (low.owner == high.owner).all() and (low.first_corner == high.first_corner).all():
+    if (low.owners == high.owners).all() and (low.first_corners == high.first_corners).all():
         slope = (high.value - low.value) / (2 * step)
         assert slope == pytest.approx(result.gradient[i, axis], abs=1e-4)
 
@@ -75,7 +75,7 @@ def test_of_robots_that_arrive_together_the_fastest_owns_the_site() -> None:
     """Robot 0 needs 0.5 s for 0.25 m, robot 1 needs 0.5 s for 0.5 m."""
     site = ROOM.points[16 * 32 + 12]
     result = ROOM([site - [0.25, 0.0], site + [0.5, 0.0]], speeds=np.array([0.5, 1.0]))
-    assert result.owner[16 * 32 + 12] == 1
+    assert result.owners[16 * 32 + 12] == 1
     assert result.distances[16 * 32 + 12] == 0.5
     assert result.times[16 * 32 + 12] == 0.5
 
@@ -83,7 +83,7 @@ def test_of_robots_that_arrive_together_the_fastest_owns_the_site() -> None:
 def test_a_fast_robot_owns_sites_that_are_nearer_to_a_slow_one() -> None:
     robots = np.array([[0.4, 0.5], [0.6, 0.5]])
     result = ROOM(robots, speeds=np.array([0.1, 1.0]))
-    assert (result.owner == 0).mean() < 0.05
+    assert (result.owners == 0).mean() < 0.05
     assert result.mean_time is not None
     assert result.mean_time < ROOM(robots[1:], speeds=np.ones(1)).mean_time
     assert result.mean_distance > ROOM(robots).mean_distance
@@ -93,7 +93,7 @@ def test_a_fast_robot_owns_sites_that_are_nearer_to_a_slow_one() -> None:
 def test_rooms_without_a_robot_are_uncovered_for_any_speed() -> None:
     halves = CoverageCost(build_environment(((0.45, 0.0), (0.55, 0.0), (0.55, 1.0), (0.45, 1.0))), lattice=20)
     result = halves([[0.2, 0.5], [0.3, 0.5]], speeds=[1.0, 2.0])
-    assert np.isinf(result.times[result.owner < 0]).all()
+    assert np.isinf(result.times[result.owners < 0]).all()
     assert result.uncovered_area == pytest.approx(0.45)
     assert result.value == pytest.approx(result.mean_time * 0.45)
 

@@ -79,8 +79,8 @@ def test_rooms_without_a_robot_are_reported_as_uncovered():
     assert both.uncovered_area == 0.0
     in_left = cost.points[:, 0] < 3.0
     np.testing.assert_array_equal(np.isfinite(left.distances), in_left)
-    np.testing.assert_array_equal(left.owner, np.where(in_left, 0, -1))
-    assert (left.first_corner[~in_left] == -1).all()
+    np.testing.assert_array_equal(left.owners, np.where(in_left, 0, -1))
+    assert (left.first_corners[~in_left] == -1).all()
     assert left.mean_distance == left.distances[in_left].mean()
     assert left.value == pytest.approx(left.mean_distance * 24.0)
     assert both.value == pytest.approx(both.distances.mean() * 56.0)
@@ -97,7 +97,7 @@ def test_a_room_too_small_for_a_site_has_no_mean():
     result = cost([[0.05, 0.05]])
     assert np.isnan(result.mean_distance)
     assert np.isnan(result.value)
-    assert (result.owner == -1).all()
+    assert (result.owners == -1).all()
     assert result.gradient.tolist() == [[0.0, 0.0]]
 
 
@@ -108,7 +108,7 @@ def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n):
     result = cost(robots)
     distances = cost.geodesics.compute_distances(robots, cost.points)
     np.testing.assert_allclose(result.distances, distances.min(axis=0), rtol=0, atol=1e-12)
-    distances_of_owners = distances[result.owner, np.arange(len(cost.points))]
+    distances_of_owners = distances[result.owners, np.arange(len(cost.points))]
     np.testing.assert_allclose(distances_of_owners, result.distances, rtol=0, atol=1e-12)
 
 
@@ -118,7 +118,7 @@ def test_first_waypoints_are_those_of_the_shortest_paths():
     result = cost(robots)
     for site in range(len(cost.points)):
         path = cost.find_path(robots, cost.points[site])
-        np.testing.assert_allclose(path[-1], robots[result.owner[site]], atol=1e-12)
+        np.testing.assert_allclose(path[-1], robots[result.owners[site]], atol=1e-12)
         np.testing.assert_allclose(path[-2], result.first_waypoints[site], atol=1e-12)
 
 
@@ -166,7 +166,7 @@ def test_results_do_not_depend_on_earlier_calls():
     other_results = [other_cost(team) for team in reversed(teams)]
     for result, other in zip(results, reversed(other_results), strict=True):
         assert result.value == other.value
-        for name in ("distances", "owner", "first_waypoints", "gradient"):
+        for name in ("distances", "owners", "first_waypoints", "gradient"):
             np.testing.assert_array_equal(getattr(result, name), getattr(other, name))
 
 
@@ -189,7 +189,7 @@ def test_the_cost_scales_and_moves_with_the_map(scale, shift):
 
 def test_coincident_robots_give_the_site_to_the_first():
     result = CoverageCost(PILLAR, lattice=16)([[0.1, 0.1], [0.9, 0.9], [0.1, 0.1], [0.9, 0.9]])
-    assert set(result.owner.tolist()) == {0, 1}
+    assert set(result.owners.tolist()) == {0, 1}
 
 
 def test_errors_name_robots_outside_the_free_space():
@@ -229,12 +229,12 @@ def test_sealed_rooms_without_a_corner():
     robots = np.array([[2.9, 4.0], [7.0, 7.0]])
     result = cost(robots)
     is_left = cost.points[:, 0] < 4.0
-    np.testing.assert_array_equal(result.owner, np.where(is_left, 0, 1))
-    expected = np.hypot(*(cost.points - robots[result.owner]).T)
+    np.testing.assert_array_equal(result.owners, np.where(is_left, 0, 1))
+    expected = np.hypot(*(cost.points - robots[result.owners]).T)
     np.testing.assert_allclose(result.distances, expected, rtol=0, atol=1e-12)
     result = cost(robots[:1])
     assert result.uncovered_area == pytest.approx(24.0)
-    np.testing.assert_array_equal(result.owner, np.where(is_left, 0, -1))
+    np.testing.assert_array_equal(result.owners, np.where(is_left, 0, -1))
 
 
 def test_results_have_a_short_repr(empty: Environment) -> None:

@@ -21,7 +21,7 @@ def assert_results_are_equal(result, expected):
     assert result.mean_distance == expected.mean_distance
     assert result.value == expected.value
     assert result.uncovered_area == expected.uncovered_area
-    for name in ("positions", "distances", "owner", "first_corner", "last_corner", "gradient"):
+    for name in ("positions", "distances", "owners", "first_corners", "last_corners", "gradient"):
         np.testing.assert_array_equal(getattr(result, name), getattr(expected, name))
 
 

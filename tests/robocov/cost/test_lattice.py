@@ -33,8 +33,8 @@ def test_the_sites_are_the_free_cell_centers_row_by_row():
 @pytest.mark.parametrize("side", [1, 3, 20, 37])
 def test_tiles_are_squares_of_cells(side):
     sites, tiles = build_lattice(Geodesics(build_environment()), side)
-    tile, slot = np.nonzero(tiles.site >= 0)
-    number = tiles.site[tile, slot]
+    tile, slot = np.nonzero(tiles.sites >= 0)
+    number = tiles.sites[tile, slot]
     points = np.column_stack([tiles.x[tile, slot], tiles.y[tile, slot]])
     np.testing.assert_array_equal(np.sort(number), np.arange(len(sites.cells)))
     # Each tile contains the sites of one square, and each square belongs to one tile.
@@ -56,5 +56,5 @@ def test_a_lattice_without_a_free_cell_is_rejected():
 
 def test_values_of_sites_are_arranged_as_an_image_of_the_lattice():
     cost = CoverageCost(build_environment(CircleObstacle((4.5, 1.5), 0.4)), 4)
-    image = cost.to_grid(cost([[2.5, 1.5]]).owner)
+    image = cost.to_grid(cost([[2.5, 1.5]]).owners)
     assert image.tolist() == [[0, 0, -1, 0], [0] * 4, [0] * 4, [-1] * 4]

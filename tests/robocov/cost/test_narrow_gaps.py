@@ -26,7 +26,7 @@ ROBOT = np.array([[3.0, 3.0]])
 def test_area_behind_a_crack_is_uncovered() -> None:
     result = CoverageCost(CRACKED, 32)(ROBOT)
     assert result.uncovered_area == pytest.approx(SMALL_ROOM_M2, abs=0.03)
-    assert (result.owner[result.points[:, 0] > 7.1] == -1).all()
+    assert (result.owners[result.points[:, 0] > 7.1] == -1).all()
     assert result.environment is CRACKED
     assert result.mean_distance == pytest.approx(CoverageCost(SEALED, 32)(ROBOT).mean_distance)
 
@@ -35,7 +35,7 @@ def test_area_behind_a_crack_is_uncovered() -> None:
 def test_smaller_robots_cover_it(radius: float) -> None:
     result = CoverageCost(CRACKED, 32, radius=radius)(ROBOT)
     assert result.uncovered_area == 0.0
-    assert (result.owner == 0).all()
+    assert (result.owners == 0).all()
 
 
 def test_density_keeps_the_gaps_closed() -> None:

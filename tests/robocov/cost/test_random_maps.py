@@ -110,7 +110,7 @@ def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, see
     cost(draw_positions(environment, 5, seed + 1))
     repeated = cost(robots)
     by_new_cost = CoverageCost(environment, 24)(robots)
-    for name in ("distances", "owner", "first_corner", "last_corner", "gradient"):
+    for name in ("distances", "owners", "first_corners", "last_corners", "gradient"):
         np.testing.assert_array_equal(getattr(repeated, name), getattr(first, name))
         np.testing.assert_array_equal(getattr(by_new_cost, name), getattr(first, name))
     reversed_order = cost(robots[::-1])
@@ -148,8 +148,8 @@ def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
 
 def have_same_paths(first, second):
     """Return whether owners and first corners of two results are the same."""
-    has_same_owners = np.array_equal(first.owner, second.owner)
-    return has_same_owners and np.array_equal(first.first_corner, second.first_corner)
+    has_same_owners = np.array_equal(first.owners, second.owners)
+    return has_same_owners and np.array_equal(first.first_corners, second.first_corners)
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())

@@ -26,9 +26,9 @@ def compute_owners(side, positions):
     grid = cost.geodesics.grid
     offsets = grid.snap(cost.points)[:, None] - grid.snap(result.positions)
     squares = (offsets**2).sum(axis=2)
-    np.testing.assert_array_equal(result.owner, squares.argmin(axis=1))
-    np.testing.assert_array_equal(result.distances, np.sqrt(squares.min(axis=1)) * grid.unit)
-    return result.owner
+    np.testing.assert_array_equal(result.owners, squares.argmin(axis=1))
+    np.testing.assert_array_equal(result.distances, np.sqrt(squares.min(axis=1)) * grid.spacing)
+    return result.owners
 
 
 lattice_points = st.tuples(st.integers(0, 8), st.integers(0, 8)).map(lambda point: np.array(point) / 8)
@@ -88,8 +88,8 @@ def test_the_first_of_coincident_robots_owns_sites_around_corners():
     positions = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
     result = cost(positions)
     doubled = cost(np.concatenate([positions, positions]))
-    assert (result.first_corner >= 0).any()
-    for name in ("owner", "distances", "first_corner", "last_corner"):
+    assert (result.first_corners >= 0).any()
+    for name in ("owners", "distances", "first_corners", "last_corners"):
         np.testing.assert_array_equal(getattr(doubled, name), getattr(result, name))
 
 
@@ -106,7 +106,8 @@ office = Environment("office", OFFICE.boundary, OFFICE.obstacles, density=densit
 cost = CoverageCost(office, 12)
 for speeds in (None, np.array([0.3, 0.7, 0.3])):
     result = cost(np.array([[1.0, 1.0], [10.0, 1.0], [5.5, 7.3]]), speeds)
-    numbers = [result.value, result.mean_distance, *result.distances, *result.gradient.ravel(), *result.owner]
+    means = [result.value, result.mean_distance]
+    numbers = [*means, *result.distances, *result.gradient.ravel(), *result.owners]
     print(*(float(number).hex() for number in numbers))
 """
 

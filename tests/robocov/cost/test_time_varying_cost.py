@@ -36,7 +36,7 @@ def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
     assert result is not None
     np.testing.assert_array_equal(result.positions, ROBOTS)
     # The first robot is run over at this time, and the last one has failed.
-    assert set(result.owner.tolist()) == {1}
+    assert set(result.owners.tolist()) == {1}
     assert (
         result.mean_distance
         == time_varying_cost.compute_summary(0.0, ROBOTS, working).mean_distance
@@ -44,7 +44,7 @@ def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
     )
     later = time_varying_cost.evaluate_all_robots(2.0, ROBOTS)
     assert later is not None
-    assert set(later.owner.tolist()) == {0, 1}
+    assert set(later.owners.tolist()) == {0, 1}
     assert time_varying_cost.evaluate_all_robots(0.0, ROBOTS[:1]) is None
 
 

@@ -74,7 +74,7 @@ def test_the_index_contains_only_walls_within_reach():
     target = np.array([0.9, 0.5]) * STEPS_PER_METER
     for reach, has_walls in ((0.05, False), (0.31, True)):
         index = build_index(geodesics, [source], reach * STEPS_PER_METER)
-        assert (index.head >= 0).any() == has_walls
+        assert (index.heads >= 0).any() == has_walls
         assert not compute_visibility(geodesics, index, [target])
 
 
@@ -92,8 +92,8 @@ def test_each_bin_is_checked_once_however_long_the_box_is():
     """The angle of a long box next to a source is estimated to be many turns."""
     index = AngularWallIndex.allocate(1, 8, 1)
     index.positions[:] = 0.0
-    index.squared_horizon[:] = 0.0
+    index.squared_horizons[:] = 0.0
     boxes = np.array([[-(2.0**30), 1.0, 2.0**30, 1.0]])
     assert is_box_hidden(boxes, 0, index, 0)
-    index.squared_horizon[0, 5] = 2.0
+    index.squared_horizons[0, 5] = 2.0
     assert not is_box_hidden(boxes, 0, index, 0)

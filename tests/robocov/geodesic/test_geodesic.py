@@ -159,7 +159,7 @@ def test_the_cost_agrees_with_brute_force(environment, data):
     is_compared = [brute.is_well_placed(environment.free, point, 8.0) for point in cost.points]
     expected = brute.compute_distances(environment.free, robots, cost.points).min(axis=0)
     np.testing.assert_allclose(result.distances[is_compared], expected[is_compared], rtol=0, atol=8e-12)
-    assert ((result.owner >= 0) == np.isfinite(result.distances)).all()
+    assert ((result.owners >= 0) == np.isfinite(result.distances)).all()
 
 
 @settings(max_examples=60, deadline=None)

@@ -64,7 +64,7 @@ def test_collinear_vertices_are_no_corners():
 def test_a_pinch_has_two_narrow_sectors_and_no_corner(touching):
     pinch = build_walls_around(build_ring(3, 3, 5, 5), touching)
     vertex = find_vertex(pinch.vertices, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
-    sectors = slice(pinch.first_sector[vertex], pinch.first_sector[vertex + 1])
+    sectors = slice(pinch.sector_starts[vertex], pinch.sector_starts[vertex + 1])
     assert len(pinch.sector_walls[sectors]) == 2
     assert (5.0, 5.0) not in list_corners(pinch)
     assert not pinch.sector_is_corner[sectors].any()
@@ -136,6 +136,6 @@ def test_the_side_of_a_line_is_exact(ux, uy, offset_x, offset_y, multiple, wx, w
 def test_the_grid_keeps_dyadic_numbers():
     grid = Grid.from_square(np.array([-3.0, 5.0]), 10.0)
     points = np.array([[-2.875, 5.5], [7.0, 14.99]])
-    assert grid.unit == 2.0**-44
-    np.testing.assert_allclose(grid.to_meters(grid.snap(points)), points, rtol=0, atol=grid.unit)
+    assert grid.spacing == 2.0**-44
+    np.testing.assert_allclose(grid.to_meters(grid.snap(points)), points, rtol=0, atol=grid.spacing)
     np.testing.assert_array_equal(grid.to_meters(grid.snap(points))[0], points[0])

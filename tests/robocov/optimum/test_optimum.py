@@ -118,7 +118,7 @@ def run_lloyd_on_sites(cost, positions):
     while True:
         moved = result.positions.copy()
         for robot in range(len(moved)):
-            cell = np.nonzero(result.owner == robot)[0]
+            cell = np.nonzero(result.owners == robot)[0]
             if len(cell):
                 moved[robot] = cost.points[distances[:, cell].sum(axis=1).argmin()]
         after = cost(moved)

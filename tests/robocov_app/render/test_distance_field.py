@@ -114,10 +114,10 @@ def test_fields_with_moving_obstacles_depend_on_time():
     robots = np.array([[1.0, 3.0], [2.0, 5.0]])
     x = np.array([1.95, 2.05])
     y = np.array([1.05, 0.95])
-    assert fields.compute_at(robots).result.owner.max() == 1
+    assert fields.compute_at(robots).result.owners.max() == 1
     # at four seconds it stands on the second robot, where the other cannot be either
     later = fields.compute_at(robots, 4.0)
-    assert set(later.result.owner.tolist()) == {0}
+    assert set(later.result.owners.tolist()) == {0}
     exact = np.hypot(*(np.array([1.95, 1.05]) - robots[0]))
     assert later.compute_distances(x, y)[0, 0] == pytest.approx(exact, abs=1e-9)
     assert fields.compute_at(robots[1:], 4.0) is None
@@ -135,7 +135,7 @@ def test_no_distance_leaks_through_a_wall():
     opened = x < 5.85 - cost.spacing
     assert np.isfinite(distance[:, opened]).all()
     assert not closed[borders.columns].any()
-    reached = field.result.distances[field.result.owner >= 0]
+    reached = field.result.distances[field.result.owners >= 0]
     assert field.max_distance == reached.max() < 6.0
 
 

@@ -202,7 +202,7 @@ def test_a_robot_under_a_moving_obstacle_owns_no_site():
     costs.request(0, 0.0, over, np.array([5.5, 3.5]))
     ((_, known),) = costs.poll()
     np.testing.assert_array_equal(known.result.positions, over)
-    assert set(known.result.owner.tolist()) == {1}
+    assert set(known.result.owners.tolist()) == {1}
     assert known.result.mean_distance == CoverageCost(CROSSED.at(0.0), 32)(over[1:]).mean_distance
     np.testing.assert_array_equal(known.path[-1], over[1])
     # There is no other robot.

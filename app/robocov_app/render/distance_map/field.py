@@ -91,8 +91,8 @@ class DistanceField:
     def __init__(self, lattice: FieldLattice, result: CoverageResult) -> None:
         self.lattice = lattice
         self.result = result
-        owners = result.owner
-        last_corners = result.last_corner
+        owners = result.owners
+        last_corners = result.last_corners
         # The last bend of the path to each site, or the position of its robot.
         bends = result.positions[owners]
         is_bent = last_corners >= 0

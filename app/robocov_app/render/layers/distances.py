@@ -159,7 +159,7 @@ def _draw_unreached_symbol(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _has_unreached_sites(scene: Scene) -> bool:
-    return scene.field is not None and bool((scene.field.result.owner < 0).any())
+    return scene.field is not None and bool((scene.field.result.owners < 0).any())
 
 
 _build_unreached_legend = build_legend(legend.UNREACHED, _draw_unreached_symbol, _has_unreached_sites)

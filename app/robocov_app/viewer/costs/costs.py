@@ -297,9 +297,9 @@ class _CostCodec(Codec):
             return self._shared
         result = replace(
             answer.result,
-            owner=answer.result.owner.astype(np.intp),
-            first_corner=answer.result.first_corner.astype(np.intp),
-            last_corner=answer.result.last_corner.astype(np.intp),
+            owners=answer.result.owners.astype(np.intp),
+            first_corners=answer.result.first_corners.astype(np.intp),
+            last_corners=answer.result.last_corners.astype(np.intp),
             points=self._shared.sites.points,
             corners=self._shared.corners,
             weights=self._shared.weights,
@@ -391,9 +391,9 @@ def _evaluate(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> 
     # Sending 32-bit integers takes half as long.
     result = replace(
         result,
-        owner=result.owner.astype(np.int32),
-        first_corner=result.first_corner.astype(np.int32),
-        last_corner=result.last_corner.astype(np.int32),
+        owners=result.owners.astype(np.int32),
+        first_corners=result.first_corners.astype(np.int32),
+        last_corners=result.last_corners.astype(np.int32),
         points=np.empty((0, 2)),
         corners=np.empty((0, 2)),
         weights=None,

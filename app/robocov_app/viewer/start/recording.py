@@ -111,7 +111,7 @@ def _build_owner_grid(environment: Environment, result: Any) -> IntArray:
     grid = np.full((rows, columns), -1)
     column = ((result.points[:, 0] - low_x) / spacing).astype(int).clip(0, columns - 1)
     row = ((high_y - result.points[:, 1]) / spacing).astype(int).clip(0, rows - 1)
-    grid[row, column] = result.owner
+    grid[row, column] = result.owners
     nearest = distance_transform_edt(grid < 0, return_distances=False, return_indices=True)
     filled: IntArray = grid[tuple(nearest)]
     return filled

@@ -108,7 +108,7 @@ def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Po
         if is_in_map:
             return "inside an obstacle"
         return "outside the map"
-    row = int(result.owner[site])
+    row = int(result.owners[site])
     numbers = viewer.session.displayed.get_setup(pane).numbers
     if not 0 <= row < len(numbers):
         return "out of reach of all robots"
