@@ -12,6 +12,7 @@ from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, is_plan_due
 from robocov.controllers.density_exchange import (
     MeasurementExchange,
+    MeasurementMemory,
     MessageLists,
     ParameterExchange,
     add_received_measurements,
@@ -33,30 +34,22 @@ _NOISE_VARIANCE = 1e-3
 """Variance of a measurement, relative to that of the prior."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AdaptiveMemory:
-    """Memory of the robots: what each of them knows of the density."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class AdaptiveMemory(MeasurementMemory):
+    """Memory of the robots, with the density as each robot estimates it."""
 
-    team: Team
     lattice: Lattice
     estimates: Array
     """(n, k) Estimates of φ at the samples of the lattice."""
     parameters: Array
     """(n, m) a, weights of the basis functions."""
-    information: Array
-    """(n, m, m) s, Λ."""
-    projections: Array
-    """(n, m) s, λ."""
-    measurements: Array
-    """(n, s) Measurements of φ in the squares, also those of other robots; nan if there is none."""
+    information_matrices: Array
+    """(n, m, m) s, Λ, integrals of K K^T along the paths of the robots."""
+    information_vectors: Array
+    """(n, m) s, λ, integrals of K φ along the paths of the robots."""
     has_new_measurements: BoolArray
-    """(n,) Whether the measurements of each robot have changed since its latest estimate."""
+    """(n,) Whether measurements of others have arrived since the last estimate of each robot."""
     parameter_exchange: ParameterExchange
-    measurement_exchange: MeasurementExchange
-    goals: Array | None = None
-    """(n, 2) m"""
-    plan_time: float = -np.inf
-    """Time of the latest estimate, s."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +57,13 @@ class Adaptive(BaseController):
     """Lloyd's algorithm with a density that is learned (Schwager, Rus and Slotine, IJRR 28, 2009).
 
     A robot measures the density only at its own position. It estimates the density everywhere from its own
-    measurements and from the messages of others, and moves to the centroid of its Voronoi cell under that
-    estimate. It does not explore: where no robot has been, the estimate stays close to `prior`.
+    measurements and from the messages of others, and moves to the centroid of its Voronoi cell, weighted by
+    the estimated density. It does not explore: where no robot has been, the estimate stays close to `prior`.
 
     With ``estimate="basis"``, the estimate is a sum of Gaussians as in the paper, and robots send each other
-    their parameters: 4 + 8 `basis`² bytes every `period` seconds. With ``estimate="gp"``, it is the mean of a
-    Gaussian process, and robots send each other measurements, their own and received ones: at most 50 every
-    `period` seconds, 4 + 10 k bytes for k measurements. Both have the information "shared map";
+    its parameters: 4 + 8 `basis`² bytes every `period` seconds. With ``estimate="gp"``, the estimate is the
+    mean of a Gaussian process, and robots send each other measurements, their own and received ones: at most
+    50 every `period` seconds, 4 + 10 k bytes for k measurements. Both have the information "shared map";
     `robocov.controllers.density_exchange` describes the messages. Obstacles are not known; robots slide along
     them as with `Lloyd`.
 
@@ -78,9 +71,9 @@ class Adaptive(BaseController):
 
     Notes
     -----
-    *Basis functions.* The estimate of robot i is K(q)·a_i. K are Gaussians on a grid of `basis` by `basis`,
-    divided by their sum, so a constant density is represented exactly. At its position p_i, in its cell
-    V_i with the centroid C_i, robot i learns by
+    *Basis functions.* The estimate of robot i is K(q)·a_i. The components of K are Gaussians, centered on a
+    grid of `basis` by `basis` points and divided by their sum, so that a constant density is represented
+    exactly. At its position p_i, in its cell V_i with the centroid C_i, robot i learns by
 
         dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
@@ -91,9 +84,9 @@ class Adaptive(BaseController):
 
     *Gaussian process.* One measurement is stored for each of 20 by 20 squares, as if taken at its center. The
     kernel is the squared exponential with the length `correlation`, as in Luo and Sycara (ICRA 2018) and
-    Santos, Diaz-Mercado and Egerstedt (2018), without their mixtures and bounds. With `explore` above 0, that
-    many standard deviations are added to the mean, so robots are drawn to unvisited places. This
-    takes several times as long to compute.
+    Santos, Diaz-Mercado and Egerstedt (2018), without their mixtures and bounds. The estimate is the mean
+    plus `explore` standard deviations: with a positive number, robots are attracted by unvisited areas, and
+    the computation takes several times as long.
 
     The implementation is based on summaries of the papers, not on their full texts. It differs from the
     paper as follows: implicit steps of `period` seconds, which are stable for all gains; cells and centroids
@@ -146,8 +139,8 @@ class Adaptive(BaseController):
             lattice=lattice,
             estimates=np.full((robot_count, sample_count), self.prior),
             parameters=np.full((robot_count, function_count), self.prior),
-            information=np.zeros((robot_count, function_count, function_count)),
-            projections=np.zeros((robot_count, function_count)),
+            information_matrices=np.zeros((robot_count, function_count, function_count)),
+            information_vectors=np.zeros((robot_count, function_count)),
             measurements=np.full((robot_count, len(lattice.squares)), np.nan),
             has_new_measurements=np.zeros(robot_count, dtype=bool),
             parameter_exchange=ParameterExchange.build_empty(robot_count),
@@ -183,7 +176,7 @@ class Adaptive(BaseController):
         )
 
     def _send(self, seen: Observations, memory: AdaptiveMemory) -> tuple[AdaptiveMemory, MessageLists]:
-        """Return the memory after the robots sent what they can send in this step, and the messages."""
+        """Return the memory after this step's messages have been sent, and the messages."""
         if self.estimate == "basis":
             parameter_exchange, messages = memory.parameter_exchange.send(seen, memory.parameters)
             return replace(memory, parameter_exchange=parameter_exchange), messages
@@ -191,7 +184,7 @@ class Adaptive(BaseController):
         return replace(memory, measurement_exchange=measurement_exchange), messages
 
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with new estimates, and with the centroids of the cells under them as goals."""
+        """Return the memory with new estimates, and with the centroids of the cells as goals."""
         samples = memory.lattice.samples
         pairs = seen.find_near_neighbors(np.inf)
         neighbor_positions = seen.positions[pairs.robot] - pairs.offset
@@ -206,7 +199,7 @@ class Adaptive(BaseController):
     def _learn_by_basis(
         self, seen: Observations, memory: AdaptiveMemory, is_own: BoolArray
     ) -> AdaptiveMemory:
-        """Return the memory after one implicit step of the adaptation law in the notes of `Adaptive`.
+        """Return the memory after one implicit step of the equations in the notes of `Adaptive`.
 
         Parameters
         ----------
@@ -219,35 +212,36 @@ class Adaptive(BaseController):
         exchange = memory.parameter_exchange.forget_silent_robots(seen.neighbors)
         dt = self.period
         functions = lattice.evaluate_basis(seen.positions)
-        # Λ is `information`, λ is `projections`.
-        information = memory.information + dt * functions[:, :, None] * functions[:, None]
-        projections = memory.projections + dt * functions * _measure(seen)[:, None]
+        # These are Λ and λ, after one step of the first two equations.
+        matrices = memory.information_matrices + dt * functions[:, :, None] * functions[:, None]
+        vectors = memory.information_vectors + dt * functions * _measure(seen)[:, None]
         goals = compute_sample_centroids(is_own, lattice.samples, memory.estimates, seen.positions)
-        # P (C - p) is the integral of K (q - p)·(C - p) over the samples q of the cell.
+        # P (C - p) is the integral over the cell of K(q) (q - p)·(C - p), here a sum over samples q.
         offsets = lattice.samples - seen.positions[:, None]
         moments = is_own * (offsets * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.sample_area
         coupling = _multiply(moments, lattice.functions)
-        # With da/dt = drive - decay a, an implicit step solves (1 + dt decay) a' = a + dt drive.
+        # The equation has the form da/dt = drive - decay a. An implicit step solves
+        # (1 + dt decay) a' = a + dt drive, which is stable for all gains.
         drive = (
-            self.learning * projections
+            self.learning * vectors
             + self.consensus * exchange.compute_means(memory.parameters)
             + self.coupling * coupling
         )
         identity = np.eye(memory.parameters.shape[1])
-        decay = self.learning * information + self.consensus * identity
+        decay = self.learning * matrices + self.consensus * identity
         parameters = _solve(identity + dt * decay, memory.parameters + dt * drive)
         parameters = np.maximum(parameters, self.least)
         return replace(
             memory,
             estimates=_multiply(parameters, lattice.functions.T),
             parameters=parameters,
-            information=information,
-            projections=projections,
+            information_matrices=matrices,
+            information_vectors=vectors,
             parameter_exchange=exchange.start_period(),
         )
 
     def _learn_by_gaussian_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with the robots' new measurements, and estimates from all known measurements."""
+        """Return the memory after each robot has measured, with estimates from all known measurements."""
         lattice = memory.lattice
         values = _measure(seen)
         measurements = memory.measurements.copy()
@@ -281,13 +275,14 @@ class Adaptive(BaseController):
         weights = scipy.linalg.cho_solve(factor, measurements[is_known] - self.prior)
         estimate = self.prior + lattice.sample_covariance[:, is_known] @ weights
         if self.explore:
-            # The standard deviation at a sample is taken from the nearest square. Row i of `cross_covariance`
-            # contains the covariances of square i and the squares with a measurement.
+            # The posterior variance of square i is 1 - c_i^T C^-1 c_i: row i of `cross_covariance`, c_i,
+            # contains the covariances with the measured squares, and C is the noisy covariance of these.
             cross_covariance = lattice.square_covariance[:, is_known]
             solution = scipy.linalg.cho_solve(factor, cross_covariance.T).T
-            variance = np.maximum(1.0 - (cross_covariance * solution).sum(axis=1), 0.0)
+            variances = np.maximum(1.0 - (cross_covariance * solution).sum(axis=1), 0.0)
+            # A sample has the standard deviation of the nearest square: the one with the largest covariance.
             nearest_square = lattice.sample_covariance.argmax(axis=1)
-            estimate += self.explore * self.prior * np.sqrt(variance)[nearest_square]
+            estimate += self.explore * self.prior * np.sqrt(variances)[nearest_square]
         return np.asarray(estimate)
 
 
@@ -304,30 +299,33 @@ def _multiply(first: Array, second: Array) -> Array:
 
 @kernel
 def _solve(matrices: Array, right_sides: Array) -> Array:
-    """Return the solutions, (n, m), of symmetric positive definite systems, (n, m, m), by elimination.
+    """Solve n systems of m linear equations by Gaussian elimination, and return the solutions, (n, m).
 
-    They have the same bits on all processors, unlike those of LAPACK.
+    The results have the same bits on all processors, unlike those of LAPACK. The matrices, (n, m, m), must be
+    symmetric and positive definite, so that no pivoting is needed. The right-hand sides are (n, m).
     """
     matrices = matrices.copy()
     solutions = right_sides.copy()
     m = solutions.shape[1]
     for i in range(len(solutions)):
+        # Eliminate the elements below the diagonal.
         for k in range(m):
-            for r in range(k + 1, m):
-                factor = matrices[i, r, k] / matrices[i, k, k]
+            for row in range(k + 1, m):
+                factor = matrices[i, row, k] / matrices[i, k, k]
                 if factor != 0.0:
-                    solutions[i, r] -= factor * solutions[i, k]
-                    for c in range(k, m):
-                        matrices[i, r, c] -= factor * matrices[i, k, c]
-        for k in range(m - 1, -1, -1):
-            for c in range(k + 1, m):
-                solutions[i, k] -= matrices[i, k, c] * solutions[i, c]
-            solutions[i, k] /= matrices[i, k, k]
+                    solutions[i, row] -= factor * solutions[i, k]
+                    for column in range(k, m):
+                        matrices[i, row, column] -= factor * matrices[i, k, column]
+        # Substitute back, from the last row to the first.
+        for row in range(m - 1, -1, -1):
+            for column in range(row + 1, m):
+                solutions[i, row] -= matrices[i, row, column] * solutions[i, column]
+            solutions[i, row] /= matrices[i, row, row]
     return solutions
 
 
 def _measure(seen: Observations) -> Array:
-    """Return φ at the positions of the robots, (n,), the only values of φ that they may use."""
+    """Return φ at the positions of the robots, (n,). A robot may use no other values of φ."""
     if seen.density is None:
         return np.ones(len(seen.positions))
     return seen.density.evaluate(seen.positions)
@@ -335,7 +333,7 @@ def _measure(seen: Observations) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lattice:
-    """Samples of the region, and the values of basis functions and covariances at the samples."""
+    """Sample points of a region, basis functions, and squares with one measurement each."""
 
     samples: Array
     """(k, 2) m"""
@@ -350,9 +348,9 @@ class Lattice:
     squares: Array
     """(s, 2) m, centers of the squares with one measurement each."""
     sample_covariance: Array
-    """(k, s) Covariances of samples and squares."""
+    """(k, s) Covariances of φ at the samples and at the centers of the squares."""
     square_covariance: Array
-    """(s, s) Covariances of the squares."""
+    """(s, s) Covariances of φ at the centers of the squares."""
 
     @classmethod
     def build(cls, region: Region, basis: int, correlation: float) -> Lattice:
@@ -387,7 +385,7 @@ class Lattice:
         )
 
     def evaluate_basis(self, points: Array) -> Array:
-        """Return K at points, (n, m)."""
+        """Return the basis functions K at (n, 2) points, (n, m)."""
         return _evaluate_basis(points, self.centers, self.width)
 
 
@@ -408,6 +406,6 @@ def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
 
 
 def _compute_exponents(points: Array, others: Array, length: float) -> Array:
-    """Return half the squared distances of (k, 2) and (m, 2) points, in units of a length, (k, m)."""
+    """Return d² / (2 length²) for the distances d of (k, 2) points from (m, 2) others, (k, m)."""
     squared_distances = ((points[:, None] - others) ** 2).sum(axis=2)
     return np.asarray(squared_distances / (2.0 * length * length))

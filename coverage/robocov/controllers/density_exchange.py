@@ -1,12 +1,14 @@
-"""Messages of robots that learn a density together: parameters of their estimates, or measurements.
+"""Messages of robots that learn a density together.
 
-Once in each learning period, robots send what they know, as far as the communication allows:
+Depending on the controller, a robot sends one of the following to its neighbors in each learning period, as
+far as the conditions of the communication allow:
 
 - *Parameters.* All m parameters of its estimate, in one message of 4 + 8 m bytes. A receiver uses the newest
   parameters from each neighbor until newer ones arrive, or until it forgets the neighbor.
-- *Measurements.* At most `MAX_SENT_MEASUREMENTS` of its own measurements and of those that it has received,
-  in messages of 4 + 10 k bytes for k measurements. Those that it has not sent yet come first, then those that
-  it sent longest ago. So lost messages are made up for, and robots that meet later receive all measurements.
+- *Measurements.* At most `MAX_SENT_MEASUREMENTS` of the measurements that it knows, its own and received
+  ones, in messages of 4 + 10 k bytes for k measurements. Measurements that it has not sent yet come first,
+  then those that it sent longest ago. In this way, measurements in lost messages are sent again, and robots
+  that meet later receive all measurements.
 """
 
 from __future__ import annotations
@@ -20,13 +22,14 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation import Message, Observations
 from robocov.observation.neighbors import Neighbors
+from robocov.team import Team
 
 HEADER_BYTES = 4
-"""Size of the number of the sender, at the start of a message."""
+"""Size of the index of the sender, at the start of a message."""
 PARAMETER_BYTES = 8
 """Size of a parameter."""
 MEASUREMENT_BYTES = 10
-"""Size of a measurement: 2 bytes for the number of its square, 8 for its value."""
+"""Size of a measurement: 2 bytes for the index of its square, 8 for its value."""
 MAX_SENT_MEASUREMENTS = 50
 """Maximum number of measurements that a robot sends in one learning period."""
 
@@ -36,14 +39,14 @@ MessageLists: TypeAlias = Sequence[Sequence[Message]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterExchange:
-    """Parameters that robots have received, and whether they still have to send their own. Immutable.
+    """Parameters that robots have received from others, and still have to send. Immutable.
 
     Attributes
     ----------
     received : tuple of mapping of int to (m,) array
         The newest parameters that each robot has received from others, by the index of the sender.
     is_unsent : (n,) bool array
-        Whether each robot has parameters that it has not sent yet.
+        Whether each robot still has to send its own parameters in this learning period.
     """
 
     received: tuple[Mapping[int, Array], ...]
@@ -72,8 +75,8 @@ class ParameterExchange:
         """Return the exchange without the parameters of robots that are no longer neighbors."""
         received = []
         for robot, known in enumerate(self.received):
-            heard = set(neighbors.list_neighbors(robot).tolist())
-            received.append(known if heard.issuperset(known) else _select_senders(known, heard))
+            senders = set(neighbors.list_neighbors(robot).tolist())
+            received.append(known if senders.issuperset(known) else _select_senders(known, senders))
         return replace(self, received=tuple(received))
 
     def compute_means(self, parameters: Array) -> Array:
@@ -96,16 +99,18 @@ class ParameterExchange:
         return means
 
     def send(self, seen: Observations, parameters: Array) -> tuple[ParameterExchange, MessageLists]:
-        """Send parameters that have not been sent yet, where the communication allows it.
+        """Send the parameters of all robots that have not sent theirs yet, and can send messages now.
 
         Parameters
         ----------
         seen : Observations
         parameters : (n, m) array
+            Parameters of the robots.
 
         Returns
         -------
         exchange : ParameterExchange
+            The exchange after these messages have been sent.
         messages : sequence of sequence of Message
         """
         if not self.is_unsent.any():
@@ -122,21 +127,21 @@ class Measurements(NamedTuple):
     """Content of a message with k measurements."""
 
     squares: IntArray
-    """(k,) Numbers of the squares."""
+    """(k,) Indices of the squares."""
     values: Array
-    """(k,) φ in the squares."""
+    """(k,) φ in these squares."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementExchange:
-    """When robots sent which measurements, and how many they may still send. Immutable.
+    """Times at which robots last sent each measurement, and the numbers that they may still send. Immutable.
 
     Attributes
     ----------
     sent_times : (n, s) array, s
-        When each robot last sent the measurement in each square; -inf if it never did.
+        Time at which each robot last sent the measurement in each square; -inf if it never did.
     allowances : (n,) int array
-        How many measurements each robot may still send in this learning period.
+        Number of measurements that each robot may still send in this learning period.
     """
 
     sent_times: Array
@@ -173,6 +178,7 @@ class MeasurementExchange:
         Returns
         -------
         exchange : MeasurementExchange
+            The exchange after these messages have been sent.
         messages : sequence of sequence of Message
         """
         if not self.allowances.any():
@@ -193,7 +199,7 @@ class MeasurementExchange:
         return replace(self, sent_times=sent_times, allowances=allowances), messages
 
     def _count_measurements_to_send(self, seen: Observations, robot: int) -> int:
-        """Return how many measurements a robot sends in this step: at least one."""
+        """Return the number of measurements that a robot sends in this step: at least one."""
         allowance = int(self.allowances[robot])
         if seen.send_limits is None:
             return allowance
@@ -201,10 +207,25 @@ class MeasurementExchange:
         return min(allowance, max(1, fitting))
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MeasurementMemory:
+    """Memory of robots that exchange measurements, and move to goals that depend on them."""
+
+    team: Team
+    measurements: Array
+    """(n, s) Measurements of φ in the squares that each robot knows, also those of others; nan if unknown."""
+    measurement_exchange: MeasurementExchange
+    goals: Array | None = None
+    """(n, 2) m, goals in the last plan; None before the first one."""
+    plan_time: float = -np.inf
+    """Time of the last plan, s."""
+
+
 def add_received_measurements(seen: Observations, measurements: Array) -> Array:
     """Add the measurements that arrive in a step to those that the robots know.
 
-    A robot keeps the measurement that it has in a square. Messages with other contents are ignored.
+    In a square in which a robot already knows a measurement, it keeps this one. Messages with other contents
+    are ignored.
 
     Parameters
     ----------
@@ -230,11 +251,12 @@ def add_received_measurements(seen: Observations, measurements: Array) -> Array:
 
 
 def find_possible_senders(seen: Observations) -> BoolArray:
-    """Return which robots can send a message in this step, (n,)."""
+    """Return a mask, (n,), of the robots that can send a message in this step."""
     if seen.send_limits is None:
         return np.ones(len(seen.positions), dtype=bool)
     return np.asarray(seen.send_limits > 0)
 
 
 def _select_senders(received: Mapping[int, Array], senders: set[int]) -> dict[int, Array]:
+    """Return the parameters that a robot has received from the given senders."""
     return {sender: parameters for sender, parameters in received.items() if sender in senders}

@@ -180,10 +180,10 @@ def test_robots_use_nothing_that_was_sent_less_than_the_latency_ago(estimate: st
 def change_measurements(memory: AdaptiveMemory, robots: list[int]) -> AdaptiveMemory:
     """Return a memory in which some robots have measured and learned other values."""
     measurements = memory.measurements.copy()
-    projections = memory.projections.copy()
+    vectors = memory.information_vectors.copy()
     measurements[robots, 0] = 5.0
-    projections[robots] += 1.0
-    return replace(memory, measurements=measurements, projections=projections)
+    vectors[robots] += 1.0
+    return replace(memory, measurements=measurements, information_vectors=vectors)
 
 
 def test_lost_measurements_are_sent_again() -> None:

@@ -12,6 +12,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import BaseController, Information, is_plan_due
 from robocov.controllers.density_exchange import (
     MeasurementExchange,
+    MeasurementMemory,
     MessageLists,
     add_received_measurements,
     find_possible_senders,
@@ -25,10 +26,15 @@ from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
+NO_SQUARE = -1
+"""Index that stands for no square."""
 _ROUNDING_TOLERANCE = 1e-9
-"""Part of a square by which the region may exceed the grid because of rounding."""
+"""Fraction of a square by which the region may exceed the grid because of rounding."""
 _MIN_RELATIVE_MASS = 1e-6
-"""Lower limit of the mass of a square, relative to an unknown one: in an empty cell, robots spread evenly."""
+"""Lower limit of the mass of a square, relative to an unknown one.
+
+Without it, the centroid of a cell in which φ is zero would be undefined.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,53 +64,46 @@ class SquareGrid:
         centers = np.column_stack([x.ravel(), y.ravel()])
         return cls(centers=centers, is_inside=region.contains(centers), shape=(rows, columns), side=side)
 
-    def count_nearby(self, is_counted: BoolArray, reach: float) -> Array:
-        """Count squares around each square.
+    def count_nearby(self, is_counted: BoolArray, half_width: float) -> Array:
+        """Count the marked squares in a box around each square.
 
         Parameters
         ----------
         is_counted : (s,) bool array
-            Which squares count.
-        reach : float, m
-            Half the side of the box in which squares count.
+            Which squares are counted.
+        half_width : float, m
+            Half the width of the box.
 
         Returns
         -------
         (s,) array
         """
-        width = 2 * int(reach / self.side) + 1
+        width = 2 * int(half_width / self.side) + 1
+        # The number is the mean over the box times the number of squares in the box.
         mean = uniform_filter(is_counted.reshape(self.shape).astype(np.float64), width, mode="constant")
         return np.asarray(np.rint(mean * width**2).ravel())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ExploringMemory:
-    """Memory of the robots: what each of them knows of the density and of the team."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ExploringMemory(MeasurementMemory):
+    """Memory of the robots, with the last known positions of others, and the squares that they explore."""
 
-    team: Team
     grid: SquareGrid
-    measurements: Array
-    """(n, s) φ in the squares, measured by the robot or by others; nan where it is unknown."""
-    measurement_exchange: MeasurementExchange
     sightings: Sightings
     is_report_due: BoolArray
-    """(n,) Whether each robot still has to report its sightings."""
+    """(n,) Whether each robot still has to report its sightings in this period."""
     viewpoints: IntArray
-    """(n,) The square that each robot heads for to measure there; -1 for none."""
-    goals: Array | None = None
-    """(n, 2) m"""
-    plan_time: float = -np.inf
-    """Time of the latest plan, s."""
+    """(n,) Index of the square to which each robot moves to measure there, or `NO_SQUARE`."""
 
 
 @dataclass(frozen=True)
 class ExploringLloyd(BaseController):
     """Lloyd's algorithm for an unknown density, which robots sense, share and explore.
 
-    A robot measures the density only within its sensing range. Robots tell each other their measurements and
-    the last known positions of all robots, and pass on what they hear. A robot's cell is the part of the
-    region that is nearer to it than to any other robot that it knows of. As long as much of the cell's mass
-    may be where nobody has measured, the robot explores its cell; then it moves to the centroid.
+    A robot measures the density only within its sensing range. Robots send each other measurements and the
+    last known positions of all robots, their own and received ones. A robot's cell is the part of the region
+    that is nearer to it than to any other robot that it knows of. The robot explores its cell as long as
+    much of the cell's mass may be in squares without a measurement. Then it moves to the centroid.
 
     The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
 
@@ -115,7 +114,8 @@ class ExploringLloyd(BaseController):
     prior : float
         Density of unknown squares, relative to the mean of the known ones.
     exploration : float
-        Fraction of the mass of its cell that must be in unknown squares for a robot to explore; 1 for never.
+        Fraction of the mass of its cell that must be in unknown squares for a robot to explore it. With 1,
+        robots never explore.
     period : float, s
         Time between two plans.
     k_prop : float, 1/s
@@ -133,9 +133,9 @@ class ExploringLloyd(BaseController):
     *Masses.* The mass of a square is the density measured in it. For an unknown square, it is `prior` times
     the mean of all measurements that the robot knows.
 
-    *Exploration.* A robot heads for the unknown square of its cell from which it would see the most unknown
-    ones, relative to the distance. It keeps this viewpoint until the square is measured or belongs to the
-    cell of another robot.
+    *Exploration.* A robot moves to a viewpoint: the unknown square of its cell with the largest number of
+    unknown squares around it, within the sensing range, divided by the distance plus the sensing range. It
+    keeps this viewpoint until the square is measured or belongs to the cell of another robot.
 
     *Messages.* Once in each period, a robot sends at most 50 measurements, 4 + 10 k bytes for k of them
     (`robocov.controllers.density_exchange`), and the last known positions of k robots, 4 + 14 k bytes
@@ -180,7 +180,7 @@ class ExploringLloyd(BaseController):
             measurement_exchange=MeasurementExchange.build_empty(robot_count, square_count),
             sightings=Sightings.build_empty(robot_count),
             is_report_due=np.zeros(robot_count, dtype=bool),
-            viewpoints=np.full(robot_count, -1),
+            viewpoints=np.full(robot_count, NO_SQUARE),
         )
 
     def decide(self, seen: Observations, memory: ExploringMemory) -> Decision:
@@ -217,7 +217,7 @@ class ExploringLloyd(BaseController):
         for robot in range(len(goals)):
             is_unknown = is_own[robot] & np.isnan(measurements[robot])
             masses = self._estimate_masses(measurements[robot])
-            viewpoints[robot] = -1
+            viewpoints[robot] = NO_SQUARE
             if masses[is_unknown].sum() > self.exploration * masses[is_own[robot]].sum():
                 viewpoints[robot] = _choose_viewpoint(
                     grid,
@@ -247,16 +247,16 @@ class ExploringLloyd(BaseController):
         mean = 0.0
         if is_known.any():
             mean = float(measurements[is_known].mean())
-        # Where only zeros have been measured so far, the mass must be elsewhere.
+        # If only zeros have been measured so far, the mass must be in the unknown squares.
         unknown_mass = self.prior * mean if mean > 0.0 else self.prior
         masses = np.where(is_known, measurements, unknown_mass)
         return np.maximum(masses, _MIN_RELATIVE_MASS * unknown_mass)
 
 
 def _measure(seen: Observations, density: Density, memory: ExploringMemory) -> Array:
-    """Return the measurements, (n, s), with those that the robots make in this step.
+    """Return the measurements, (n, s), including those that the robots make in this step.
 
-    A robot measures φ at the centers of the squares within its sensing range, and nowhere else.
+    A robot measures φ only at the centers of the squares within its sensing range.
     """
     measurements = memory.measurements.copy()
     centers = memory.grid.centers
@@ -270,33 +270,33 @@ def _measure(seen: Observations, density: Density, memory: ExploringMemory) -> A
 def _choose_viewpoint(
     grid: SquareGrid, is_unknown: BoolArray, *, position: Array, previous: int, sensing_range: float
 ) -> int:
-    """Choose the square to which a robot moves next to measure there.
+    """Choose the square to which a robot moves next, to measure there.
 
     Parameters
     ----------
     grid : SquareGrid
     is_unknown : (s,) bool array
-        The squares of the robot's cell that nobody has measured; at least one.
+        The squares of the robot's cell in which it knows no measurement; at least one.
     position : (2,) array, m
         Position of the robot.
     previous : int
-        The previous viewpoint, or -1. It is kept as long as it is unknown.
+        The previous viewpoint, or `NO_SQUARE`. It is kept as long as it is unknown.
     sensing_range : float, m
 
     Returns
     -------
     int
     """
-    if previous >= 0 and is_unknown[previous]:
+    if previous != NO_SQUARE and is_unknown[previous]:
         return previous
     candidates = np.flatnonzero(is_unknown)
-    newly_seen = grid.count_nearby(is_unknown, sensing_range)[candidates]
+    counts = grid.count_nearby(is_unknown, sensing_range)[candidates]
     distances = np.sqrt(((grid.centers[candidates] - position) ** 2).sum(axis=1))
-    return int(candidates[np.argmax(newly_seen / (distances + sensing_range))])
+    return int(candidates[np.argmax(counts / (distances + sensing_range))])
 
 
 def _send(seen: Observations, memory: ExploringMemory) -> tuple[ExploringMemory, MessageLists]:
-    """Return the memory after the robots sent what they can send in this step, and the messages."""
+    """Return the memory after this step's messages have been sent, and the messages."""
     measurement_exchange, measurement_messages = memory.measurement_exchange.send(seen, memory.measurements)
     is_reporting = memory.is_report_due & find_possible_senders(seen)
     messages: list[list[Message]] = [[] for _ in is_reporting]

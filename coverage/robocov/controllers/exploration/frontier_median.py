@@ -1,4 +1,4 @@
-"""Coordinated exploration by frontiers, followed by placement at the k-median of the discovered map."""
+"""Exploration by frontiers, followed by placement of the robots at the k-median of the discovered map."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ from robocov.planning.discovered_map import FREE, UNKNOWN
 _INSPECTED_RADIUS_M = 0.5
 """Targets closer than this to an inspected target are not worth a visit."""
 _ARRIVAL_RADIUS_M = 0.3
-"""Distance from a target at which a robot inspects it."""
+"""Distance from a target at which a robot has inspected it."""
 _MIN_PROGRESS_M = 0.05
 """A robot that moves less between two plans is stuck."""
 _BLOCK = np.ones((3, 3), dtype=bool)
+"""A cell and its eight neighbors."""
 
 
 @dataclass(frozen=True)
@@ -101,16 +102,18 @@ class FrontierMedian(SharedMapController):
         planner = situation.planner
         window = planner.window
         labels = self._label_frontiers(situation)
-        row, column = np.nonzero(labels)
-        # One target for each block of a frontier.
-        block = row // window.stride * window.columns + column // window.stride
-        _, first = np.unique(labels[row, column] * len(planner.nodes) + block, return_index=True)
-        targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
+        rows, columns = np.nonzero(labels)
+        # Choose one target for each pair of a frontier and a block of cells that a node represents. Each pair
+        # is one number, so that the cells can be grouped by pair.
+        blocks = rows // window.stride * window.columns + columns // window.stride
+        pairs = labels[rows, columns] * len(planner.nodes) + blocks
+        _, first = np.unique(pairs, return_index=True)
+        targets = raster.compute_centers(rows[first] + window.first_row, columns[first] + window.first_column)
         squared_distances = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(targets[squared_distances > _INSPECTED_RADIUS_M**2])
 
     def _label_frontiers(self, situation: Situation) -> IntArray:
-        """Return the number of the frontier, from 1, that each cell of the window is on; 0 for none."""
+        """Return the label of the frontier, from 1, to which each cell of the window belongs; 0 for none."""
         planner = situation.planner
         state = planner.window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~planner.is_outside
@@ -123,7 +126,7 @@ class FrontierMedian(SharedMapController):
         return np.asarray(np.where(is_long[labels], labels, 0))
 
     def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
-        """Return the path length from each robot to each target, (k, t) m; inf where there is no path."""
+        """Return the path length from each robot to each target, (k, t) m; infinite without a path."""
         planner = situation.planner
         clear_nodes = np.flatnonzero(planner.has_clearance)
         if not len(targets) or not len(clear_nodes):
@@ -135,23 +138,27 @@ class FrontierMedian(SharedMapController):
         )
 
     def _assign_targets(self, situation: Situation, targets: Array, path_lengths: Array) -> Array:
-        """Return the target of each robot, (k, 2) m, or its position if it has none."""
+        """Return the target of each robot, (k, 2) m, or its position if it has no target.
+
+        The pair of a robot and a target with the largest U - β V is assigned first; see `FrontierMedian`.
+        """
         planner = situation.planner
         goals = situation.positions.copy()
-        utility = np.ones(len(targets))
+        utilities = np.ones(len(targets))
         is_unassigned = np.ones(len(goals), dtype=bool)
         for _ in range(len(goals)):
-            is_possible = is_unassigned[:, None] & (utility > 0.0)
-            value = np.where(is_possible, utility - self.beta * path_lengths, -np.inf)
-            robot, target = np.unravel_index(value.argmax(), value.shape)
-            if value[robot, target] == -np.inf:
+            is_possible = is_unassigned[:, None] & (utilities > 0.0)
+            values = np.where(is_possible, utilities - self.beta * path_lengths, -np.inf)
+            robot, target = np.unravel_index(values.argmax(), values.shape)
+            if values[robot, target] == -np.inf:
                 break
             goals[robot] = targets[target]
             is_unassigned[robot] = False
-            distance = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
+            # The robot will also see the other targets in view of its own, so these become less useful.
+            distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
             is_clear = planner.find_clear_lines(targets[target], targets, planner.is_blocked)
-            is_in_view = (distance < situation.sensing_range) & is_clear
-            utility -= np.where(is_in_view, 1.0 - distance / situation.sensing_range, 0.0)
+            is_in_view = (distances < situation.sensing_range) & is_clear
+            utilities -= np.where(is_in_view, 1.0 - distances / situation.sensing_range, 0.0)
         return goals
 
     def _compute_median(self, situation: Situation) -> Array:

@@ -22,10 +22,10 @@ class GreedySubmodular(SharedMapController):
     """Greedy placement, followed by descent (after Sun, Cassandras and Meng 2019).
 
     Robots are placed one after another, each where it reduces the cost most, given the earlier ones; then all
-    positions descend. The map is the one that the robots discover and share; unknown space counts as free
-    where a path may lead to. When the map has changed, the team plans again. It keeps descending from the
+    positions descend. The map is the one that the robots discover and share; unknown space that a path may
+    lead to counts as free. When the map has changed, the team plans again. It keeps descending from the
     previous goals unless the new greedy solution saves the fraction `threshold` of the cost. Goals are
-    assigned to robots such that the sum of the squared path lengths is minimal.
+    assigned to robots so that the sum of the squared path lengths is minimal.
 
     Notes
     -----

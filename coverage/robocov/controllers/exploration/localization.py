@@ -1,4 +1,8 @@
-"""Position estimates under noise and late messages: dead reckoning, and alpha-beta trackers of others."""
+"""Estimates of positions from noisy and late measurements.
+
+A robot estimates its own position by dead reckoning and position fixes, and the positions of others by
+alpha-beta filters.
+"""
 
 from __future__ import annotations
 
@@ -14,49 +18,49 @@ from robocov.observation import Observations
 from robocov.team import Team
 
 _AVERAGING_S = 2.0
-"""Time over which position fixes are averaged."""
+"""Time constant with which position fixes are averaged."""
 _OUTLIER_SIGMAS = 6.0
-"""Deviation of a fix from the prediction, in standard deviations, above which the robot was displaced."""
+"""Deviation of a fix from the prediction, in standard deviations, that shows that the robot was displaced."""
 _MIN_FIXES = 10
-"""Number of fixes after which their noise is known."""
+"""Number of fixes from which the noise can be estimated."""
 _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances in divisions."""
 _MIN_SIGMA_M = 1e-9
 """Lower limit of standard deviations in divisions."""
 _SENT_TOLERANCE_S = 1e-6
-"""A message is new if it was sent later than the last one by more than this, to allow for rounding."""
+"""Minimum difference between the times at which two messages were sent; smaller ones are due to rounding."""
 _MANEUVER_FRACTION = 0.5
 """Assumed acceleration of others, as a fraction of their maximum acceleration."""
 _MAX_EXTRAPOLATION_S = 1.5
-"""Maximum time that others are assumed to keep their velocities."""
+"""Maximum time for which others are assumed to keep their velocities."""
 _UNCERTAINTY_SIGMAS = 1.0
-"""Others may be closer than estimated by this number of standard deviations of a fix."""
+"""Uncertainty of a position that is due to noise, in standard deviations of a fix."""
 _UNCERTAINTY_SPEED = 1.0
-"""Speed in m/s at which others may have come closer since their last message."""
+"""Speed in m/s at which the uncertainty grows with the age of a message."""
 _MAX_UNCERTAINTY_FRACTION = 0.75
-"""Others may be closer than estimated by at most this fraction of the estimated distance."""
+"""Upper limit of the uncertainty, as a fraction of the estimated distance."""
 
 
 class Tracks(NamedTuple):
-    """Tracks of the other robots from their messages: row i, column j is robot i's track of robot j."""
+    """Filter states of the other robots, from their messages. Entry (i, j) is robot i's track of robot j."""
 
     sent_times: Array
-    """(n, n) s, times at which the newest messages were sent; nan for none."""
+    """(n, n) s, time at which the newest message was sent; nan for none."""
     counts: IntArray
-    """(n, n) Number of messages."""
+    """(n, n) Number of messages; 0 if there is no track."""
     positions: Array
-    """(n, n, 2) m, filtered position at that time."""
+    """(n, n, 2) m, filtered position when the newest message was sent."""
     velocities: Array
     """(n, n, 2) m/s, filtered velocity at that time."""
 
 
 class _Messages(NamedTuple):
-    """The newest messages that robots have of each other."""
+    """The newest message that each robot has received from each of its neighbors."""
 
-    receiver: IntArray
-    """(m,)"""
-    sender: IntArray
-    """(m,)"""
+    receivers: IntArray
+    """(m,) Index of the robot that has each message."""
+    senders: IntArray
+    """(m,) Index of the robot that sent it."""
     positions: Array
     """(m, 2) m, reported position of the sender."""
     sent_times: Array
@@ -64,18 +68,18 @@ class _Messages(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Filter states of n robots: of their own positions, and of the robots whose messages they receive."""
+    """Filter states of n robots: for their own positions, and for the positions of others."""
 
     time: float
-    """s"""
+    """Time of the last position fixes, s."""
     positions: Array
-    """(n, 2) m, own positions."""
+    """(n, 2) m, each robot's estimate of its own position."""
     velocities: Array
-    """(n, 2) m/s, own velocities."""
+    """(n, 2) m/s, velocities of the robots."""
     fix_counts: Array
-    """(n,) Number of position fixes that were averaged."""
-    variance: Array
-    """(n,) m², of one fix in x or y."""
+    """(n,) Number of position fixes since the start, or since the robot was displaced."""
+    variances: Array
+    """(n,) m², estimated variance of one fix, in x or in y."""
     tracks: Tracks
 
     @classmethod
@@ -92,18 +96,18 @@ class Estimates(NamedTuple):
             positions=np.zeros((n, 2)),
             velocities=np.zeros((n, 2)),
             fix_counts=np.zeros(n),
-            variance=np.zeros(n),
+            variances=np.zeros(n),
             tracks=tracks,
         )
 
 
 def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Observations, Estimates]:
-    """Estimate the positions of robots and their neighbors.
+    """Estimate the positions of robots and of their neighbors.
 
     Parameters
     ----------
     seen : Observations
-        With noisy positions of the robots, and reported positions of their neighbors.
+        Observations with noisy positions of the robots, and reported positions of their neighbors.
     previous : Estimates
         Filter states after the previous observations.
     team : Team
@@ -117,40 +121,41 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
 
     Notes
     -----
-    A robot integrates its own velocity and averages the residuals of its position fixes over two seconds.
-    Others are tracked by their messages with the steady-state gains of Kalata (1984, *The tracking index*),
-    and with larger gains for the first messages. Their messages are assumed to be as noisy as the robot's own
-    fixes, and they are assumed to keep their velocities for at most 1.5 seconds since their last message.
+    A robot integrates its own velocity, and corrects the result by the residuals of its position fixes,
+    averaged over two seconds. It tracks others from their messages by alpha-beta filters with the
+    steady-state gains of Kalata (1984, *The tracking index*), and with larger gains for the first messages.
+    It assumes that the messages are as noisy as its own fixes, and that the others keep their velocities for
+    at most 1.5 seconds after their last message.
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
-    positions, fix_counts, variance = _filter_own_positions(seen, previous, team)
-    robot, neighbor = seen.neighbors.list_pairs()
+    positions, fix_counts, variances = _filter_own_positions(seen, previous, team)
+    robots, neighbors = seen.neighbors.list_pairs()
     messages = _Messages(
-        receiver=robot,
-        sender=neighbor,
+        receivers=robots,
+        senders=neighbors,
         positions=seen.reported_positions,
         sent_times=seen.time - seen.report_ages,
     )
     tracks = _update_tracks(
         previous.tracks,
         messages,
-        sigma=np.sqrt(variance),
-        maneuver=_MANEUVER_FRACTION * team.max_acceleration,
-        max_speed=team.max_speed,
+        sigmas=np.sqrt(variances),
+        accelerations=_MANEUVER_FRACTION * team.max_acceleration,
+        max_speeds=team.max_speed,
     )
     estimates = Estimates(
         time=seen.time,
         positions=positions,
         velocities=seen.velocities,
         fix_counts=fix_counts,
-        variance=variance,
+        variances=variances,
         tracks=tracks,
     )
-    ages = np.clip(seen.time - tracks.sent_times[robot, neighbor], 0.0, _MAX_EXTRAPOLATION_S)
+    ages = np.clip(seen.time - tracks.sent_times[robots, neighbors], 0.0, _MAX_EXTRAPOLATION_S)
     neighbor_positions = (
-        tracks.positions[robot, neighbor] + ages[:, None] * tracks.velocities[robot, neighbor]
+        tracks.positions[robots, neighbors] + ages[:, None] * tracks.velocities[robots, neighbors]
     )
-    # The sensor measures the offset of the obstacle point from the robot.
+    # The sensor measures obstacle points relative to the robot, so they move with its position.
     obstacle_points = seen.obstacle_points - seen.positions + positions
     estimated = replace(
         seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbor_positions
@@ -159,32 +164,34 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
 
 
 def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Array, Array, Array]:
-    """Return the positions, the numbers of fixes and their variances after one more fix of each robot."""
+    """Return the positions, the numbers of fixes, and their variances, after one more fix of each robot."""
     dt = seen.time - previous.time
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
     squared_residual = ((seen.positions - predicted) ** 2).sum(axis=1)
     # A residual that is too large for noise means that something has displaced the robot: start again. The
-    # variance is that of one of the two coordinates.
-    max_squared_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
+    # variance is that of one coordinate, so both together have twice the variance.
+    max_squared_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variances + (team.max_speed * dt) ** 2
     was_displaced = (squared_residual > max_squared_residual) & (previous.fix_counts >= _MIN_FIXES)
     fix_counts = np.where(was_displaced, 1.0, previous.fix_counts + 1.0)
-    # At first the mean of all fixes, later that of the last few seconds.
+    # The estimate is the mean of all fixes at first, and of those of the last few seconds later.
     gain = np.maximum(1.0 / fix_counts, min(dt / _AVERAGING_S, 1.0))
     positions = predicted + gain[:, None] * (seen.positions - predicted)
-    # A fix differs more from the mean of k - 1 others than from the truth. There are two coordinates.
+    # The residual of fix k contains its own error, and that of the mean of k - 1 earlier fixes: its variance
+    # is larger than that of a fix by the factor 1 + 1 / (k - 1) = 1 / (1 - 1 / k). A residual has two
+    # coordinates, hence the factor 0.5.
     squared_error = 0.5 * squared_residual * (1.0 - 1.0 / np.maximum(fix_counts, 1.0))
     # The first fix has no residual, so there is one residual fewer to average than there are fixes.
     variance_gain = np.maximum(1.0 / np.maximum(fix_counts - 1.0, 1.0), gain)
-    variance = previous.variance + variance_gain * (squared_error - previous.variance)
-    variance = np.where(was_displaced, previous.variance, variance)
-    return positions, fix_counts, variance
+    variances = previous.variances + variance_gain * (squared_error - previous.variances)
+    variances = np.where(was_displaced, previous.variances, variances)
+    return positions, fix_counts, variances
 
 
 def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observations:
     """Return the observations with each neighbor moved closer by the uncertainty of its position.
 
-    Controllers that avoid collisions use them, to keep clear of a neighbor wherever it may be. The
-    uncertainty grows with the localization noise and with the age of the neighbor's message.
+    A robot that avoids collisions with these positions also avoids them if a neighbor is closer than
+    estimated. The uncertainty grows with the localization noise and with the age of the neighbor's message.
 
     Parameters
     ----------
@@ -198,32 +205,32 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
     Observations
     """
     assert seen.reported_positions is not None
-    robot, neighbor = seen.neighbors.list_pairs()
-    offset = seen.reported_positions - seen.positions[robot]
+    robots, neighbors = seen.neighbors.list_pairs()
+    offset = seen.reported_positions - seen.positions[robots]
     distance = np.sqrt((offset**2).sum(axis=1))
-    ages = np.clip(seen.time - estimates.tracks.sent_times[robot, neighbor], 0.0, _MAX_EXTRAPOLATION_S)
-    uncertainty = _UNCERTAINTY_SIGMAS * np.sqrt(estimates.variance[robot]) + _UNCERTAINTY_SPEED * ages
+    ages = np.clip(seen.time - estimates.tracks.sent_times[robots, neighbors], 0.0, _MAX_EXTRAPOLATION_S)
+    uncertainty = _UNCERTAINTY_SIGMAS * np.sqrt(estimates.variances[robots]) + _UNCERTAINTY_SPEED * ages
     uncertainty = np.minimum(uncertainty, _MAX_UNCERTAINTY_FRACTION * distance)
     factor = 1.0 - uncertainty / np.maximum(distance, _MIN_DISTANCE_M)
-    return replace(seen, reported_positions=seen.positions[robot] + factor[:, None] * offset)
+    return replace(seen, reported_positions=seen.positions[robots] + factor[:, None] * offset)
 
 
 @kernel
 def _update_tracks(
-    previous: Tracks, messages: _Messages, sigma: Array, maneuver: Array, max_speed: Array
+    previous: Tracks, messages: _Messages, sigmas: Array, accelerations: Array, max_speeds: Array
 ) -> Tracks:
-    """Return the tracks after the newest messages, some of which may already be known.
+    """Return the tracks after the newest messages. Messages that the tracks already contain are ignored.
 
     Parameters
     ----------
     previous : Tracks
     messages : _Messages
-    sigma : (n,) array, m
-        Standard deviation of position fixes of each robot.
-    maneuver : (n,) array, m/s²
-        Assumed acceleration of others.
-    max_speed : (n,) array, m/s
-        Assumed maximum speed of others.
+    sigmas : (n,) array, m
+        Standard deviation of the position fixes of each robot.
+    accelerations : (n,) array, m/s²
+        Acceleration that each robot assumes of the others.
+    max_speeds : (n,) array, m/s
+        Maximum speed that each robot assumes of the others.
     """
     tracks = Tracks(
         sent_times=previous.sent_times.copy(),
@@ -232,57 +239,63 @@ def _update_tracks(
         velocities=previous.velocities.copy(),
     )
     is_neighbor = np.zeros(tracks.sent_times.shape, np.bool_)
-    for m in range(len(messages.receiver)):
-        i = messages.receiver[m]
-        j = messages.sender[m]
-        is_neighbor[i, j] = True
-        has_track = tracks.counts[i, j] > 0
-        is_new = messages.sent_times[m] > tracks.sent_times[i, j] + _SENT_TOLERANCE_S
+    for message in range(len(messages.receivers)):
+        receiver = messages.receivers[message]
+        sender = messages.senders[message]
+        is_neighbor[receiver, sender] = True
+        has_track = tracks.counts[receiver, sender] > 0
+        is_new = messages.sent_times[message] > tracks.sent_times[receiver, sender] + _SENT_TOLERANCE_S
         if has_track and not is_new:
             continue
         if has_track:
-            _update_track(tracks, messages, m, sigma[i], maneuver[i], max_speed[i])
+            _update_track(
+                tracks, messages, message, sigmas[receiver], accelerations[receiver], max_speeds[receiver]
+            )
         else:
             for axis in range(2):
-                tracks.velocities[i, j, axis] = 0.0
-                tracks.positions[i, j, axis] = messages.positions[m, axis]
-        tracks.sent_times[i, j] = messages.sent_times[m]
-        tracks.counts[i, j] += 1
+                tracks.velocities[receiver, sender, axis] = 0.0
+                tracks.positions[receiver, sender, axis] = messages.positions[message, axis]
+        tracks.sent_times[receiver, sender] = messages.sent_times[message]
+        tracks.counts[receiver, sender] += 1
     # If a robot that is not a neighbor now becomes one again later, its track starts from scratch.
-    for i in range(len(is_neighbor)):
-        for j in range(len(is_neighbor)):
-            if not is_neighbor[i, j]:
-                tracks.counts[i, j] = 0
+    for receiver in range(len(is_neighbor)):
+        for sender in range(len(is_neighbor)):
+            if not is_neighbor[receiver, sender]:
+                tracks.counts[receiver, sender] = 0
     return tracks
 
 
 @kernel
 def _update_track(
-    tracks: Tracks, messages: _Messages, m: int, sigma: float, maneuver: float, max_speed: float
+    tracks: Tracks, messages: _Messages, message: int, sigma: float, acceleration: float, max_speed: float
 ) -> None:
-    """Update the position and the velocity of one track, in place, by message m."""
-    i = messages.receiver[m]
-    j = messages.sender[m]
-    dt = messages.sent_times[m] - tracks.sent_times[i, j]
-    k = tracks.counts[i, j] + 1.0
-    # The steady-state gains of an alpha-beta filter (Kalata 1984), from the ratio of the uncertainty by
-    # maneuvers to that by noise.
-    tracking_index = maneuver * dt * dt / max(sigma, _MIN_SIGMA_M)
+    """Update the position and the velocity of one track, in place, by the message with the given index."""
+    receiver = messages.receivers[message]
+    sender = messages.senders[message]
+    dt = messages.sent_times[message] - tracks.sent_times[receiver, sender]
+    # An alpha-beta filter corrects the predicted position by alpha, and the velocity by beta / dt, times the
+    # residual. Kalata (1984) derives the steady-state gains from the tracking index: the ratio of the
+    # uncertainty due to maneuvers to that due to noise.
+    tracking_index = acceleration * dt * dt / max(sigma, _MIN_SIGMA_M)
     discriminant = 8.0 * tracking_index + tracking_index * tracking_index
     root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
     steady_alpha = 1.0 - root * root
     steady_beta = 2.0 * (1.0 - root) ** 2
-    # For small k, the gains of a least-squares fit to k messages are larger.
+    # The first gains are larger: those of a least-squares fit of a straight line to the k messages so far.
+    k = tracks.counts[receiver, sender] + 1.0
     initial_alpha = 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0))
     initial_beta = 6.0 / (k * (k + 1.0))
     alpha = max(steady_alpha, initial_alpha)
     beta = min(max(steady_beta, initial_beta), 1.0)
+    # Views of the track: assignments to their elements change it.
+    position = tracks.positions[receiver, sender]
+    velocity = tracks.velocities[receiver, sender]
     for axis in range(2):
-        expected = tracks.positions[i, j, axis] + dt * tracks.velocities[i, j, axis]
-        residual = messages.positions[m, axis] - expected
-        tracks.positions[i, j, axis] = expected + alpha * residual
-        tracks.velocities[i, j, axis] += beta * residual / dt
-    speed = math.sqrt(tracks.velocities[i, j, 0] ** 2 + tracks.velocities[i, j, 1] ** 2)
+        predicted = position[axis] + dt * velocity[axis]
+        residual = messages.positions[message, axis] - predicted
+        position[axis] = predicted + alpha * residual
+        velocity[axis] += beta * residual / dt
+    speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
     if speed > max_speed:
-        tracks.velocities[i, j, 0] *= max_speed / speed
-        tracks.velocities[i, j, 1] *= max_speed / speed
+        velocity[0] *= max_speed / speed
+        velocity[1] *= max_speed / speed

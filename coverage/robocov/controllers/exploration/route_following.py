@@ -1,4 +1,4 @@
-"""Route following among walls and other robots: fast in open space, braking before both."""
+"""Route following among walls and other robots: fast in open space, and braking before obstacles."""
 
 import math
 from collections.abc import Sequence
@@ -42,16 +42,17 @@ _MIN_DISTANCE_M = 1e-9
 
 
 class RouteProgress(NamedTuple):
-    """The routes of robots, and how far each robot has come."""
+    """The routes of the robots, and the waypoint that each robot heads for."""
 
     routes: Sequence[Array]
-    """Waypoints of each robot, (w, 2) m each; the last one is the goal."""
+    """Waypoints of each robot, (w, 2) m. The last one is its goal."""
     waypoint_indices: IntArray
-    """(n,) Index of the waypoint that each robot heads for."""
+    """(n,) Index, in its route, of the waypoint that each robot heads for."""
 
     def get_waypoints(self) -> Array:
         """Return the waypoint that each robot heads for, (n, 2) m."""
-        return np.array([route[leg] for route, leg in zip(self.routes, self.waypoint_indices, strict=True)])
+        pairs = zip(self.routes, self.waypoint_indices, strict=True)
+        return np.array([route[index] for route, index in pairs])
 
 
 class RouteGains(NamedTuple):
@@ -71,7 +72,7 @@ class RouteCommand(NamedTuple):
     goals: Array
     """(n, 2) m, ends of the routes."""
     waypoint_indices: IntArray
-    """(n,) Index of the waypoint that each robot heads for now."""
+    """(n,) Index, in its route, of the waypoint that each robot heads for now."""
 
 
 def follow_routes(
@@ -86,7 +87,7 @@ def follow_routes(
     progress : RouteProgress
         The routes, and the waypoint that each robot headed for at the last step.
     returns : (n, rays, 2) array or None, m
-        Points of the last scans, as `driving.update_returns` returns them.
+        Obstacle points in the last scans, as `driving.update_returns` returns them.
     gains : RouteGains
 
     Returns
@@ -136,8 +137,8 @@ def _compute_desired_velocities(
     speed_limit = _compute_speed_limits(seen, team)
     to_waypoint = compute_approach_velocities(offsets, math.inf, speed_limit)
     to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
-    is_on_last_leg = progress.waypoint_indices == _get_last_indices(progress)
-    return np.where(is_on_last_leg[:, None], to_goal, to_waypoint)
+    is_last_waypoint = progress.waypoint_indices == _get_last_indices(progress)
+    return np.where(is_last_waypoint[:, None], to_goal, to_waypoint)
 
 
 def _compute_speed_limits(seen: Observations, team: Team) -> Array:
@@ -152,20 +153,25 @@ def _compute_speed_limits(seen: Observations, team: Team) -> Array:
 
 
 def _compute_evasion(seen: Observations, team: Team, velocities: Array, separation: Array) -> Array:
-    """Return velocities, (n, 2) m/s, to the left of the other robot that each one approaches too fast."""
+    """Return the sideways velocities, (n, 2) m/s, with which robots pass each other on the left.
+
+    They are zero for robots that approach no other robot too fast.
+    """
     offsets = list_neighbor_offsets(seen, _EVASION_RANGE_M)
     if not offsets.shape[1]:
         return np.zeros_like(velocities)
     braking = _BRAKING_FRACTION * team.max_acceleration
     distance = np.hypot(*np.moveaxis(offsets, -1, 0))
     normals = offsets / np.maximum(distance, _MIN_DISTANCE_M)[..., None]
+    # `avoid_collisions` allows speeds up to sqrt(braking * gap). Robots start to pass each other before they
+    # have to slow down: at that speed divided by sqrt(2).
     allowed_speed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - separation[:, None], 0.0))
     excess = -(normals * velocities[:, None]).sum(axis=2) - allowed_speed
     excess = np.nan_to_num(excess, nan=-np.inf)
     rows = np.arange(len(velocities))
     worst = excess.argmax(axis=1)
-    # The normal points from the other robot to this one. Turned clockwise, it points to the left of the way
-    # to the other robot.
+    # The normal points from the other robot to this one. Turned clockwise, it points to the left, as seen by
+    # a robot that faces the other one.
     left = np.nan_to_num(normals[rows, worst])[:, ::-1] * [1.0, -1.0]
     speed = np.clip(excess[rows, worst], 0.0, _MAX_EVASION_SPEED)
     return np.asarray(left * speed[:, None])

@@ -24,7 +24,7 @@ from robocov.planning.voronoi_roadmap import VoronoiRoadmap
 from robocov.planning.window import Window
 
 MAX_BLOCKS = 150_000
-"""Maximum number of square blocks of cells that stand for the map when it is thinned."""
+"""Maximum number of square blocks of cells in the coarser map from which the graph is built."""
 MAX_VERTICES = 300
 """Approximate number of vertices of the graph."""
 _MIN_SPACING_M = 0.25
@@ -50,11 +50,11 @@ class VoronoiGraphCoverage(SharedMapController):
 
     In the paper the graph is known, and robots know the neighbors of their neighbors. Here it is the graph
     of the map that robots discover and share, and each robot plans for all robots that it hears. Unknown
-    space counts as free where a path may lead to, so the graph extends into it. When the map has
-    changed, the plan starts from the previous vertices; the first exchange must then save the fraction
-    `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
-    robots such that the sum of the squared path lengths is minimal. While the graph has fewer vertices than
-    there are robots, as in a region in which no wall is known yet, the nearest robots move to all of them.
+    space that a path may lead to counts as free, so the graph extends into it. When the map has changed, the
+    plan starts from the previous vertices; the first exchange must then save the fraction `threshold` of the
+    cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to robots so that the
+    sum of the squared path lengths is minimal. While the graph has fewer vertices than there are robots, as
+    in a region in which no wall is known yet, one robot moves to each vertex, and the others stay.
 
     The implementation is based on the abstract of Yun and Rus and on general knowledge, not on the full texts
     of the papers.
@@ -71,7 +71,7 @@ class VoronoiGraphCoverage(SharedMapController):
         candidates = self._build_candidates(situation)
         count = len(situation.positions)
         if len(candidates.positions) < count:
-            return Placement(goals=_fill_vertices(situation, candidates.positions), is_final=False)
+            return Placement(goals=_assign_vertices(situation, candidates.positions), is_final=False)
         goals = situation.previous_goals
         chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
         is_fixed = np.zeros(count, dtype=bool)
@@ -111,8 +111,12 @@ class VoronoiGraphCoverage(SharedMapController):
         return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))
 
 
-def _fill_vertices(situation: Situation, vertices: Array) -> Array:
-    """Return goals for all robots, (k, 2) m: the nearest robots move to the vertices, (v < k, 2) m."""
+def _assign_vertices(situation: Situation, vertices: Array) -> Array:
+    """Return the goals of k robots, (k, 2) m, given fewer vertices than robots, (v, 2) m.
+
+    One robot moves to each vertex, so that the sum of the squared path lengths is minimal. The other robots
+    stay where they are.
+    """
     goals = situation.positions.copy()
     if not len(vertices):
         return goals
@@ -130,11 +134,12 @@ def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
     """Return a mask of the blocks of the window that a robot can reach through blocks with clearance."""
     raster = situation.known_map.raster
     planner = situation.planner
-    rows, columns = raster.shape
-    is_tight = window.crop(planner.is_tight[:rows, :columns], fill=True)
+    # The window of the planner extends beyond the raster if its last blocks do.
+    row_count, column_count = raster.shape
+    is_tight = window.crop(planner.is_tight[:row_count, :column_count], fill=True)
     has_clearance = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
     labels, _ = ndimage.label(has_clearance, np.ones((3, 3)))
     own_nodes = [planner.find_own_node(position) for position in situation.positions]
-    row, column = raster.find_cells(planner.nodes[own_nodes])
-    own_labels = labels[row // window.stride, column // window.stride]
+    rows, columns = raster.find_cells(planner.nodes[own_nodes])
+    own_labels = labels[rows // window.stride, columns // window.stride]
     return np.asarray(has_clearance & np.isin(labels, own_labels) & (labels > 0))

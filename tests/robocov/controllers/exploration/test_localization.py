@@ -99,7 +99,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     paths = build_straight_paths(4, 120, seed)
     known, estimates, errors = drive_along_paths(paths, Conditions(position_noise=0.1, seed=seed))
     assert np.sqrt(np.mean(np.square(errors[80:]))) < 0.035
-    assert np.all((estimates.variance > 0.06**2) & (estimates.variance < 0.14**2))
+    assert np.all((estimates.variances > 0.06**2) & (estimates.variances < 0.14**2))
     assert known.reported_positions is not None
     _, other = known.neighbors.list_pairs()
     reported_errors = np.hypot(*(known.reported_positions - paths[-1][other]).T)
@@ -156,7 +156,7 @@ def test_neighbors_are_assumed_closer_by_noise_and_age() -> None:
     distances = np.hypot(*(known.reported_positions - known.positions[robot]).T)
     assumed_distances = np.hypot(*(close.reported_positions - close.positions[robot]).T)
     ages = known.time - estimates.tracks.sent_times[robot, other]
-    uncertainty = np.sqrt(estimates.variance)[robot] + 1.0 * ages
+    uncertainty = np.sqrt(estimates.variances)[robot] + 1.0 * ages
     expected = np.minimum(uncertainty, 0.75 * distances)
     assert np.allclose(distances - assumed_distances, expected)
 
