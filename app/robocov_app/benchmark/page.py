@@ -204,7 +204,7 @@ def _build_overview_cells(
     suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)
     contacts = sum(row["contacts"] > 0 for row in rows)
     at_rest = sum(row["settled_at_s"] is not None for row in rows)
-    cells = [f"{run_count} of {suite_run_count}"]
+    cells = [ratings.format_run_count(run_count, suite_run_count)]
     cells += [f"{count / max(1, len(rows)):.0%}" for count in (contacts, at_rest)]
     for name in tracks:
         rating = label_ratings.get(name)

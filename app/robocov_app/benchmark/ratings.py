@@ -317,12 +317,17 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
     }
 
 
+def format_run_count(count: int, total: int) -> str:
+    """Format the number of runs of an entry, with their total number if some are missing."""
+    return str(count) if count == total else f"{count} of {total}"
+
+
 def _format_runs(rating: Rating, gaps: int) -> str:
     """Return the numbers of runs, failed runs and runs without a gap as text.
 
     `gaps` is the number of runs with a gap.
     """
-    text = f"{rating.run_count} of {len(list_run_keys(rating.track))}"
+    text = format_run_count(rating.run_count, len(list_run_keys(rating.track)))
     if rating.failed:
         text += f", {rating.failed} failed"
     if gaps < len(rating.rows):

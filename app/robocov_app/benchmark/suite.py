@@ -177,8 +177,8 @@ def build_map(name: str) -> Environment:
 
 
 def compute_map_hash(environment: Environment) -> str:
-    """Return the SHA-256 of the content of a map, apart from the version of the file format."""
-    document = {**to_json(environment), "$schema": None}
+    """Return the SHA-256 of the content of a map, apart from its description and the schema of its file."""
+    document = {**to_json(environment), "$schema": None, "description": None}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 

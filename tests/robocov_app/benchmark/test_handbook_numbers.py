@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,17 @@ ROWS = [
 @pytest.mark.parametrize(("law", "track"), ROWS)
 def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
     assert f"| {suite.format_heading(track)} {format_row(law, track)}\n" in PAGE.read_text(encoding="utf-8")
+
+
+def test_the_first_table_has_the_gaps_of_the_entries() -> None:
+    first_table = PAGE.read_text(encoding="utf-8").partition("## List of controllers")[0]
+    names = re.findall(r"`([a-z-]+)`", first_table)
+    gaps = re.findall(r"(\d+\.\d) %", first_table)
+    expected = []
+    for name in names:
+        rows = [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"]
+        expected.append(f"{100.0 * Rating(name, 'ideal', rows, 0).gap.estimate:.1f}")
+    assert gaps == expected
 
 
 def test_the_study_of_the_paper_has_the_goals_of_the_handbook() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,18 @@ def test_a_bundled_map_that_has_changed_is_rejected(tmp_path: Path) -> None:
     message = rf'maps\[0\]\.digest: expected "{digest}", got "0": the bundled map \'rooms\' has changed'
     with pytest.raises(MapError, match=message):
         load_session(path)
+
+
+def test_the_description_of_a_bundled_map_is_kept_and_may_change(tmp_path: Path) -> None:
+    path = tmp_path / "session.robocov"
+    described = replace(load_map("rooms"), description="My rooms.")
+    save(start_session(RAPF, environment=described), path)
+    assert json.loads(path.read_text())["maps"][0]["description"] == "My rooms."
+    earlier_digest = "f80cc6154428d973"
+    save(start_session(RAPF, environment=load_map("rooms")), path)
+    digest = json.loads(path.read_text())["maps"][0]["digest"]
+    path.write_text(path.read_text().replace(digest, earlier_digest))
+    assert Session.open(load_session(path)).timeline.scenario.environment == load_map("rooms")
 
 
 def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_path: Path) -> None:

@@ -14,6 +14,27 @@ from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
 from robocov_app.viewer.session.files.models import BundledMapModel
 
 DIGEST_CHARS = 16
+_DIGESTS_WITH_DESCRIPTION = {
+    "blocks-a": "016c47aecf35c2ce",
+    "blocks-b": "5c0d42c52e56fbc4",
+    "campus": "9fdad3c0d5c43c21",
+    "cave": "15826297a0518ea8",
+    "city": "ae11b90f987b941d",
+    "corridor": "b158a1ca98c969c0",
+    "courtyard": "3657aa4d3bc5b48a",
+    "forklifts": "d04f1fc56f88e3bd",
+    "gaps": "d9df1e61e2c91c73",
+    "hospital": "251d4cd81e686dc9",
+    "l-shape": "ea129597b6c4c5e9",
+    "museum": "07a70595f9811cd5",
+    "office": "f27af4dc7ac1721a",
+    "pentagon": "2ba69474dae2f664",
+    "rooms": "f80cc6154428d973",
+    "square": "70a1f7aab13565c4",
+    "trap": "360c3417c0777a47",
+    "warehouse": "928aa1bf7944e421",
+}
+"""Digests of the bundled maps in sessions of earlier versions, whose digests included the description."""
 
 
 def refuse_value(where: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
@@ -95,7 +116,7 @@ class FileContext:
             refuse_value(self.where, path, content.bundled, "the name of a bundled map")
         environment = load_map(content.bundled)
         digest = _compute_digest(to_json(environment))
-        if digest != content.digest:
+        if content.digest not in (digest, _DIGESTS_WITH_DESCRIPTION.get(content.bundled)):
             expected = quote_json(digest)
             reason = f"the bundled map {quote(content.bundled)} has changed since the session was saved"
             message = f"expected {expected}, got {quote_json(content.digest)}: {reason}"
@@ -107,19 +128,19 @@ class FileContext:
 def _build_map_content(environment: Environment) -> dict[str, Any]:
     """Return the representation of a map in session files."""
     content = to_json(environment)
-    digest = _compute_digest(content)
-    name = _list_bundled_digests().get(digest)
-    if name is None:
-        return content
-    return {"bundled": name, "digest": digest}
+    for name, bundled_content in _load_bundled_contents().items():
+        if content == bundled_content:
+            return {"bundled": name, "digest": _compute_digest(content)}
+    return content
 
 
 @cache
-def _list_bundled_digests() -> dict[str, str]:
-    """Return the name of each bundled map, by its digest."""
-    return {_compute_digest(to_json(load_map(name))): name for name in list_bundled_maps()}
+def _load_bundled_contents() -> dict[str, dict[str, Any]]:
+    """Return the content of each bundled map, by its name."""
+    return {name: to_json(load_map(name)) for name in list_bundled_maps()}
 
 
 def _compute_digest(content: Mapping[str, Any]) -> str:
-    text = json.dumps(content, sort_keys=True)
+    """Return the digest of a map without its description, on which no simulation depends."""
+    text = json.dumps({**content, "description": None}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_CHARS]
