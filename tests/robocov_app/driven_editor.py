@@ -85,9 +85,9 @@ class EditorDriver(Driver):
 
     def settle(self) -> None:
         """Handle the posted events, also during a trial."""
-        if self.window.play_window is None:
+        if self.window.play_mode.window is None:
             super().settle()
-        for _ in range(4 if self.window.play_window is not None else 0):
+        for _ in range(4 if self.window.play_mode.window is not None else 0):
             self.window.run_frame(0.0)
 
     @property

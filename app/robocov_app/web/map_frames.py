@@ -7,6 +7,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pygame import Surface
 
 from robocov_app.web.frames import Frame
 from robocov_app.web.pages import MapSize
@@ -63,7 +64,9 @@ class MapFrames:
         self._drawn_sizes = sizes
         frames: dict[MapSize, Frame] = {}
         for size in sizes:
-            picture = window.draw_map((size.width, size.height), size.scale)
+            picture: Surface | None = None
+            if window.map_pictures is not None:
+                picture = window.map_pictures.draw((size.width, size.height), size.scale)
             if picture is None:
                 continue
             previous = self.frames.get(size)

@@ -105,8 +105,10 @@ class WindowInput:
         size = self._map_size
         if size is None or not isinstance(message, PointerMessage):
             return message
-        shown = window.replacement or window
-        x, y = shown.find_window_pixel((size.width, size.height), (message.x, message.y))
+        pictures = (window.replacement or window).map_pictures
+        if pictures is None:
+            return message
+        x, y = pictures.find_window_pixel((size.width, size.height), (message.x, message.y))
         return message.model_copy(update={"x": x, "y": y})
 
     def _fit(self, window: BaseWindow, page: PageChanged) -> None:

@@ -89,7 +89,7 @@ def test_changes_during_a_trial_are_in_the_draft(ends, tmp_path):
     with open_editor(tmp_path, load_sketch("square"), drafts=drafts) as driver:
         before = len(driver.shapes)
         driver.press_key("f5")
-        trial = driver.window.play_window
+        trial = driver.window.play_mode.window
         session = trial.viewer.session
         circle = CircleObstacle((5.0, 5.0), 0.3)
         obstacles = (*session.displayed.environment.obstacles, circle)

@@ -193,7 +193,7 @@ def play_events(name: str, seed: int, tmp_path: Path, events: int) -> None:
             for _ in range(EVENTS_PER_STEP):
                 user.act()
             window = driver.window
-            if window.play_window is not None or step % STEPS_PER_FRAME == 0:
+            if window.play_mode.window is not None or step % STEPS_PER_FRAME == 0:
                 window.run_frame(1 / 50)
             else:
                 window.advance(1 / 50)
@@ -205,8 +205,8 @@ def play_events(name: str, seed: int, tmp_path: Path, events: int) -> None:
                 assert driver.editor.selection.restrict_to(sketch) == driver.editor.selection
         # and back to the beginning, exactly
         pygame.event.clear()
-        if driver.window.play_window is not None:
-            driver.window.play_window.returns_to_editor = True
+        if driver.window.play_mode.window is not None:
+            driver.window.play_mode.window.returns_to_editor = True
             driver.window.run_frame(0.0)
         history = driver.editor.document.history
         last = history.sketch

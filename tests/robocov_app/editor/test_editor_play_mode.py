@@ -10,14 +10,15 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.play_mode import BACK_COMMAND, build_play_change
+from robocov_app.editor.ui.play_mode.map_changes import build_play_change
+from robocov_app.editor.ui.play_mode.window import BACK_COMMAND
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 
 
 def start_trial(driver: EditorDriver):
     driver.press_key("f5")
-    trial = driver.window.play_window
+    trial = driver.window.play_mode.window
     assert trial is not None
     return trial
 
@@ -39,7 +40,7 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
         driver.run_frames(10)
         assert trial.viewer.session.displayed.time > 0.0
         driver.press_key("f5")
-        assert driver.window.play_window is None
+        assert driver.window.play_mode.window is None
         assert driver.sketch is before and driver.window.canvas.camera == camera
         assert driver.editor.selection == selection
         driver.editor.message = ""
@@ -57,26 +58,26 @@ def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
         driver.press_key("f1")
         assert trial.is_help_open
         driver.press_key("escape")
-        assert driver.window.play_window is trial and not trial.is_help_open
+        assert driver.window.play_mode.window is trial and not trial.is_help_open
         driver.press_key("w")
         driver.press_key("escape")
-        assert driver.window.play_window is trial
+        assert driver.window.play_mode.window is trial
         driver.press_key("escape")
-        assert driver.window.play_window is None
+        assert driver.window.play_mode.window is None
 
 
 def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
     with open_editor(tmp_path, build_sheet(crossed)) as driver:
         driver.press_key("f5")
-        assert driver.window.play_window is None and driver.editor.has_error_message and driver.message
+        assert driver.window.play_mode.window is None and driver.editor.has_error_message and driver.message
     with open_editor(tmp_path, Sketch(boundary=None)) as driver:
         driver.press_key("f5")
-        assert driver.window.play_window is None and driver.editor.has_error_message
+        assert driver.window.play_mode.window is None and driver.editor.has_error_message
     with open_editor(tmp_path, build_sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as driver:
         driver.editor.robots = 50
         driver.press_key("f5")
-        assert driver.window.play_window is None and "space for about" in driver.message
+        assert driver.window.play_mode.window is None and "space for about" in driver.message
 
 
 def test_changes_of_a_trial_are_one_edit(tmp_path: Path) -> None:
@@ -119,7 +120,9 @@ def test_closing_the_window_in_a_trial_asks_about_unsaved_changes(tmp_path: Path
         driver.settle()
         driver.settle()
         assert (
-            driver.window.play_window is None and driver.window.dialogs.is_open and not driver.window.closed
+            driver.window.play_mode.window is None
+            and driver.window.dialogs.is_open
+            and not driver.window.closed
         )
         driver.press_key("d")
         assert driver.window.closed
@@ -133,7 +136,7 @@ def test_a_button_leads_back_to_the_editor(tmp_path: Path) -> None:
         assert button is not None
         assert "F5" in trial.commands[BACK_COMMAND].tip
         driver.click(*button.rect.center)
-        assert driver.window.play_window is None
+        assert driver.window.play_mode.window is None
 
 
 def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
@@ -161,10 +164,10 @@ def test_a_held_key_does_not_end_the_trial(tmp_path: Path) -> None:
         driver.run_frames(2)
         pygame.event.post(press)
         driver.run_frames(2)
-        trial = driver.window.play_window
+        trial = driver.window.play_mode.window
         assert trial is not None and not trial.returns_to_editor
         pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_F5, mod=0, unicode=""))
         pygame.event.post(press)
         pygame.event.post(press)
         driver.run_frames(3)
-        assert driver.window.play_window is None
+        assert driver.window.play_mode.window is None

@@ -52,9 +52,9 @@ def test_a_dot_marks_unsaved_changes_until_the_map_is_saved(driver: EditorDriver
 
 def test_the_bar_creates_tries_and_explains(driver: EditorDriver) -> None:
     driver.push_button("try")
-    assert driver.window.play_window is not None
+    assert driver.window.play_mode.window is not None
     driver.press_key("f5")
-    assert driver.window.play_window is None
+    assert driver.window.play_mode.window is None
     driver.push_button("palette")
     assert driver.window.dialogs.is_open
     driver.press_key("escape")

@@ -201,7 +201,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
             editor.document.history.apply(add_circle(editor.sketch, (5.0, 5.0), 0.5))
             raise ZeroDivisionError("half-way")
 
-        monkeypatch.setattr(window, "start_play_mode", fail_half_way)
+        monkeypatch.setattr(window.play_mode, "start", fail_half_way)
         monkeypatch.setattr(window, "do", lambda name: fail_half_way())
         driver.press_key("f5")
         assert editor.sketch == before

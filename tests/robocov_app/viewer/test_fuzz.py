@@ -237,7 +237,7 @@ def limit_commands(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
     def do_if_remaining(window: ViewerWindow, name: str) -> None:
         if name in remaining:
-            ends_video = name == "video" and window.video is not None
+            ends_video = name == "video" and window.video_recorder.video is not None
             if remaining[name] == 0 and not ends_video:
                 return
             remaining[name] = max(remaining[name] - 1, 0)

@@ -163,7 +163,7 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
             driver.press_key(key)
             assert driver.viewer.has_error_message
             assert driver.viewer.message, key
-        assert driver.window.video is None
+        assert driver.window.video_recorder.video is None
         assert not driver.viewer.view.is_recording
 
 

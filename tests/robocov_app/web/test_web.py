@@ -671,6 +671,7 @@ class FakeWindow:
 
     def __init__(self):
         self.screen = pygame.Surface((1280, 720), 0, 32)
+        self.map_pictures = self
         self.has_dialog = False
         self.shade = 0
 
@@ -680,7 +681,7 @@ class FakeWindow:
     def reduce_motion(self, *, is_reduced):
         self.is_motion_reduced = is_reduced
 
-    def draw_map(self, size, scale):
+    def draw(self, size, scale):
         if self.has_dialog:
             return None
         picture = pygame.Surface(size, 0, 32)

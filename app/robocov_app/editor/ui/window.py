@@ -23,7 +23,7 @@ from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel, find_object_kind
-from robocov_app.editor.ui.play_mode import PlayWindow, build_play_change, open_play_window
+from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import edit_typed_value
 from robocov_app.editor.ui.top_bar import EditorTopBar
@@ -38,7 +38,7 @@ from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.command_window import CommandWindow
-from robocov_app.toolkit.window.display import prefers_reduced_motion, set_title
+from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
 
@@ -104,8 +104,8 @@ class EditorWindow(CommandWindow):
         The panel.
     pointer : EditorPointer
         The mouse over the map.
-    play_window : PlayWindow or None
-        The viewer in play mode; None while the map is being edited.
+    play_mode : PlayMode
+        Shows the viewer in this window to try the map.
     team_sampler : TeamSampler
         Computes the positions of the team at a start.
     """
@@ -128,7 +128,7 @@ class EditorWindow(CommandWindow):
     ) -> None:
         super().__init__(editor, editor.dialogs, size, scale)
         self.editor = editor
-        self.play_window: PlayWindow | None = None
+        self.play_mode = PlayMode(editor, self, self._arrange, waits_for_workers=waits_for_workers)
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, waits_for_workers=waits_for_workers)
         commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
@@ -138,8 +138,6 @@ class EditorWindow(CommandWindow):
         self.tool_rail = ToolRail(editor.toolbox, self.commands, self.do)
         self.pointer = EditorPointer(editor, self.canvas, self.parts, self.open_menu)
         self.team_sampler = TeamSampler()
-        self._waits_for_workers = waits_for_workers
-        self._is_motion_reduced = prefers_reduced_motion()
         editor.snapper.waits_for_targets = waits_for_workers
         self._layout_key: tuple[object, ...] | None = None
         self._arrange()
@@ -150,7 +148,7 @@ class EditorWindow(CommandWindow):
     def _build_actions(self) -> EditorWindowActions:
         """Build the actions of the window for the commands that run them."""
         return EditorWindowActions(
-            start_play_mode=self.start_play_mode,
+            start_play_mode=self.play_mode.start,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
             edit_width=self._edit_width,
@@ -198,9 +196,7 @@ class EditorWindow(CommandWindow):
 
     def close(self) -> None:
         """End play mode and all background work."""
-        if self.play_window is not None:
-            self.play_window.save_draft(force=True)
-            self.play_window.close()
+        self.play_mode.close()
         self.team_sampler.close()
         self.dialogs.close()
         self.editor.snapper.close()
@@ -245,19 +241,17 @@ class EditorWindow(CommandWindow):
         if panel is not None:
             self.editor.shows_panel = panel
         self.editor.revision += 1
-        if self.play_window is not None:
-            self.play_window.set_appearance(scale, theme, panel=panel)
+        if self.play_mode.window is not None:
+            self.play_mode.window.set_appearance(scale, theme, panel=panel)
 
     def reduce_motion(self, *, is_reduced: bool) -> None:
         """Adopt the setting of the user's system for reduced motion, which matters in play mode."""
-        self._is_motion_reduced = is_reduced
-        if self.play_window is not None:
-            self.play_window.reduce_motion(is_reduced=is_reduced)
+        self.play_mode.reduce_motion(is_reduced=is_reduced)
 
     def update(self, seconds: float) -> None:
         """Advance the clock, poll files and workers, and update layout, parts, cursor and title."""
-        if self.play_window is not None:
-            self._update_play_window(self.play_window, seconds)
+        if self.play_mode.window is not None:
+            self.play_mode.update(seconds)
             return
         if self.documents.may_close:
             self.closed = True
@@ -373,59 +367,6 @@ class EditorWindow(CommandWindow):
         commands = [self.commands[name] if name else None for name in list_menu_commands(editor)]
         self.dialogs.ask(Menu(commands, pixel, self.do))
 
-    def start_play_mode(self) -> None:
-        """Open the map in the viewer, in this window."""
-        if self.editor.toolbox.selector.is_busy:
-            # A drag is cancelled, but an unfinished drawing is kept.
-            self.editor.toolbox.selector.cancel(self.editor)
-        play_window = open_play_window(
-            self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers
-        )
-        play_window.reduce_motion(is_reduced=self._is_motion_reduced)
-        play_window.windowed_size = self.windowed_size
-        play_window.cursor = self.cursor
-        self.play_window = play_window
-        self.replacement = play_window
-
-    def _update_play_window(self, play_window: PlayWindow, seconds: float) -> None:
-        play_window.screen = self.screen
-        play_window.frame_rate = self.frame_rate
-        if not play_window.returns_to_editor and not play_window.closed:
-            play_window.update(seconds)
-        if play_window.returns_to_editor or play_window.closed:
-            self._end_play_mode(play_window)
-        else:
-            play_window.save_draft()
-
-    def _end_play_mode(self, play_window: PlayWindow) -> None:
-        """Return to the editor with the changes made in the viewer."""
-        play_window.close()
-        play_window.run_saver.finish()
-        self.play_window = None
-        self.replacement = None
-        self.adopt_display()
-        self.windowed_size = play_window.windowed_size
-        editor = self.editor
-        viewer = play_window.viewer
-        editor.theme = viewer.view.theme
-        change = build_play_change(
-            editor.sketch, viewer.files.edited_map, viewer.session.displayed.environment
-        )
-        if change is not None and not viewer.files.has_left_edited_map:
-            editor.apply(change)
-        editor.document.update_draft()
-        # If the key is still held down, its repetitions must not start play mode again.
-        if pygame.key.get_pressed()[pygame.K_F5]:
-            self.commands.reset_keys(pygame.K_F5)
-        else:
-            self.commands.reset_keys()
-        self._arrange()
-        editor.revision += 1
-        if play_window.returns_to_editor:
-            self.draw()
-        else:
-            self.do("quit")
-
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; the key for screenshots works even while a dialog is open."""
         is_space_released = event.type == pygame.KEYUP and event.key == pygame.K_SPACE
@@ -458,5 +399,5 @@ class EditorWindow(CommandWindow):
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press, as input or as the key of a command."""
         super().press_key(event)
-        if self.play_window is not None:
-            self.play_window.ignored_key = event.key
+        if self.play_mode.window is not None:
+            self.play_mode.window.ignored_key = event.key

@@ -68,6 +68,40 @@ class Remote(Protocol):
         """Show the current frame and the shape of the cursor (a pygame constant)."""
 
 
+class MapDrawing(Protocol):
+    """Draws the map of a window without its controls, for small screens."""
+
+    def draw(self, size: tuple[int, int], scale: float) -> Surface | None:
+        """Draw the map.
+
+        Parameters
+        ----------
+        size : (width, height), px
+        scale : float
+            Size of texts and symbols.
+
+        Returns
+        -------
+        pygame.Surface or None
+            None if the window itself must be seen now, because it shows a dialog, for example.
+        """
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same point of the map.
+
+        Parameters
+        ----------
+        size : (width, height), px
+            Size of a picture that `draw` has returned.
+        pixel : (x, y)
+            Pixel of that picture.
+
+        Returns
+        -------
+        (x, y)
+        """
+
+
 class BaseWindow:
     """A window that is redrawn while something moves, and otherwise only when something has changed.
 
@@ -94,6 +128,8 @@ class BaseWindow:
         Window that is temporarily shown and used in its place.
     remote : Remote or None
         Where the window is displayed, if not on the screen.
+    map_pictures : MapDrawing or None
+        Draws the map alone; None if the window shows no map.
     cursor : MouseCursor
     exceptions : ExceptionLog
     frame_rate : float
@@ -109,6 +145,7 @@ class BaseWindow:
         self.closed = False
         self.replacement: BaseWindow | None = None
         self.remote: Remote | None = None
+        self.map_pictures: MapDrawing | None = None
         self._held_keys: set[int] = set()
         self.cursor = MouseCursor()
         self.exceptions = ExceptionLog()
@@ -138,38 +175,6 @@ class BaseWindow:
     def status_text(self) -> str:
         """Text that a screen reader announces when it changes."""
         return ""
-
-    def draw_map(self, size: tuple[int, int], scale: float) -> Surface | None:
-        """Draw the map without the controls of the window, for a small screen.
-
-        Parameters
-        ----------
-        size : (width, height), px
-        scale : float
-            Size of texts and symbols.
-
-        Returns
-        -------
-        pygame.Surface or None
-            None if the window itself must be seen now, because it shows a dialog, for example.
-        """
-        return None
-
-    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return the pixel of the window that shows the same point of the map.
-
-        Parameters
-        ----------
-        size : (width, height), px
-            Size of a picture that `draw_map` has returned.
-        pixel : (x, y)
-            Pixel of that picture.
-
-        Returns
-        -------
-        (x, y)
-        """
-        return pixel
 
     def close(self) -> None:
         """Stop threads and processes that the window has started."""

@@ -112,6 +112,18 @@ class ViewerCanvas:
         left, top, _, _ = self.layout.panes[pane]
         self.camera.zoom(factor, pane, (pixel[0] - left, pixel[1] - top))
 
+    def follow_robot(self) -> None:
+        """Keep the robot that the camera follows in the middle of the view, as long as it is displayed."""
+        viewer = self.viewer
+        number = viewer.inspection.followed
+        displayed = viewer.session.displayed
+        numbers = displayed.numbers
+        if number is None or number not in numbers:
+            viewer.inspection.followed = None
+            return
+        x, y = displayed.get_positions(viewer.pane)[numbers.index(number)].tolist()
+        self.camera.center_on((x, y))
+
     def find_pane(self, pixel: tuple[float, float]) -> int | None:
         """Return the index of the pane at a pixel; None if there is none."""
         for pane, box in enumerate(self.layout.panes):

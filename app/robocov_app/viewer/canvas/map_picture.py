@@ -1,5 +1,6 @@
 """The panes without the controls of the window, drawn in the size of a small screen."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import pygame
@@ -8,6 +9,8 @@ from robocov_app.look.theme import get_theme
 from robocov_app.toolkit.window.layout import build_map_layout
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.presenter import Presenter
+
+MAX_MAP_PICTURES = 8  # of different sizes that are kept
 
 
 class _LayoutKey(NamedTuple):
@@ -82,3 +85,44 @@ class MapPicture:
         aspect = (high_x - low_x) / (high_y - low_y)
         layout = build_map_layout(size, scale, len(session.timeline.panes), aspect)
         self._canvas.arrange(layout, get_theme(theme))
+
+
+class MapPictures:
+    """Pictures of the map of a window in several sizes, for the phones of those who watch.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    window_canvas : ViewerCanvas
+        The canvas of the window.
+    is_covered : callable
+        Returns whether something else is shown in front of the map.
+    """
+
+    def __init__(
+        self, viewer: Presenter, window_canvas: ViewerCanvas, is_covered: Callable[[], bool]
+    ) -> None:
+        self._viewer = viewer
+        self._window_canvas = window_canvas
+        self._is_covered = is_covered
+        self._pictures: dict[tuple[int, int], MapPicture] = {}
+
+    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface | None:
+        """Draw the panes without the controls; None while a page or a dialog is open. See `MapDrawing`."""
+        if self._is_covered():
+            return None
+        picture = self._pictures.get(size)
+        if picture is None:
+            if len(self._pictures) >= MAX_MAP_PICTURES:
+                self._pictures.clear()
+            picture = MapPicture(self._viewer, self._window_canvas)
+            self._pictures[size] = picture
+        return picture.draw(size, scale)
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same point of the map. See `MapDrawing`."""
+        picture = self._pictures.get(size)
+        if picture is None or self._is_covered():
+            return pixel
+        return picture.find_window_pixel(pixel)

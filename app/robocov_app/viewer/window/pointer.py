@@ -1,6 +1,7 @@
 """The mouse over the viewer's canvas and chart: tools, panning, the time slider."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import pygame
 
@@ -22,13 +23,53 @@ from robocov_app.viewer.canvas.canvas import HoveredRobot, ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.scrubbing import TimeGesture
-from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
 
 MENU_REACH_FRACTION = 0.5  # fraction of the reach within which a right click selects an obstacle
+
+
+@dataclass(frozen=True)
+class PointerTargets:
+    """Parts of the window that the mouse acts on.
+
+    Attributes
+    ----------
+    canvas : ViewerCanvas
+        The panes.
+    chart : Chart
+        The chart and the time slider.
+    layer_bar : LayerBar
+        The chips over the canvas.
+    parts : sequence of WindowPart
+        Top bar, tool rail and panel, which get events first.
+    """
+
+    canvas: ViewerCanvas
+    chart: Chart
+    layer_bar: LayerBar
+    parts: Sequence[WindowPart]
+
+
+@dataclass(frozen=True)
+class PointerActions:
+    """Functions of the window that the mouse calls.
+
+    Attributes
+    ----------
+    leave_lesson : callable
+        Lets the user take over from a lesson.
+    open_menu : callable
+        Opens the context menu at a pixel.
+    show_robot_page : callable
+        Shows the page of the panel that describes the selected robot.
+    """
+
+    leave_lesson: Callable[[], None]
+    open_menu: Callable[[Pixel], None]
+    show_robot_page: Callable[[], None]
 
 
 class ViewerPointer(Pointer):
@@ -38,42 +79,20 @@ class ViewerPointer(Pointer):
     ----------
     viewer : Presenter
         The viewer.
-    canvas : ViewerCanvas
-        The panes.
-    chart : Chart
-        The chart and the time slider.
-    panel : ViewerPanel
-        The panel.
-    layer_bar : LayerBar
-        The chips over the canvas.
-    parts : sequence of WindowPart
-        Top bar, tool rail and panel, which get events first.
-    leave_lesson : callable
-        Lets the user take over from a lesson.
-    open_menu : callable
-        Opens the context menu at a pixel.
+    targets : PointerTargets
+        Parts of the window that the mouse acts on.
+    actions : PointerActions
+        Functions of the window that the mouse calls.
     """
 
-    def __init__(
-        self,
-        viewer: Presenter,
-        canvas: ViewerCanvas,
-        chart: Chart,
-        panel: ViewerPanel,
-        layer_bar: LayerBar,
-        parts: Sequence[WindowPart],
-        leave_lesson: Callable[[], None],
-        open_menu: Callable[[Pixel], None],
-    ) -> None:
+    def __init__(self, viewer: Presenter, targets: PointerTargets, actions: PointerActions) -> None:
         """Connect the mouse to the parts of the window."""
-        super().__init__(parts)
+        super().__init__(targets.parts)
         self._viewer = viewer
-        self._canvas = canvas
-        self._chart = chart
-        self._viewer_panel = panel
-        self._layer_bar = layer_bar
-        self._leave_lesson = leave_lesson
-        self._open_menu = open_menu
+        self._canvas = targets.canvas
+        self._chart = targets.chart
+        self._layer_bar = targets.layer_bar
+        self._actions = actions
         self._snapper = MapSnapper()
 
     def get_scale(self) -> float:
@@ -126,6 +145,15 @@ class ViewerPointer(Pointer):
         self._chart.hover = None
         self._layer_bar.hover(None)
 
+    def zoom(self, factor: float) -> None:
+        """Zoom by a factor about the mouse if it is over a pane, else about the center of the first pane."""
+        canvas = self._canvas
+        left, top, width, height = canvas.layout.panes[0]
+        center: tuple[float, float] = (left + width / 2, top + height / 2)
+        if canvas.find_pane(self.pixel) is not None:
+            center = self.pixel
+        canvas.zoom(factor, center)
+
     def handle_wheel(self, event: pygame.event.Event) -> None:
         """Zoom the map, or change the size of the tool."""
         if self._canvas.find_pane(self.pixel) is None or self._layer_bar.is_over(self.pixel):
@@ -163,7 +191,7 @@ class ViewerPointer(Pointer):
         if node is not None:
             viewer.attempt(lambda: viewer.playback.go_to_node(node))
             return None
-        self._leave_lesson()
+        self._actions.leave_lesson()
         viewer.attempt(lambda: viewer.playback.show_time(chart.to_time(pixel[0])))
         return TimeGesture(viewer, chart)
 
@@ -172,7 +200,7 @@ class ViewerPointer(Pointer):
         viewer = self._viewer
         canvas = self._canvas
         hand = viewer.toolbox.hand
-        self._leave_lesson()
+        self._actions.leave_lesson()
         # Leaving a lesson may have brought back a session with fewer panes.
         pane = min(pane, len(viewer.session.timeline.panes) - 1)
         if viewer.active_pane != pane:
@@ -186,7 +214,7 @@ class ViewerPointer(Pointer):
         if viewer.tool is not hand:
             return ViewerToolGesture(self, pane)
         if pointer.robot is not None:
-            self._viewer_panel.show_tab("robot")
+            self._actions.show_robot_page()
         if hand.is_holding:
             return ViewerToolGesture(self, pane)
         return PanGesture(canvas.camera.pan, self._click_without_tool)
@@ -251,7 +279,7 @@ class ViewerPointer(Pointer):
             viewer.attempt(viewer.finish_drawing)
         else:
             self._select_at(event.pos)
-            self._open_menu(event.pos)
+            self._actions.open_menu(event.pos)
 
     def _select_at(self, pixel: Pixel) -> None:
         """Select the robot or the obstacle at a pixel of a pane; nothing on the bare floor.

@@ -9,12 +9,10 @@ import pygame
 from robocov_app.look.theme import get_theme
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import Draft
-from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
-from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
@@ -25,7 +23,7 @@ from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
-from robocov_app.viewer.canvas.map_picture import MapPicture
+from robocov_app.viewer.canvas.map_picture import MapPictures
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.chart_focus import ChartFocus
 from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
@@ -43,17 +41,16 @@ from robocov_app.viewer.window.dialogs import (
     build_file_dialog,
     build_recovery_offer,
 )
-from robocov_app.viewer.window.pointer import ViewerPointer
-from robocov_app.viewer.window.screen_video import ScreenVideo
+from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
-from robocov_app.viewer.window.status import HINT, list_facts, suggest_actions
+from robocov_app.viewer.window.status import HINT, list_facts
+from robocov_app.viewer.window.status_display import StatusDisplay
 from robocov_app.viewer.window.top_bar import TopBar
+from robocov_app.viewer.window.video_recorder import VideoRecorder
 
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
-_LESSON_HINT = "F2 back to the lesson · Esc ends it"
 _FOCUS_KEYS = ("tab", "shift+tab")
-MAX_MAP_PICTURES = 8  # of different sizes that are kept
 _ASPECT_DECIMALS = 3  # smaller changes of the shape of the map do not change the layout
 
 
@@ -113,8 +110,8 @@ class ViewerWindow(CommandWindow):
         All commands.
     lesson : LessonGuide
         The lesson, if there is one.
-    video : ScreenVideo or None
-        The video being recorded.
+    video_recorder : VideoRecorder
+        Records videos of the window.
     run_saver : RunSaver
         Saves runs in other processes.
     focus : KeyboardFocus
@@ -125,15 +122,19 @@ class ViewerWindow(CommandWindow):
         Shares the session as text, as a file or as a link.
     is_help_open : bool
         Whether the help page is shown.
+    top_bar_class : type of TopBar
+        Class of the top bar.
     """
 
     groups = GROUPS
     keys_hint = KEYS_HINT
     palette_hint = PALETTE_HINT
     hint = HINT
+    top_bar_class: type[TopBar] = TopBar
 
     panel: ViewerPanel
     pointer: ViewerPointer
+    map_pictures: MapPictures
 
     def __init__(
         self,
@@ -149,7 +150,7 @@ class ViewerWindow(CommandWindow):
         self.viewer = viewer
         set_title(viewer.files.title)
         self.is_unattended = is_unattended
-        self.video: ScreenVideo | None = None
+        self.video_recorder = VideoRecorder(viewer, waits=is_unattended)
         self.run_saver = RunSaver(viewer.costs.lattice)
         self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
         self.canvas.camera.is_animated = not is_unattended
@@ -162,26 +163,23 @@ class ViewerWindow(CommandWindow):
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
-        self.top_bar = self.build_top_bar(viewer)
+        self.top_bar = self.top_bar_class(viewer, self.commands, self.do)
         self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.do)
         self.chart_focus = ChartFocus(self.chart)
         self.focus = KeyboardFocus(self._list_focus_groups)
-        self.pointer = ViewerPointer(
-            viewer,
-            self.canvas,
-            self.chart,
-            self.panel,
-            self.layer_bar,
-            self.parts,
-            self.lesson.leave,
-            self.open_menu,
+        targets = PointerTargets(self.canvas, self.chart, self.layer_bar, self.parts)
+        actions = PointerActions(
+            leave_lesson=self.lesson.leave,
+            open_menu=self.open_menu,
+            show_robot_page=lambda: self.panel.show_tab("robot"),
         )
-        self._map_pictures: dict[tuple[int, int], MapPicture] = {}
+        self.pointer = ViewerPointer(viewer, targets, actions)
+        self.map_pictures = MapPictures(viewer, self.canvas, lambda: self._is_map_covered)
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
+        self._status = StatusDisplay(viewer, self.lesson, self.hint, can_suggest=not is_unattended)
         self._inspector = RobotInspector(viewer, self.panel)
         self._layout_key: _LayoutKey | None = None  # of the current layout
-        self._unrecorded_s = 0.0  # time since the last frame of the video
         self._arrange()
         self.draw()
 
@@ -189,18 +187,14 @@ class ViewerWindow(CommandWindow):
         """Return further commands of a subclass."""
         return []
 
-    def build_top_bar(self, viewer: Presenter) -> TopBar:
-        """Build the top bar."""
-        return TopBar(viewer, self.commands, self.do)
-
     def _build_actions(self) -> ViewerWindowActions:
         """Return the functions of this window that commands call."""
         return ViewerWindowActions(
-            zoom=self.zoom,
+            zoom=lambda factor: self.pointer.zoom(factor),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
             save_screenshot=lambda: self.save_screenshot(self.viewer.files.folder),
-            toggle_recording=self.toggle_recording,
+            toggle_recording=lambda: self.video_recorder.toggle(self.screen),
             save_run=self.save_run,
             open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer.files)),
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
@@ -271,8 +265,7 @@ class ViewerWindow(CommandWindow):
         files.workspace.save_draft(files.view, at_once=True)
         # This restores the session and the layers from before the lesson, which are those to be saved.
         self.lesson.end()
-        if self.video is not None:
-            self.viewer.attempt(self.toggle_recording)
+        self.video_recorder.close()
         self.viewer.costs.close()
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
@@ -283,25 +276,6 @@ class ViewerWindow(CommandWindow):
         if panel is not None:
             view.has_panel = panel
         self.viewer.revision += 1
-
-    def draw_map(self, size: tuple[int, int], scale: float) -> pygame.Surface | None:
-        """Draw the panes without the controls; see `BaseWindow`. None while a page or a dialog is open."""
-        if self._is_map_covered:
-            return None
-        picture = self._map_pictures.get(size)
-        if picture is None:
-            if len(self._map_pictures) >= MAX_MAP_PICTURES:
-                self._map_pictures.clear()
-            picture = MapPicture(self.viewer, self.canvas)
-            self._map_pictures[size] = picture
-        return picture.draw(size, scale)
-
-    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return the pixel of the window that shows the same point of the map; see `BaseWindow`."""
-        picture = self._map_pictures.get(size)
-        if picture is None or self._is_map_covered:
-            return pixel
-        return picture.find_window_pixel(pixel)
 
     @property
     def _is_map_covered(self) -> bool:
@@ -314,31 +288,19 @@ class ViewerWindow(CommandWindow):
 
     def update(self, seconds: float) -> None:
         """Advance everything by a time, s."""
-        self._unrecorded_s += seconds
+        self.video_recorder.pass_time(seconds)
         self._pass_time(seconds)
         set_title(self.viewer.files.title)
         self.canvas.camera.update(seconds)
         self._cost_curves.update()
         self._arrange()
-        self._follow_robot()
+        self.canvas.follow_robot()
         self._inspector.update(self.viewer.now)
         self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
         self.top_bar.update()
         self.tool_rail.update()
         self.pointer.show_action(self.cursor)
-
-    def _follow_robot(self) -> None:
-        """Keep the robot that the camera follows in the middle of the view, as long as it is displayed."""
-        viewer = self.viewer
-        number = viewer.inspection.followed
-        displayed = viewer.session.displayed
-        numbers = displayed.numbers
-        if number is None or number not in numbers:
-            viewer.inspection.followed = None
-            return
-        x, y = displayed.get_positions(viewer.pane)[numbers.index(number)].tolist()
-        self.canvas.camera.center_on((x, y))
 
     def build_frame_key(self) -> object:
         """Return all values that the frame depends on, to detect changes; None while something moves."""
@@ -350,7 +312,7 @@ class ViewerWindow(CommandWindow):
             and not session.displayed.environment.has_moving_obstacles
         )
         if (
-            self.video is not None
+            self.video_recorder.video is not None
             or self.canvas.camera.is_moving
             or (session.playback.is_playing and not is_at_rest)
         ):
@@ -363,7 +325,7 @@ class ViewerWindow(CommandWindow):
             session.timeline.past_version,
             session.playback.is_playing,
             self._cost_curves.answer_count,
-            self._get_seek_progress(),
+            self._status.seek_progress,
             viewer.costs.state,
             self._layout_key,
             any(part.ui.needs_redraw for part in self.parts),
@@ -416,47 +378,17 @@ class ViewerWindow(CommandWindow):
         self.canvas.draw(self.screen)
         self.chart.draw(self.screen)
         self.chart_focus.draw(self.screen)
-        self._draw_status()
+        facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, self.video_recorder.duration)
+        self._status.draw_status_line(self.screen, layout, self.theme, facts)
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         self.tool_rail.draw(self.screen)
         self.top_bar.draw(self.screen)
-        self._draw_message(can_suggest=not has_lesson)
+        self._status.draw_message(self.screen, layout, self.theme)
         self.draw_above_map()
-        if self.video is not None:
-            self.video.add(self.screen, self._unrecorded_s)
-        self._unrecorded_s = 0.0
-
-    def _draw_status(self) -> None:
-        duration = None if self.video is None else self.video.duration
-        facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, duration)
-        hint = self.hint
-        if self.lesson.is_waiting:
-            hint = _LESSON_HINT
-        elif not self.viewer.session.playback.is_playing:
-            hint = hint.replace("Space pause", "Space play")
-        draw_status(self.screen, self.layout.status, self.theme, self.layout.scale, facts=facts, hint=hint)
-
-    def _get_seek_progress(self) -> float | None:
-        pending = self.viewer.session.timeline.pending_seek
-        if pending is None:
-            return None
-        return pending.progress
-
-    def _draw_message(self, *, can_suggest: bool) -> None:
-        """Draw the progress of a seek, the status message, or a suggestion."""
-        viewer = self.viewer
-        message = viewer.message
-        is_error = bool(message) and viewer.has_error_message
-        progress = self._get_seek_progress()
-        if progress is not None and not is_error:
-            message = f"Recomputing the session: {100 * progress:.0f} %"
-        if not message and can_suggest and not self.is_unattended:
-            message = suggest_actions(viewer)
-        arena = self.layout.arena
-        draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
+        self.video_recorder.add_frame(self.screen)
 
     def do(self, name: str) -> None:
         """Run the command with this name, unless the lesson or the help page handles it."""
@@ -470,14 +402,6 @@ class ViewerWindow(CommandWindow):
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
-
-    def zoom(self, factor: float) -> None:
-        """Zoom by a factor about the mouse if it is over a pane, else about the center of the first pane."""
-        left, top, width, height = self.layout.panes[0]
-        center: tuple[float, float] = (left + width / 2, top + height / 2)
-        if self.canvas.find_pane(self.pointer.pixel) is not None:
-            center = self.pointer.pixel
-        self.canvas.zoom(factor, center)
 
     def quit(self) -> None:
         """Close the window."""
@@ -495,21 +419,6 @@ class ViewerWindow(CommandWindow):
         """Save the run up to the present in a new folder; return a message."""
         files = self.viewer.files
         return self.run_saver.save(self.viewer.session, files.folder, files.map_name)
-
-    def toggle_recording(self) -> str:
-        """Start or stop a video of the window; return a message."""
-        view = self.viewer.view
-        if self.video is None:
-            target = find_free_path(self.viewer.files.folder, "robocov", ".mp4")
-            self.video = ScreenVideo(target, self.screen.get_size(), waits=self.is_unattended)
-            view.is_recording = True
-            return f"recording {target}; F9 stops it"
-        video = self.video
-        self.video = None
-        view.is_recording = False
-        video.close()
-        skipped = f", {video.skipped_count} frames left out" if video.skipped_count else ""
-        return f"video saved: {video.path} ({video.duration:.1f} s{skipped})"
 
     def open_file(self, path: Path) -> None:
         """Open a session or a map that was dropped on the window."""

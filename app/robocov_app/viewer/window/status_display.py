@@ -1,0 +1,67 @@
+"""Drawing of the status line and of the message above the map."""
+
+from __future__ import annotations
+
+import pygame
+
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.window.layout import Layout
+from robocov_app.viewer.lessons.guide import LessonGuide
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.window.status import suggest_actions
+
+_LESSON_HINT = "F2 back to the lesson · Esc ends it"
+
+
+class StatusDisplay:
+    """Draws what the viewer reports: facts and hints in the status line, messages above the map.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    lesson : LessonGuide
+        The lesson, if there is one.
+    hint : str
+        Keys to show at the end of the status line.
+    can_suggest : bool
+        Whether suggestions are shown, too.
+    """
+
+    def __init__(self, viewer: Presenter, lesson: LessonGuide, hint: str, *, can_suggest: bool) -> None:
+        self._viewer = viewer
+        self._lesson = lesson
+        self._hint = hint
+        self._can_suggest = can_suggest
+
+    @property
+    def seek_progress(self) -> float | None:
+        """Fraction of the steps of a seek that are recomputed; None if there is no seek."""
+        pending = self._viewer.session.timeline.pending_seek
+        if pending is None:
+            return None
+        return pending.progress
+
+    def draw_status_line(
+        self, screen: pygame.Surface, layout: Layout, theme: Theme, facts: list[str]
+    ) -> None:
+        """Draw the status line with facts, most important first, and the hint."""
+        hint = self._hint
+        if self._lesson.is_waiting:
+            hint = _LESSON_HINT
+        elif not self._viewer.session.playback.is_playing:
+            hint = hint.replace("Space pause", "Space play")
+        draw_status(screen, layout.status, theme, layout.scale, facts=facts, hint=hint)
+
+    def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> None:
+        """Draw the progress of a seek, the status message, or a suggestion."""
+        viewer = self._viewer
+        message = viewer.message
+        is_error = bool(message) and viewer.has_error_message
+        progress = self.seek_progress
+        if progress is not None and not is_error:
+            message = f"Recomputing the session: {100 * progress:.0f} %"
+        if not message and self._can_suggest and self._lesson.shown is None:
+            message = suggest_actions(viewer)
+        draw_message(screen, message, layout.arena, theme, layout.scale, is_error=is_error)
