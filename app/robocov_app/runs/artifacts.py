@@ -79,7 +79,7 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
             quiet=settings.hide_progress,
         )
         with Interruption() as interruption:
-            run = execute_scenario(scenario, cost, result, "", settings, interruption)
+            run = execute_scenario(scenario, cost, result, settings, interruption)
             save_figures([run], cost, result.staging, settings)
             _save_videos([run], cost, result, settings, interruption)
     return run, interruption.requested
@@ -119,7 +119,9 @@ def execute_comparison(
         with Interruption() as interruption:
             start_comparison(result.staging, list(scenarios))
             for subfolder, scenario in scenarios.items():
-                runs[subfolder] = execute_scenario(scenario, cost, result, subfolder, settings, interruption)
+                runs[subfolder] = execute_scenario(
+                    scenario, cost, result, settings, interruption, subfolder=subfolder
+                )
                 if interruption.requested:
                     break
             save_comparison(runs, cost, result.staging, settings)

@@ -59,8 +59,8 @@ def refine_cost_for_figures(
     ----------
     environment : Environment
     cost : CoverageCost
-        Cost of this map. It is returned unchanged if it is fine enough, or if the map has so many vertices
-        that a finer cost would take too long.
+        Cost of this map. It is returned unchanged if it is fine enough, or if a finer cost would take too
+        long because the map has many vertices.
     lattice : int or None
         Minimum lattice size. None stands for `MIN_FIGURE_LATTICE`.
 

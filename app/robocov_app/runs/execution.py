@@ -52,9 +52,10 @@ def execute_scenario(
     scenario: Scenario,
     cost: CoverageCost,
     result: ResultFolder,
-    subfolder: str,
     settings: OutputSettings,
     interruption: Interruption,
+    *,
+    subfolder: str = "",
 ) -> Run:
     """Simulate a scenario, evaluate the run, and save its numbers.
 
@@ -64,11 +65,11 @@ def execute_scenario(
     cost : CoverageCost
         Cost of the scenario's map.
     result : ResultFolder
-    subfolder : str
-        Name of a subfolder of the result; empty for the result folder itself.
     settings : OutputSettings
     interruption : Interruption
         The run ends early if an interruption is requested.
+    subfolder : str
+        Name of a subfolder of the result; empty for the result folder itself.
 
     Returns
     -------

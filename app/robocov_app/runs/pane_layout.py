@@ -127,7 +127,7 @@ def build_pane_layout(
     gaps_height = (rows - 1) * PANE_GAP_PX
     pane_width = (width - gaps_width) // columns
     if size is not None:
-        header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
+        header = _draw_legend(records, settings, width, scale, fields=fields, scenes=legend_scenes)
         pane_height = (height - len(header) - gaps_height) // rows
     else:
         # The legend has at least one row.
@@ -135,7 +135,7 @@ def build_pane_layout(
         max_pane_height = (height - min_header_height) / rows - PANE_GAP_PX
         pane_width, pane_height = _fit_pane(aspect, pane_width, max_pane_height, scale)
         width = columns * pane_width + gaps_width
-        header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
+        header = _draw_legend(records, settings, width, scale, fields=fields, scenes=legend_scenes)
         height = len(header) + rows * pane_height + gaps_height
         # Video encoders need even sizes.
         width += width % 2
@@ -180,6 +180,7 @@ def _draw_legend(
     settings: VideoSettings,
     width: int,
     scale: float,
+    *,
     fields: DistanceFields | None,
     scenes: Sequence[Scene] | None,
 ) -> Frame:

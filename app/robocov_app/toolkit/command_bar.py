@@ -8,12 +8,11 @@ from typing import NamedTuple
 from pygame import Rect, Surface
 
 from robocov_app.render.fonts import measure_text, shorten_to_width
-from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import draw_edge
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.widgets.appearance import TEXT_PX
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window_part import CommandPart
 
 NO_UNDO_REASON = "nothing to undo"
 NO_REDO_REASON = "nothing to redo"
@@ -75,17 +74,10 @@ class BarFile:
         return self.name
 
 
-class CommandBar(WindowPart):
+class CommandBar(CommandPart):
     """A bar with groups of buttons at the left end, in the middle, and at the right end.
 
-    Subclasses say what the window has open, and which buttons there are.
-
-    Parameters
-    ----------
-    commands : CommandTable
-        The commands of the window.
-    run_command : callable
-        Runs the command with a given name.
+    Subclasses provide the open file and further buttons; see also `CommandPart`.
 
     Attributes
     ----------
@@ -94,11 +86,6 @@ class CommandBar(WindowPart):
     """
 
     save_command = "save"
-
-    def __init__(self, commands: CommandTable, run_command: Callable[[str], object]) -> None:
-        super().__init__()
-        self._commands = commands
-        self._run_command = run_command
 
     def get_box(self, layout: Layout) -> Box:
         """Return the box of the bar."""
@@ -214,7 +201,7 @@ class CommandBar(WindowPart):
             icon,
             text,
             key=command,
-            tip=self._commands[command].tip,
+            tip=self.commands[command].tip,
             disabled_reason=disabled_reason,
             selected=selected,
             has_label=has_label,
@@ -223,7 +210,7 @@ class CommandBar(WindowPart):
             self._run_command(command)
 
     def _show_main_button(self, ui: Ui, *, icon: str, text: str, command: str) -> None:
-        if ui.main_button(icon, text, key=command, tip=self._commands[command].tip):
+        if ui.main_button(icon, text, key=command, tip=self.commands[command].tip):
             self._run_command(command)
 
     def _build_file_name(self, ui: Ui, file: BarFile, max_width: float) -> BarCell:
@@ -232,7 +219,7 @@ class CommandBar(WindowPart):
         width = measure_text(text, ui.px(TEXT_PX)) / ui.scale + SPACE_PX
         tip = file.location
         if file.has_unsaved_edits:
-            tip += f"; it has unsaved changes: {self._commands[self.save_command].tip}"
+            tip += f"; it has unsaved changes: {self.commands[self.save_command].tip}"
         return BarCell(width, partial(_show_file_name, text=text, tip=tip))
 
 

@@ -3,6 +3,10 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from robocov_app.toolkit.window.input import ENTER_KEYS
+
+_ACTIVATION_KEYS = (*ENTER_KEYS, "space")
+
 
 class FocusGroup(Protocol):
     """A part of a window with widgets that can have the focus, such as a `Page`.
@@ -23,6 +27,40 @@ class FocusGroup(Protocol):
 
     def stop_typing(self) -> None:
         """Take the focus away from all widgets of the group."""
+
+
+class BasicFocusGroup:
+    """A group that is not a page of widgets: it stores the key with the focus, and Enter or Space uses it.
+
+    Attributes
+    ----------
+    focus : str or None
+        Key of the element with the focus; see `FocusGroup`.
+    """
+
+    def __init__(self) -> None:
+        self.focus: str | None = None
+
+    def set_focus(self, key: str) -> None:
+        """Give the focus to an element."""
+        self.focus = key
+
+    def stop_typing(self) -> None:
+        """Take the focus away."""
+        self.focus = None
+
+    def handle_key(self, name: str) -> bool:
+        """Handle a key while an element has the focus; return whether it was used."""
+        if self.focus is None:
+            return False
+        if name == "escape":
+            self.focus = None
+            return True
+        return name in _ACTIVATION_KEYS and self.activate(self.focus)
+
+    def activate(self, key: str) -> bool:
+        """Use the element with the focus; return whether there was anything to do."""
+        return False
 
 
 class KeyboardFocus:

@@ -1,121 +1,14 @@
-"""Parts of a window with widgets, and panels with tabbed pages whose buttons run commands."""
+"""Panels with tabbed pages, whose buttons run commands."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
-import pygame
-from pygame import Rect, Surface
-
-from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.widgets.ui import Ui
-from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window_part import CommandPart
 
 PanelPage: TypeAlias = Callable[[Ui], None]
 """Function that shows the widgets of a page and handles their input."""
-
-
-class WindowPart:
-    """A rectangular part of a window with widgets, such as the panel or the top bar.
-
-    Attributes
-    ----------
-    is_covered : bool
-        Whether something else is drawn over it and gets its events.
-    hidden : bool
-        Whether it is not shown.
-    ui : Ui
-        Page with the widgets.
-    drawn_state : object
-        State of the content when it was last drawn, for parts that are redrawn only when it changes.
-    """
-
-    def __init__(self) -> None:
-        self.is_covered = False
-        self.hidden = False
-        self.ui = Ui(self.show_content, LIGHT)
-        self.drawn_state: object = None
-
-    def show_content(self, ui: Ui) -> None:
-        """Show the widgets, and handle their input; called in every run of the page."""
-
-    def get_box(self, layout: Layout) -> Box:
-        """Return the box of this part in a layout."""
-        return layout.panel
-
-    def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt the position and the scale of this part in a layout, and the colors of a theme."""
-        box = self.get_box(layout)
-        # A part of width or height 0 is hidden.
-        self.hidden = not (box.width and box.height)
-        if self.hidden:
-            self.ui.stop_typing()
-        if theme is not self.ui.theme or layout.scale != self.ui.scale:
-            self.ui = Ui(self.show_content, theme, layout.scale)
-        self.ui.box = Rect(box)
-        self.ui.needs_redraw = True
-
-    def request_redraw(self, state: object) -> None:
-        """Request a redraw if the state of the content has changed since the last one."""
-        if state != self.drawn_state:
-            self.drawn_state = state
-            self.ui.needs_redraw = True
-
-    def draw(self, screen: Surface) -> None:
-        """Draw the widgets, the open list and the tool tip."""
-        self.ui.draw(screen)
-        self.ui.draw_overlays(screen)
-
-    def handle_event(self, event: pygame.event.Event) -> bool:
-        """Pass an event to the widgets; return whether it was meant for this part."""
-        return not self.is_covered and not self.hidden and self.ui.handle_event(event)
-
-
-def offer_event(parts: Sequence[WindowPart], event: pygame.event.Event) -> bool:
-    """Offer an event to the parts of a window until one uses it.
-
-    A part with an open list or a held button comes first. A press on one part ends typing in the others.
-
-    Parameters
-    ----------
-    parts : sequence of WindowPart
-    event : pygame.event.Event
-
-    Returns
-    -------
-    bool
-        Whether a part has used the event.
-    """
-    if event.type == pygame.MOUSEMOTION:
-        # All parts follow the pointer, since leaving one of them changes how it is drawn.
-        uses = [part.handle_event(event) for part in parts]
-        return any(uses)
-    by_urgency = sorted(parts, key=lambda part: not part.ui.is_busy)
-    user = next((part for part in by_urgency if part.handle_event(event)), None)
-    if event.type == pygame.MOUSEBUTTONDOWN:
-        for part in parts:
-            if part is not user and part.ui.focus is not None:
-                part.ui.stop_typing()
-    return user is not None
-
-
-class SidePanel(WindowPart):
-    """A panel next to the arena.
-
-    Parameters
-    ----------
-    tab : str
-        Name of the tab that is open first.
-
-    Attributes
-    ----------
-    tab : str
-        Name of the open tab.
-    """
-
-    def __init__(self, tab: str) -> None:
-        super().__init__()
-        self.tab = tab
 
 
 class PanelButton(NamedTuple):
@@ -133,15 +26,8 @@ class PanelButton(NamedTuple):
     command: str
 
 
-class CommandPanel(SidePanel):
-    """A panel with tabbed pages whose buttons run the commands of the window.
-
-    Parameters
-    ----------
-    commands : CommandTable
-        The commands of the window.
-    run_command : callable
-        Runs the command with a given name.
+class CommandPanel(CommandPart):
+    """A panel with tabbed pages whose buttons run the commands of the window; see `CommandPart`.
 
     Attributes
     ----------
@@ -149,17 +35,16 @@ class CommandPanel(SidePanel):
         Names of the pages.
     tab_widths : tuple of float, px
         Widths of their tabs at scale 1; tabs of width 0 share the remaining width.
-    commands : CommandTable
-        The commands of the window.
+    tab : str
+        Name of the open tab.
     """
 
     tabs: tuple[str, ...] = ()
     tab_widths: tuple[float, ...] = ()
 
     def __init__(self, commands: CommandTable, run_command: Callable[[str], object]) -> None:
-        super().__init__(self.tabs[0])
-        self.commands = commands
-        self._run_command = run_command
+        super().__init__(commands, run_command)
+        self.tab = self.tabs[0]
 
     def list_pages(self) -> dict[str, PanelPage]:
         """Return the pages by the names of their tabs."""

@@ -8,10 +8,10 @@ from pygame import Rect, Surface
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.overlay import draw_edge
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tools.tool import Tool, Toolbox
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window_part import CommandPart
 
 VIEW_COMMANDS = ("fit", "zoom:in", "zoom:out")
 """Commands of the camera, shown below the tools as far as there is space."""
@@ -27,7 +27,7 @@ _GROUP_LINE_PX = 26.0
 _SHIFT_SYMBOL = "⇧"
 
 
-class ToolRail(WindowPart):
+class ToolRail(CommandPart):
     """Buttons that choose a tool, and buttons for the camera below them.
 
     Parameters
@@ -43,10 +43,8 @@ class ToolRail(WindowPart):
     def __init__(
         self, toolbox: Toolbox[Any], commands: CommandTable, run_command: Callable[[str], object]
     ) -> None:
-        super().__init__()
+        super().__init__(commands, run_command)
         self._toolbox = toolbox
-        self._commands = commands
-        self._run_command = run_command
 
     def get_box(self, layout: Layout) -> Box:
         """Return the box of the rail."""
@@ -82,7 +80,7 @@ class ToolRail(WindowPart):
             ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
             for tool in group:
                 is_selected = tool is self._toolbox.current
-                tip = _build_tip(tool, self._commands[f"tool:{tool.name}"])
+                tip = _build_tip(tool, self.commands[f"tool:{tool.name}"])
                 self._show_button(ui, tool.name, tip, f"tool:{tool.name}", tool.title, selected=is_selected)
         view_count = int((tools_height - count * pitch - _GROUP_GAP_PX) / pitch)
         if view_count < 1:
@@ -90,14 +88,14 @@ class ToolRail(WindowPart):
         _show_line(ui)
         ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
         for command in VIEW_COMMANDS[:view_count]:
-            entry = self._commands[command]
+            entry = self.commands[command]
             self._show_button(ui, command, entry.tip, command, entry.title)
 
     def _show_button(
         self, ui: Ui, icon: str, tip: str, command: str, title: str, *, selected: bool = False
     ) -> None:
         """Show a button with the key of its command."""
-        shortcut = _abbreviate_key(self._commands[command].key_text)
+        shortcut = _abbreviate_key(self.commands[command].key_text)
         if ui.icon_button(icon, title, key=command, tip=tip, selected=selected, shortcut=shortcut):
             self._run_command(command)
 

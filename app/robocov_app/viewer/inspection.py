@@ -33,17 +33,17 @@ class Inspection:
     cursor_pane: int = 0
 
     def select_robot(self, number: int) -> None:
-        """Select a robot instead of what was selected before."""
+        """Select a robot, and deselect all obstacles."""
         self.selected = number
         self.obstacles = ()
 
     def select_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Select obstacles instead of what was selected before."""
+        """Select these obstacles, and deselect everything else."""
         self.selected = None
         self.obstacles = obstacles
 
     def toggle_obstacle(self, obstacle: Obstacle) -> None:
-        """Select an obstacle in addition to others, or no longer."""
+        """Add an obstacle to the selection; remove it if it is selected already."""
         if obstacle in self.obstacles:
             self.obstacles = tuple(other for other in self.obstacles if other != obstacle)
         else:

@@ -51,7 +51,7 @@ class WindowInput:
 
     @property
     def is_full(self) -> bool:
-        """Whether so many messages are waiting that no more should be read."""
+        """Whether the queue is full, so that no more messages should be read."""
         return len(self._messages) > MAX_WAITING_MESSAGES
 
     def put(self, message: InputMessage | Uploaded) -> None:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import pygame
 import pytest
 
-from robocov_app.toolkit.panel import SidePanel
 from robocov_app.toolkit.tools.pointer import Gesture, PanGesture, Pointer
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S
+from robocov_app.toolkit.window_part import WindowPart
 
 
 class RecordedPointer(Pointer):
     """A pointer whose presses pan, and that records pans, clicks and counts of clicks."""
 
     def __init__(self, scale: float = 1.0) -> None:
-        super().__init__((SidePanel(""),))
+        super().__init__((WindowPart(),))
         self.scale = scale
         self.panned = (0, 0)
         self.clicks: list[int] = []

@@ -26,14 +26,12 @@ ASPECTS = st.floats(0.1, 10.0)
 def draw_layouts(draw: st.DrawFn) -> Layout:
     size = draw(WIDTHS), draw(HEIGHTS)
     panes = draw(st.integers(1, 4))
-    rows = draw(st.integers(1, 3))
     return build_layout(
         size,
         draw(SCALES),
         panes,
         draw(ASPECTS),
         panel=draw(st.booleans()),
-        legend_rows=rows,
     )
 
 
@@ -120,7 +118,7 @@ def test_every_pixel_is_in_one_box(layout: Layout, x: int, y: int) -> None:
     assert sum(is_inside(box, pixel) for box in list_boxes(layout)) == 1
 
 
-@pytest.mark.parametrize(("size", "rows"), [((1280, 720), 1), ((900, 600), 2), ((2560, 1440), 1)])
-def test_four_panes_form_two_columns_if_their_maps_are_larger_so(size: tuple[int, int], rows: int) -> None:
-    layout = build_layout(size, 1.0, 4, 4 / 3, legend_rows=rows)
+@pytest.mark.parametrize("size", [(1280, 720), (900, 600), (2560, 1440)])
+def test_four_panes_form_two_columns_if_their_maps_are_larger_so(size: tuple[int, int]) -> None:
+    layout = build_layout(size, 1.0, 4, 4 / 3)
     assert len({left for left, *_ in layout.panes}) == 2

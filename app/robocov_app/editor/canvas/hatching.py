@@ -1,5 +1,7 @@
 """Hatching of areas that are too narrow for robots, and of areas that are cut off from the rest."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pygame
 from pygame import Rect, Surface
@@ -20,6 +22,14 @@ _TINT_OPACITY = 56
 _LINE_OPACITY = 235
 
 
+class _HatchedArea(NamedTuple):
+    """An area with the color of its hatching, and the opacity from 0 to 1."""
+
+    outline: Outline
+    color: Color
+    strength: float
+
+
 def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Hatch the areas that are too narrow for robots, and the areas that are cut off from the rest.
 
@@ -35,27 +45,26 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
     tuple of Surface and Rect, or None
         A premultiplied image and its position in the window, px; None if nothing is visible.
     """
-    areas: list[tuple[Outline, Color, float]] = []
+    areas: list[_HatchedArea] = []
     if not measurement.cut_off.is_empty:
-        outline = build_outline(measurement.cut_off)
-        areas.append((outline, view.theme.cut_off, CUT_OFF_STRENGTH))
+        cut_off = build_outline(measurement.cut_off)
+        areas.append(_HatchedArea(cut_off, view.theme.cut_off, CUT_OFF_STRENGTH))
     if not measurement.impassable.is_empty:
-        areas.append((build_outline(measurement.impassable), view.theme.error, 1.0))
+        impassable = build_outline(measurement.impassable)
+        areas.append(_HatchedArea(impassable, view.theme.error, 1.0))
     if not areas:
         return None
-    bounds = total_bounds([outline.geometry for outline, _, _ in areas])
+    bounds = total_bounds([area.outline.geometry for area in areas])
     box = compute_pixel_box(view.camera, bounds).clip(view.clip)
     if not box:
         return None
     image = Surface(box.size, pygame.SRCALPHA, 32)
-    for outline, color, strength in areas:
-        _hatch_area(view, image, box, outline, color, strength)
+    for area in areas:
+        _hatch_area(view, image, box, area)
     return image, box
 
 
-def _hatch_area(
-    view: View, image: Surface, box: Rect, outline: Outline, color: Color, strength: float
-) -> None:
+def _hatch_area(view: View, image: Surface, box: Rect, area: _HatchedArea) -> None:
     """Hatch one area.
 
     Parameters
@@ -66,12 +75,9 @@ def _hatch_area(
         Premultiplied image to draw on.
     box : Rect
         Position of the image in the window, px.
-    outline : Outline
-        Outline of the area.
-    color : tuple of int
-    strength : float
-        Opacity, from 0 to 1.
+    area : _HatchedArea
     """
+    outline = area.outline
     mask = view.build_canvas(Surface(box.size, pygame.SRCALPHA, 32))
     edges = view.build_canvas(image)
     rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
@@ -82,12 +88,12 @@ def _hatch_area(
             mask.draw_outline(ring, _WHITE, 1)
         else:
             mask.fill_polygon(ring, _TRANSPARENT)
-    lines = draw_hatch_pattern(box, color, view.scale, strength)
+    lines = draw_hatch_pattern(box, area.color, view.scale, area.strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     image.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
-            edges.draw_outline(ring, color, edges.scale_width(1.0))
+            edges.draw_outline(ring, area.color, edges.scale_width(1.0))
 
 
 def draw_hatch_pattern(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:

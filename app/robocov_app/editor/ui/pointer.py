@@ -8,7 +8,6 @@ from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tools.pointer import (
     LEFT_BUTTON,
     RIGHT_BUTTON,
@@ -21,6 +20,7 @@ from robocov_app.toolkit.tools.pointer import (
 from robocov_app.toolkit.tools.snapping import Snap
 from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
+from robocov_app.toolkit.window_part import WindowPart
 
 
 class EditorPointer(Pointer):

@@ -33,7 +33,6 @@ from robocov_app.render.camera import Camera
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.tools.viewport import REACH_PX
@@ -41,6 +40,7 @@ from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
+from robocov_app.toolkit.window_part import WindowPart
 
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"

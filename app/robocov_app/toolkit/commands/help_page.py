@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from pygame import Rect, Surface
 
@@ -12,6 +13,9 @@ from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.overlay import draw_card, draw_veil
 from robocov_app.toolkit.window.input import format_key
+
+Position: TypeAlias = tuple[float, float]
+"""Horizontal and vertical position in the window, px."""
 
 # Lengths in pixels at scale 1.
 _WIDE_WINDOW_PX = 1150
@@ -107,12 +111,12 @@ def draw_help_page(
     columns = _arrange_columns(screen, scale, rows=len(lines) + len(groups))
     draw_card(screen, columns.box, theme, scale)
     _draw_title(screen, theme, columns, hint)
-    for line, x, y in _place_lines(lines, columns):
+    for line, (x, y) in _place_lines(lines, columns):
         if isinstance(line, str):
             size = max(_MIN_TEXT_PX, round(columns.text_size * _HEADING_TEXT_FRACTION))
             screen.blit(render_text(line.upper(), size, theme.accent, True), (round(x), round(y)))
         else:
-            _draw_command(screen, theme, columns, line, x, y)
+            _draw_command(screen, theme, columns, line, (x, y))
 
 
 def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str | Command]:
@@ -154,8 +158,8 @@ def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> 
 
 def _place_lines(
     lines: Sequence[str | Command], columns: _Columns
-) -> Iterator[tuple[str | Command, float, float]]:
-    """Yield each line with the x and y coordinates of its upper left corner, px."""
+) -> Iterator[tuple[str | Command, Position]]:
+    """Yield each line with the position of its upper left corner, px."""
     row_height = columns.row_height
     x = columns.box.left + _MARGIN_PX * columns.scale
     y = columns.top
@@ -170,14 +174,16 @@ def _place_lines(
             y = columns.top
         if is_heading and y > columns.top + columns.scale:
             y += _HEADING_GAP_ROWS * row_height
-        yield line, x, y
+        yield line, (x, y)
         y += row_height
 
 
 def _draw_command(
-    screen: Surface, theme: Theme, columns: _Columns, command: Command, x: float, y: float
+    screen: Surface, theme: Theme, columns: _Columns, command: Command, position: Position
 ) -> None:
+    """Draw the key and the title of a command in a row; `position` is the upper left corner, px."""
     size = columns.text_size
+    x, y = position
     screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
     max_width = columns.width - (_KEY_WIDTH_PX + _TITLE_GAP_PX) * columns.scale
     title = shorten_to_width(command.title.partition(":")[0], size, max_width)

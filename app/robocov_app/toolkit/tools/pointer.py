@@ -6,8 +6,8 @@ from typing import NamedTuple, TypeAlias
 
 import pygame
 
-from robocov_app.toolkit.panel import WindowPart, offer_event
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX
+from robocov_app.toolkit.window_part import WindowPart, offer_event
 
 LEFT_BUTTON = 1
 RIGHT_BUTTON = 3

@@ -114,21 +114,9 @@ def draw_tool_tip(
         image = sketch(scale)
         width = max(width, image.get_width())
         height += distance + image.get_height()
-    box = Rect(0, 0, width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
-    if is_beside:
-        box.midleft = widget.right + distance, widget.centery
-    else:
-        box.topleft = x, widget.bottom + distance
-        if box.bottom > screen.get_height():
-            box.bottom = widget.top - distance
-    box.clamp_ip(screen.get_rect())
-    # The text is light in both themes.
-    strength = _FILL_STRENGTH
-    if theme is LIGHT:
-        strength = _LIGHT_FILL_STRENGTH
-    fill = mix(theme.panel, theme.ink, strength)
-    edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
-    draw_rounded_box(screen, box, fill, edge=edge, radius=round(_CORNER_RADIUS_PX * scale))
+    box_size = (width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
+    box = _place_box(box_size, widget, distance, screen.get_rect(), x=x, is_beside=is_beside)
+    _draw_box(screen, box, theme, scale)
     left = box.left + round(_MARGIN_PX * scale)
     top = box.top + distance
     for line in lines:
@@ -136,6 +124,30 @@ def draw_tool_tip(
         top += line_height
     if image is not None:
         screen.blit(image, (left, top + distance), special_flags=BLEND_PREMULTIPLIED)
+
+
+def _place_box(
+    size: tuple[int, int], widget: Rect, distance: int, window: Rect, *, x: int, is_beside: bool
+) -> Rect:
+    """Return the box of a tip at a distance from its widget, px, inside the window; see `draw_tool_tip`."""
+    box = Rect((0, 0), size)
+    if is_beside:
+        box.midleft = widget.right + distance, widget.centery
+    else:
+        box.topleft = x, widget.bottom + distance
+        if box.bottom > window.height:
+            box.bottom = widget.top - distance
+    return box.clamp(window)
+
+
+def _draw_box(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
+    """Draw the empty box of a tip; its text is light in both themes."""
+    strength = _FILL_STRENGTH
+    if theme is LIGHT:
+        strength = _LIGHT_FILL_STRENGTH
+    fill = mix(theme.panel, theme.ink, strength)
+    edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
+    draw_rounded_box(screen, box, fill, edge=edge, radius=round(_CORNER_RADIUS_PX * scale))
 
 
 def _list_lines(text: str, size: int, width: float) -> list[_Line]:

@@ -13,12 +13,13 @@ from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.help_page import draw_help_page
 from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Dialogs
-from robocov_app.toolkit.panel import CommandPanel, WindowPart, offer_event
+from robocov_app.toolkit.panel import CommandPanel
 from robocov_app.toolkit.tools.pointer import Pointer
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.toolkit.window.window_model import WindowModel
+from robocov_app.toolkit.window_part import WindowPart, offer_event
 
 Action: TypeAlias = Callable[[], object]
 

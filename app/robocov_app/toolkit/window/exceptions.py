@@ -8,6 +8,7 @@ import os
 import sys
 import traceback
 from collections import Counter
+from collections.abc import Callable
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
@@ -64,6 +65,15 @@ class ExceptionLog:
             name = f"{name}: {message}"
         log = "the terminal" if self.file is None else str(self.file)
         return f"Internal error while {action} ({name}). Details: {log}."
+
+    def attempt(self, action: str, call: Callable[[], object]) -> bool:
+        """Call a function, and record any exception that it raises; return whether it succeeded."""
+        try:
+            call()
+        except Exception as error:
+            self.record(error, action)
+            return False
+        return True
 
     def _write(self, error: BaseException, action: str, count: int) -> None:
         """Write an exception with its traceback to the log; `count` is how often it has occurred."""

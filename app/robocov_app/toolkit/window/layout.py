@@ -13,8 +13,8 @@ CHART_HEIGHT_PX = 118
 TIME_SLIDER_HEIGHT_PX = 26
 STATUS_HEIGHT_PX = 26
 PANE_GAP_PX = 2
-LEGEND_ROW_PX = 22
-_LEGEND_MARGIN_PX = 6
+LEGEND_HEIGHT_PX = 28
+"""Height of the legend that several panes share."""
 _PANE_MARGINS_PX = (31, 68)
 """Width and height of a pane in addition to those of its map."""
 MIN_SIZE_PX = (900, 600)
@@ -93,7 +93,6 @@ def build_layout(
     aspect: float = 1.0,
     *,
     panel: bool = True,
-    legend_rows: int = 1,
     plot: bool = True,
 ) -> Layout:
     """Lay out a window.
@@ -109,8 +108,6 @@ def build_layout(
         Width of the map divided by its height.
     panel : bool
         Whether the panel is shown.
-    legend_rows : int
-        Number of rows of the shared legend.
     plot : bool
         Whether chart and time slider are shown.
 
@@ -120,15 +117,18 @@ def build_layout(
     """
     width, height = size
     scale = min(scale, find_max_scale(size))
-    panel_width = slider_height = chart_height = legend_height = 0
+    panel_width = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
-    # In small windows, the chart takes at most a third of the height.
+    slider_height = 0
+    chart_height = 0
     if plot:
+        # In small windows, the chart takes at most a third of the height.
         slider_height = round(TIME_SLIDER_HEIGHT_PX * scale)
         chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
+    legend_height = 0
     if panes > 1:
-        legend_height = round((_LEGEND_MARGIN_PX + LEGEND_ROW_PX * legend_rows) * scale)
+        legend_height = round(LEGEND_HEIGHT_PX * scale)
     bar_height = round(BAR_HEIGHT_PX * scale)
     rail_width = round(RAIL_WIDTH_PX * scale)
     left_width = width - panel_width

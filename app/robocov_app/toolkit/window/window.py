@@ -339,31 +339,19 @@ class BaseWindow:
         if count >= _MAX_CONSECUTIVE_EXCEPTIONS:
             self._retry_at_s[action] = perf_counter() + _RETRY_S
         message = self.exceptions.record(error, action)
-        if roll_back is not None and self._revert(roll_back):
+        if roll_back is not None and self.exceptions.attempt("undoing an action", roll_back):
             message += " The action was undone."
         message += " Save your work."
+        self.exceptions.attempt("reporting an error", lambda: self._show_exception(message, action))
+
+    def _show_exception(self, message: str, action: str) -> None:
+        """Show a message about an exception, over the incomplete frame if it was raised while drawing."""
         in_drawing = action == "drawing"
-        try:
-            (self.replacement or self).report_exception(message, in_drawing=in_drawing)
-            if in_drawing:
-                self._draw_error_message(message)
-        except Exception as second_error:
-            self.exceptions.record(second_error, "reporting an error")
-
-    def _revert(self, roll_back: RollBack) -> bool:
-        """Revert changes; return whether that succeeded."""
-        try:
-            roll_back()
-        except Exception as error:
-            self.exceptions.record(error, "undoing an action")
-            return False
-        return True
-
-    def _draw_error_message(self, message: str) -> None:
-        """Draw a message over the incomplete frame."""
-        width, height = self.screen.get_size()
-        draw_message(self.screen, message, Box(0, 0, width, height), LIGHT, 1.0, is_error=True)
-        self.show_screen()
+        (self.replacement or self).report_exception(message, in_drawing=in_drawing)
+        if in_drawing:
+            width, height = self.screen.get_size()
+            draw_message(self.screen, message, Box(0, 0, width, height), LIGHT, 1.0, is_error=True)
+            self.show_screen()
 
     # Display
 

@@ -22,7 +22,7 @@ _ARROWS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "up": (0.0, 1.0), "down": (
 
 
 class SelectionActions:
-    """Actions on what is selected: a robot or an obstacle.
+    """Actions on the selected robot or obstacle.
 
     Parameters
     ----------

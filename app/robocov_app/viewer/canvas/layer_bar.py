@@ -10,11 +10,11 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.keyboard_focus import BasicFocusGroup
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_card
 from robocov_app.toolkit.tools.pointer import Pixel
 from robocov_app.toolkit.widgets.appearance import draw_ring
 from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
-from robocov_app.toolkit.window.input import ENTER_KEYS
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.viewer.canvas.layer_chips import (
     CHIP_HEIGHT_PX,
@@ -49,7 +49,7 @@ _DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
 """Layers with symbols that need no explanation; their chips are left out first if space is short."""
 
 
-class LayerBar:
+class LayerBar(BasicFocusGroup):
     """Draws the chips and the menu of layers, and turns clicks on them into commands.
 
     Parameters
@@ -69,15 +69,13 @@ class LayerBar:
         Chips of the bar that were drawn last, with their boxes.
     rows : list of (Chip, Rect)
         Presets and layers of the open menu, with their boxes.
-    focus : str or None
-        The chip with the keyboard focus; see `FocusGroup`.
     """
 
     def __init__(self, view: ViewState, commands: CommandTable, run_command: Callable[[str], object]) -> None:
+        super().__init__()
         self.is_open = False
         self.chips: list[tuple[Chip, Rect]] = []
         self.rows: list[tuple[Chip, Rect]] = []
-        self.focus: str | None = None
         self._view = view
         self._commands = commands
         self._run_command = run_command
@@ -99,25 +97,10 @@ class LayerBar:
         """Return the chips that can have the focus, in the order of Tab."""
         return [_get_id(chip) for chip, _ in [*self.chips, *self.rows]]
 
-    def set_focus(self, key: str) -> None:
-        """Give the focus to a chip."""
-        self.focus = key
-
-    def stop_typing(self) -> None:
-        """Take the focus away."""
-        self.focus = None
-
-    def handle_key(self, name: str) -> bool:
-        """Handle a key while a chip has the focus; return whether it was used."""
-        if self.focus is None:
-            return False
-        if name == "escape":
-            self.focus = None
-            return True
-        if name not in (*ENTER_KEYS, "space"):
-            return False
+    def activate(self, key: str) -> bool:
+        """Run the command of the chip with the focus; return whether there is one."""
         for chip, _ in [*self.chips, *self.rows]:
-            if _get_id(chip) == self.focus:
+            if _get_id(chip) == key:
                 self._run_command(chip.command)
                 return True
         return False

@@ -40,7 +40,7 @@ class SharedCamera:
         self._glide: CameraGlide | None = None  # towards `_camera`, while it lasts
 
     def attach(self, painters: Sequence[Painter]) -> None:
-        """Let these painters, of one pane each, show what the previous ones showed."""
+        """Replace the painters, one for each pane; the new ones show the same section of the map."""
         self._painters = painters
         if self._camera is not None:
             self._pass_to_painters(self._camera)

@@ -2,8 +2,8 @@
 
 from pygame import Rect, Surface
 
+from robocov_app.toolkit.keyboard_focus import BasicFocusGroup
 from robocov_app.toolkit.widgets.appearance import draw_ring
-from robocov_app.toolkit.window.input import ENTER_KEYS
 from robocov_app.viewer.chart.branch_tree import BranchLine
 from robocov_app.viewer.chart.chart import Chart
 
@@ -13,23 +13,18 @@ _SLIDER_MARGIN_PX = 10.0
 """Distance of the ring from the ends of the time slider, at scale 1."""
 
 
-class ChartFocus:
-    """Gives the focus to parts of the chart; see `FocusGroup`.
+class ChartFocus(BasicFocusGroup):
+    """Gives the focus to parts of the chart: time slider, button and branches.
 
     The arrow keys move the time in any case, so the time slider needs no keys of its own.
 
     Parameters
     ----------
     chart : Chart
-
-    Attributes
-    ----------
-    focus : str or None
-        Part with the focus.
     """
 
     def __init__(self, chart: Chart) -> None:
-        self.focus: str | None = None
+        super().__init__()
         self._chart = chart
 
     def list_focusable_keys(self) -> list[str]:
@@ -39,25 +34,10 @@ class ChartFocus:
             return [_SLIDER, *branches]
         return [_SLIDER, _SWITCH, *branches]
 
-    def set_focus(self, key: str) -> None:
-        """Give the focus to a part."""
-        self.focus = key
-
-    def stop_typing(self) -> None:
-        """Take the focus away."""
-        self.focus = None
-
-    def handle_key(self, name: str) -> bool:
-        """Handle a key while a part has the focus; return whether it was used."""
-        if self.focus is None:
-            return False
-        if name == "escape":
-            self.focus = None
-            return True
-        if name not in (*ENTER_KEYS, "space"):
-            return False
+    def activate(self, key: str) -> bool:
+        """Plot the other quantity, or go to the branch with the focus; return whether anything was done."""
         viewer = self._chart.viewer
-        if self.focus == _SWITCH:
+        if key == _SWITCH:
             viewer.attempt(self._chart.switch_quantity)
             return True
         line = self._find_line()

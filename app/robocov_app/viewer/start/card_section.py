@@ -34,7 +34,7 @@ _MAX_TEXT_LINES = 2
 
 
 class CardSection:
-    """The cards, each of which opens an example.
+    """The cards; each card opens an example.
 
     Parameters
     ----------

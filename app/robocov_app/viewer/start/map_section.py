@@ -23,7 +23,7 @@ _MARGIN_PX = 6
 
 
 class MapSection:
-    """Thumbnails of the bundled maps, of which a row is shown at a time.
+    """A row of thumbnails of the bundled maps, which can be scrolled.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class MapSection:
         picture = Rect(box.left, box.top, box.width, box.height - drawing.px(_NAME_LINE_PX))
         picture = picture.inflate(-2 * margin, -2 * margin)
         outline = self._previews.outlines[name]
-        draw_outline(drawing.screen, outline, picture, theme, drawing.scale, theme.background)
+        draw_outline(drawing.screen, outline, picture, theme, drawing.scale, outside=theme.background)
         width = box.width - 2 * _NAME_MARGIN_PX * drawing.scale
         text = shorten_to_width(name, drawing.px(_NAME_PX), width)
         image = render_text(text, drawing.px(_NAME_PX), theme.ink)

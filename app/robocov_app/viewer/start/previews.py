@@ -167,7 +167,7 @@ def fit_outline(outline: Outline, box: Rect) -> Rect:
 
 
 def draw_outline(
-    screen: Surface, outline: Outline, box: Rect, theme: Theme, scale: float, outside: Color
+    screen: Surface, outline: Outline, box: Rect, theme: Theme, scale: float, *, outside: Color
 ) -> None:
     """Draw the outline of a map in the middle of a box, over the existing content.
 
@@ -250,7 +250,7 @@ def draw_run(
     positions, owners = run.interpolate(seconds)
     fitted = fit_outline(run.outline, box)
     screen.blit(_render_cells(owners, run.hues, fitted.size, theme), fitted)
-    draw_outline(screen, run.outline, box, theme, scale, outside)
+    draw_outline(screen, run.outline, box, theme, scale, outside=outside)
     left, bottom, right, top = run.outline.bounds
     is_small = len(run.hues) > MAX_SHOWN_NUMBERS
     radius = (_SMALL_ROBOT_PX if is_small else _ROBOT_PX) * scale

@@ -1,4 +1,4 @@
-"""Commands of the context menu, which depend on what is selected."""
+"""Commands of the context menu of a robot, a wall, another obstacle, or the floor."""
 
 from robocov_app.viewer.presenter import Presenter
 

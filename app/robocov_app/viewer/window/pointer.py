@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import pygame
 
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tools.pointer import (
     LEFT_BUTTON,
     RIGHT_BUTTON,
@@ -19,6 +18,7 @@ from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.window.layout import is_inside
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
+from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import HoveredRobot, ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart

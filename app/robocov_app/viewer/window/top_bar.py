@@ -116,7 +116,7 @@ class TopBar(CommandBar):
     def _show_speed(self, ui: Ui) -> None:
         viewer = self._viewer
         index = float(find_speed_index(viewer.session.playback.clock.speed))
-        tip = f"Speed: {self._commands['slower'].tip}, {self._commands['faster'].tip}"
+        tip = f"Speed: {self.commands['slower'].tip}, {self.commands['faster'].tip}"
         index_chosen = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0, tip=tip)
         if index_chosen is not None:
             viewer.attempt(partial(viewer.playback.set_speed, SPEEDS[round(index_chosen)]))

@@ -13,7 +13,6 @@ from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
-from robocov_app.toolkit.panel import WindowPart
 from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
@@ -21,6 +20,7 @@ from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window.window import FPS
+from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.canvas.map_picture import MapPictures

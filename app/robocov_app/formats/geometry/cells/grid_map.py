@@ -101,18 +101,15 @@ def build_grid_map(
     """
     _require_coordinates(cells, frame, where)
     # From here on the bottom row is first, in the direction of the y axis.
-    is_unknown = cells[::-1] == UNKNOWN
-    free = cells[::-1] == FREE
-    if unknown == "free":
-        free |= is_unknown
-    _require_free_cell(free, is_unknown, unknown_name, where)
+    known = cells[::-1] != UNKNOWN
+    free = _find_free_cells(cells[::-1], unknown, unknown_name, where)
     boundary = None
     dropped: tuple[str, ...] = ()
-    if unknown == "cut" and is_unknown.any():
-        main = _find_main_island(~is_unknown, free)
-        dropped = _describe_lost_cells(free & ~main, frame.cell)
-        free &= main
-        boundary = _build_rim(main, frame, where)
+    if unknown == "cut" and not known.all():
+        island = _find_main_island(known, free)
+        dropped = _describe_lost_cells(free & ~island, frame.cell)
+        free &= island
+        boundary = _build_rim(island, frame, where)
     outline = outline_cells(free, frame.place, where)
     return ForeignMap(
         name=name,
@@ -128,10 +125,20 @@ def build_grid_map(
     )
 
 
-def _require_free_cell(free: BoolArray, is_unknown: BoolArray, unknown_name: str, where: str) -> None:
-    """Raise MapError if no cell is free, with a hint if unknown cells could be free."""
+def _find_free_cells(cells: Cells, unknown: Meaning, unknown_name: str, where: str) -> BoolArray:
+    """Return the mask of the free cells.
+
+    Raises
+    ------
+    MapError
+        If no cell is free, with a hint if unknown cells could be free.
+    """
+    is_unknown = cells == UNKNOWN
+    free: BoolArray = cells == FREE
+    if unknown == "free":
+        free |= is_unknown
     if free.any():
-        return
+        return free
     hint = ""
     if is_unknown.any():
         hint = f" (--unknown free treats {unknown_name} cells as free)"
