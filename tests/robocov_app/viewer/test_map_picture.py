@@ -22,7 +22,7 @@ def test_pixels_of_the_map_have_pixels_of_the_window(driver: Driver, notches: in
     if notches:
         driver.turn_wheel(x, y, notches)
     driver.window.map_pictures.draw(PHONE, SCALE)
-    picture = driver.window._map_pictures[PHONE]
+    picture = driver.window.map_pictures._pictures[PHONE]
     position = get_position(driver, 2).tolist()
     pixel = picture._canvas.to_pixel(position)
     assert 0 <= pixel[0] < PHONE[0]
@@ -46,7 +46,7 @@ def test_each_controller_of_a_comparison_has_its_place(driver: Driver) -> None:
     driver.push_button("pane:add")
     driver.run_frames(2)
     assert driver.window.map_pictures.draw(PHONE, SCALE) is not None
-    boxes = driver.window._map_pictures[PHONE]._canvas.layout.panes
+    boxes = driver.window.map_pictures._pictures[PHONE]._canvas.layout.panes
     assert len(boxes) == 2
     assert boxes[1].top >= boxes[0].top + boxes[0].height, "one above the other on an upright screen"
 

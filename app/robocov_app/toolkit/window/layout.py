@@ -120,36 +120,52 @@ def build_layout(
     panel_width = 0
     if panel:
         panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
-    slider_height = 0
-    chart_height = 0
-    if plot:
-        # In small windows, the chart takes at most a third of the height.
-        slider_height = round(TIME_SLIDER_HEIGHT_PX * scale)
-        chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
     legend_height = 0
     if panes > 1:
         legend_height = round(LEGEND_HEIGHT_PX * scale)
-    bar_height = round(BAR_HEIGHT_PX * scale)
-    rail_width = round(RAIL_WIDTH_PX * scale)
     left_width = width - panel_width
-    status_height = round(STATUS_HEIGHT_PX * scale)
-    arena_height = max(height - bar_height - status_height - slider_height - chart_height, 1)
-    arena = Box(rail_width, bar_height, max(left_width - rail_width, 1), arena_height)
-    chart_top = bar_height + arena_height
-    slider_top = chart_top + chart_height
+    rail_width = round(RAIL_WIDTH_PX * scale)
+    rows = _choose_row_heights(height, scale, plot=plot)
+    arena = Box(rail_width, rows.bar, max(left_width - rail_width, 1), rows.arena)
+    chart_top = rows.bar + rows.arena
+    slider_top = chart_top + rows.chart
     return Layout(
         size=size,
         scale=scale,
-        bar=Box(0, 0, width, bar_height),
-        rail=Box(0, bar_height, rail_width, arena_height),
+        bar=Box(0, 0, width, rows.bar),
+        rail=Box(0, rows.bar, rail_width, rows.arena),
         arena=arena,
-        panel=Box(left_width, bar_height, panel_width, height - bar_height),
-        chart=Box(0, chart_top, left_width, chart_height),
-        time_slider=Box(0, slider_top, left_width, slider_height),
-        status=Box(0, slider_top + slider_height, left_width, status_height),
+        panel=Box(left_width, rows.bar, panel_width, height - rows.bar),
+        chart=Box(0, chart_top, left_width, rows.chart),
+        time_slider=Box(0, slider_top, left_width, rows.time_slider),
+        status=Box(0, slider_top + rows.time_slider, left_width, rows.status),
         panes=_arrange_panes(panes, aspect, scale, arena, legend_height),
-        legend=Box(rail_width, bar_height, arena.width, legend_height),
+        legend=Box(rail_width, rows.bar, arena.width, legend_height),
     )
+
+
+class _RowHeights(NamedTuple):
+    """Heights of the rows of a window from top to bottom, px."""
+
+    bar: int
+    arena: int
+    chart: int
+    time_slider: int
+    status: int
+
+
+def _choose_row_heights(height: int, scale: float, *, plot: bool) -> _RowHeights:
+    """Choose the heights of the rows; the arena gets the space that the others leave."""
+    bar = round(BAR_HEIGHT_PX * scale)
+    status = round(STATUS_HEIGHT_PX * scale)
+    chart = 0
+    time_slider = 0
+    if plot:
+        # In small windows, the chart takes at most a third of the height.
+        chart = min(round(CHART_HEIGHT_PX * scale), height // 3)
+        time_slider = round(TIME_SLIDER_HEIGHT_PX * scale)
+    arena = max(height - bar - status - time_slider - chart, 1)
+    return _RowHeights(bar=bar, arena=arena, chart=chart, time_slider=time_slider, status=status)
 
 
 def build_map_layout(size: tuple[int, int], scale: float, panes: int, aspect: float) -> Layout:

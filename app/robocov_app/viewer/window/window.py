@@ -10,7 +10,6 @@ from robocov_app.look.theme import get_theme
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.toolkit.commands.command import Command, CommandTable
-from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
 from robocov_app.toolkit.tool_rail import ToolRail
@@ -35,12 +34,12 @@ from robocov_app.viewer.panel.robot_inspector import RobotInspector
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.sharing.share import ShareActions
-from robocov_app.viewer.window.context_menu import list_menu_commands
 from robocov_app.viewer.window.dialogs import (
     build_branch_dialog,
     build_file_dialog,
     build_recovery_offer,
 )
+from robocov_app.viewer.window.menus import WindowMenus
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import HINT, list_facts
@@ -161,6 +160,7 @@ class ViewerWindow(CommandWindow):
         window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands, *self.list_more_commands()]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
+        self._menus = WindowMenus(viewer, self.share, self.commands, self.do)
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
         self.top_bar = self.top_bar_class(viewer, self.commands, self.do)
@@ -170,7 +170,7 @@ class ViewerWindow(CommandWindow):
         targets = PointerTargets(self.canvas, self.chart, self.layer_bar, self.parts)
         actions = PointerActions(
             leave_lesson=self.lesson.leave,
-            open_menu=self.open_menu,
+            open_menu=lambda pixel: self.dialogs.ask(self._menus.build_context_menu(pixel)),
             show_robot_page=lambda: self.panel.show_tab("robot"),
         )
         self.pointer = ViewerPointer(viewer, targets, actions)
@@ -208,10 +208,9 @@ class ViewerWindow(CommandWindow):
             quit=self.quit,
         )
 
-    def open_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the context menu of the selection at a pixel."""
-        names = list_menu_commands(self.viewer)
-        self.dialogs.ask(Menu([self.commands[name] if name else None for name in names], pixel, self.do))
+    def open_share_menu(self) -> None:
+        """Open the menu of what can be shared, below its button."""
+        self.dialogs.ask(self._menus.build_share_menu(self.top_bar.find_menu_position("share")))
 
     @property
     def parts(self) -> Sequence[WindowPart]:
@@ -406,14 +405,6 @@ class ViewerWindow(CommandWindow):
     def quit(self) -> None:
         """Close the window."""
         self.closed = True
-
-    def open_share_menu(self) -> None:
-        """Open the menu of what can be shared, below its button."""
-        names = ["share:command", "share:python", "share:copy"]
-        if self.share.has_link:
-            names.append("share:link")
-        rows = [self.commands[name] for name in names]
-        self.dialogs.ask(Menu(rows, self.top_bar.find_menu_position("share"), self.do))
 
     def save_run(self) -> str:
         """Save the run up to the present in a new folder; return a message."""

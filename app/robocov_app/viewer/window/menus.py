@@ -1,0 +1,70 @@
+"""Menus of the viewer's window: the context menu of the selection, and the share menu."""
+
+from collections.abc import Callable, Sequence
+
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.menu import Menu
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.sharing.share import ShareActions
+
+ROBOT_COMMANDS = ("robot:fail", "robot:follow", "", "robot:remove")
+WALL_COMMANDS = ("wider", "narrower", "", "duplicate", "delete")
+OBSTACLE_COMMANDS = ("duplicate", "delete")
+FLOOR_COMMANDS = ("robot:add", "", "undo", "redo", "", "fit")
+SHARE_COMMANDS = ("share:command", "share:python", "share:copy")
+LINK_COMMAND = "share:link"
+
+
+class WindowMenus:
+    """Builds the menus of a window.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    share : ShareActions
+        Actions of the share menu.
+    commands : CommandTable
+        All commands.
+    run_command : callable
+        Runs the command with a given name.
+    """
+
+    def __init__(
+        self,
+        viewer: Presenter,
+        share: ShareActions,
+        commands: CommandTable,
+        run_command: Callable[[str], object],
+    ) -> None:
+        self._viewer = viewer
+        self._share = share
+        self._commands = commands
+        self._run_command = run_command
+
+    def build_context_menu(self, pixel: tuple[int, int]) -> Menu:
+        """Build the context menu of the selection at a pixel."""
+        return self._build_menu(list_context_commands(self._viewer), pixel)
+
+    def build_share_menu(self, pixel: tuple[int, int]) -> Menu:
+        """Build the menu of what can be shared at a pixel; links need a served window."""
+        names = list(SHARE_COMMANDS)
+        if self._share.has_link:
+            names.append(LINK_COMMAND)
+        return self._build_menu(names, pixel)
+
+    def _build_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> Menu:
+        """Build a menu of commands; an empty name separates two groups."""
+        rows = [self._commands[name] if name else None for name in names]
+        return Menu(rows, pixel, self._run_command)
+
+
+def list_context_commands(viewer: Presenter) -> tuple[str, ...]:
+    """Return the names of the commands for the selection; an empty name separates two groups."""
+    if viewer.selected_robot is not None:
+        return ROBOT_COMMANDS
+    if viewer.selection.has_wall:
+        return WALL_COMMANDS
+    if viewer.selected_obstacles:
+        return OBSTACLE_COMMANDS
+    return FLOOR_COMMANDS
