@@ -22,17 +22,17 @@ from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, describe_unknown_name, format_count, require_number, require_type
 from robocov.observation.region import Region
 
-_DISPLACEMENT_DIGITS = 9
+_DISPLACEMENT_DECIMALS = 9
 """Displacements are rounded to the nanometer, so that an obstacle returns to exactly the same position."""
 _MAX_RADIUS_M = 1e6
-"""Maximum radius of a disc whose gaps are closed; keeps widths finite."""
+"""Maximum radius of a disc in `Environment.close_gaps`, which keeps widths finite."""
 _GEOMETRY_PROPERTIES = ("region", "boundary_polygon", "free", "blocked")
 """Cached properties that do not depend on the density."""
 
 
 @dataclass(frozen=True)
 class Environment(Drawable):
-    """A map: its boundary and obstacles, where teams may start, and how much each point counts.
+    """A map: its boundary, its obstacles, where teams may start, and the density of its points.
 
     Environments are immutable, and equal if their contents are equal. Only the physics, the sensor and the
     evaluation know the obstacles. Controllers know `region`, the convex hull of the boundary, and what their
@@ -43,10 +43,10 @@ class Environment(Drawable):
     name : str
         Title in figures and in the window.
     boundary : (k, 2) sequence, m
-        Clockwise or counter-clockwise, convex or not.
+        Vertices of the outer boundary, clockwise or counter-clockwise, which may be convex or not.
     obstacles : tuple of Obstacle
-        Moving obstacles are at their positions at time zero. Obstacles may overlap, touch and extend beyond
-        the boundary.
+        Solid shapes, which may overlap, touch and extend beyond the boundary. The positions of moving
+        obstacles are those at time zero.
     starts : mapping of str to DiscStart, UniformStart or PointsStart
         Named starts; the first is the default.
     description : str
@@ -56,8 +56,8 @@ class Environment(Drawable):
     schema : str or None
         ``$schema`` of the map file, kept unchanged.
     density : Density or None
-        φ, how much each point counts. It is part of the task, and robots know it. None if all points count
-        equally.
+        The density φ weights the points of the map in the coverage cost. It is part of the task, and robots
+        know it. If it is None, all points have equal weight.
 
     See Also
     --------
@@ -98,7 +98,7 @@ class Environment(Drawable):
 
     @cached_property
     def region(self) -> Region:
-        """Convex hull of the boundary: all that robots know of the map."""
+        """Convex hull of the boundary, which robots know."""
         return Region(np.asarray(self.boundary, dtype=float))
 
     @cached_property
@@ -135,23 +135,25 @@ class Environment(Drawable):
         return replace(self, obstacles=fixed_obstacles)
 
     def at(self, time: float) -> Environment:
-        """Return the map at a time, as a map without moving obstacles.
+        """Return the map at a time, with obstacles that do not move.
 
         Parameters
         ----------
         time : float, s
+            Time since the beginning of a run.
 
         Returns
         -------
         Environment
-            The same object if no obstacle moves.
+            The map with its obstacles at their positions at this time. It is the same object if no obstacle
+            moves.
         """
         if not self.has_moving_obstacles:
             return self
         obstacles = []
         for obstacle in self.obstacles:
             if obstacle.path is not None:
-                displacement = np.round(obstacle.path.compute_displacement(time), _DISPLACEMENT_DIGITS)
+                displacement = np.round(obstacle.path.compute_displacement(time), _DISPLACEMENT_DECIMALS)
                 obstacle = shift_obstacle(obstacle, displacement)
             obstacles.append(obstacle)
         return replace(self, obstacles=tuple(obstacles))
@@ -182,14 +184,15 @@ class Environment(Drawable):
         Parameters
         ----------
         density : Density or None
-            None: all points count equally.
+            The new density. If it is None, all points have equal weight.
 
         Returns
         -------
         Environment
+            The map with this density.
         """
         environment = replace(self, density=density)
-        # A cached property stores its value in the dictionary of the object.
+        # A cached property stores its value in the dictionary of the object, from which it is copied here.
         for name in _GEOMETRY_PROPERTIES:
             if name in vars(self):
                 vars(environment)[name] = vars(self)[name]
@@ -198,9 +201,10 @@ class Environment(Drawable):
     def close_gaps(self, radius: float) -> Environment:
         """Close the gaps through which a disc does not fit.
 
-        Two points in wide parts of the free space are connected in the result exactly if a disc of this
+        Two points in wide parts of the free space are connected in the result if and only if a disc of this
         radius can move from one to the other. Niches and acute corners that are too narrow for the disc stay
-        open. Moving obstacles are closed off where they are at time zero; for other times, use `at` first.
+        open. For gaps next to moving obstacles, the positions at time zero count. Call `at` first for other
+        times.
 
         Parameters
         ----------
@@ -224,8 +228,8 @@ class Environment(Drawable):
 
         Notes
         -----
-        Each bar is a triangle of 3 µm height across the narrowest place of a gap. Gaps that are narrower than
-        the disc by less than 2 µm stay open.
+        The obstacle across a gap is a triangle of 3 µm height where the gap is narrowest. Gaps that are
+        narrower than the disc by less than 2 µm stay open.
 
         Examples
         --------
@@ -252,10 +256,12 @@ class Environment(Drawable):
         Parameters
         ----------
         other : Environment
+            The map to compare with.
 
         Returns
         -------
         bool
+            Whether they are equal. Other attributes may differ.
         """
         return self.boundary == other.boundary and self.obstacles == other.obstacles
 
@@ -267,11 +273,12 @@ class Environment(Drawable):
         Parameters
         ----------
         name : str or None
-            By default the first start of the map.
+            Name of the start; by default, the first start of the map.
 
         Returns
         -------
         Start
+            The start, from which positions are sampled.
 
         Raises
         ------
@@ -293,6 +300,7 @@ def require_environment(value: object) -> None:
     Parameters
     ----------
     value : object
+        Argument of a function that expects a map.
 
     Raises
     ------

@@ -15,32 +15,33 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, Ring, compute_lengths
 
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
-"""Behavior at the end of a path: straight to its first point, or back along the path."""
+"""How an obstacle continues at the end of a path: straight to the first point, or back along the path."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
 """The values of `Repeat`."""
 _PARALLEL_TOLERANCE_M2 = 1e-12
-"""Maximum cross product of an edge that counts as parallel to the motion, and so sweeps no area."""
+"""Largest cross product of an edge and the motion if the edge counts as parallel to the motion. Such an edge
+sweeps no area."""
 
 
 @dataclass(frozen=True)
 class ObstaclePath:
     """A polyline along which an obstacle moves at constant speed, without turning.
 
-    A point moves along the polyline, from the first of `points` at time zero. The obstacle is displaced from
-    its position in the map by as much as the point from its start.
+    The polyline gives the displacement of the obstacle, which is at its position in the map at time zero. The
+    displacement is the vector from the first of `points` to a point that moves along the polyline.
 
     Attributes
     ----------
     points : (k, 2) sequence, m
-        Corners of the polyline.
+        Vertices of the polyline.
     speed : float, m/s
         Constant speed, above 0.
     repeat : {"loop", "back-and-forth"}
-        Behavior at the end: straight to the first point, or back along the path.
+        How the obstacle continues at the end: straight to the first point, or back along the path.
 
     See Also
     --------
-    Environment.at : The map at a time, with its moving obstacles where they are then.
+    Environment.at : The map at a time, with its moving obstacles at their positions.
     TimeVaryingCost : The coverage cost of a map whose obstacles move.
 
     Examples
@@ -59,14 +60,14 @@ class ObstaclePath:
 
     @cached_property
     def _round_trip(self) -> tuple[Array, Array]:
-        """Points of one round trip, (k, 2) m, and the path length to each of them, (k,) m."""
-        outward = np.array(self.points, dtype=float)
+        """Points of one round trip, (k, 2) m, and the path length up to each point, (k,) m."""
+        outward_points = np.array(self.points, dtype=float)
         if self.repeat == "loop":
-            back = outward[:1]
+            return_points = outward_points[:1]
         else:
             # In reverse order, without the last point, at which the obstacle turns around.
-            back = outward[:-1][::-1]
-        points = np.concatenate([outward, back])
+            return_points = outward_points[:-1][::-1]
+        points = np.concatenate([outward_points, return_points])
         lengths = compute_lengths(np.diff(points, axis=0))
         return points, np.concatenate([[0.0], np.cumsum(lengths)])
 
@@ -82,10 +83,12 @@ class ObstaclePath:
         Parameters
         ----------
         time : float, s
+            Time since the beginning of a run.
 
         Returns
         -------
         (2,) array, m
+            Vector from the position in the map to the position at this time.
         """
         points, path_lengths = self._round_trip
         path_length = (time * self.speed) % path_lengths[-1]
@@ -102,24 +105,26 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
     polygon : Polygon, m
         The obstacle at time zero.
     path : ObstaclePath
+        Path along which the obstacle moves.
 
     Returns
     -------
     geometry, m
+        All points that the obstacle covers at some time.
     """
     points = [*path.points]
     if path.repeat == "loop":
         points += path.points[:1]
     displacements = np.array(points, dtype=float)
     displacements = displacements - displacements[:1]
-    swept = [_sweep(polygon, start, end) for start, end in pairwise(displacements)]
-    return shapely.union_all([polygon, *swept])
+    swept_areas = [_sweep(polygon, start, end) for start, end in pairwise(displacements)]
+    return shapely.union_all([polygon, *swept_areas])
 
 
 def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
     """Return the area that a polygon sweeps while its displacement changes from `start` to `end`.
 
-    It consists of the polygon at both ends, and of the parallelograms that its edges sweep.
+    The area is the union of the polygon at both displacements and the parallelograms that its edges sweep.
     """
     pieces: list[BaseGeometry] = []
     motion = end - start

@@ -15,11 +15,11 @@ from robocov.arrays import Array, Point, Ring
 from robocov.environment.obstacle_paths import ObstaclePath
 
 MAX_SAGITTA_M = 1e-3
-"""Largest distance between a circle and the polygon that represents it."""
+"""Largest distance between a circle and the polygon that represents the circle."""
 _MIN_SIDES = 12
-"""Sides of the polygon that represents the smallest circles."""
+"""Smallest number of sides of such a polygon."""
 _MITRE_LIMIT = 4.0
-"""Maximum distance of the tip of a wall's corner from its axis, in half widths."""
+"""Maximum distance between the tip of a wall's corner and the axis of the wall, in half widths."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class PolygonObstacle:
     vertices : (k, 2) sequence, m
         Outer ring, in either direction. The first vertex is not repeated.
     holes : sequence of (k, 2) sequences, m
-        Rings like `vertices`.
+        Inner rings, in the same form.
     name : str or None
         Displayed name of the obstacle.
     path : ObstaclePath or None
-        Path along which it moves; None if it does not move.
+        Path along which the obstacle moves; None if it does not move.
 
     See Also
     --------
@@ -63,16 +63,18 @@ class PolygonObstacle:
 
 @dataclass(frozen=True)
 class CircleObstacle:
-    """A round pillar, represented by an inscribed regular polygon for both physics and cost.
+    """A round pillar. An inscribed regular polygon represents it in all computations.
 
     Attributes
     ----------
     center : (2,) sequence, m
+        Center of the circle.
     radius : float, m
+        Radius of the circle.
     name : str or None
         Displayed name of the obstacle.
     path : ObstaclePath or None
-        Path along which it moves; None if it does not move.
+        Path along which the obstacle moves; None if it does not move.
 
     See Also
     --------
@@ -101,6 +103,7 @@ class CircleObstacle:
         """Polygon that represents the circle."""
         side_count = _MIN_SIDES
         if self.radius > MAX_SAGITTA_M:
+            # The sagitta of a side is radius * (1 - cos(half_angle)), with half of the side's central angle.
             half_angle = math.acos(1.0 - MAX_SAGITTA_M / self.radius)
             side_count = max(side_count, math.ceil(math.pi / half_angle))
         angles = np.arange(side_count) * (2.0 * np.pi / side_count)
@@ -110,18 +113,18 @@ class CircleObstacle:
 
 @dataclass(frozen=True)
 class WallObstacle:
-    """A polyline with a width, flat ends and mitred corners.
+    """A wall along a polyline, with flat ends and mitred corners.
 
     Attributes
     ----------
     points : (k, 2) sequence, m
-        Axis of the wall, from end to end.
+        Vertices of the polyline, which is the axis of the wall.
     width : float, m
         Thickness of the wall.
     name : str or None
         Displayed name of the obstacle.
     path : ObstaclePath or None
-        Path along which it moves; None if it does not move.
+        Path along which the obstacle moves; None if it does not move.
 
     See Also
     --------
@@ -142,7 +145,7 @@ class WallObstacle:
 
     @cached_property
     def polygon(self) -> BaseGeometry:
-        """Shape of the obstacle: several polygons if the line doubles back."""
+        """Shape of the obstacle, which may consist of several polygons if the polyline doubles back."""
         return LineString(self.points).buffer(
             self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=_MITRE_LIMIT
         )
@@ -153,16 +156,19 @@ Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 
 
 def shift_obstacle(obstacle: Obstacle, displacement: Array) -> Obstacle:
-    """Return an obstacle at another position, without a path.
+    """Move an obstacle to another position, where it stays.
 
     Parameters
     ----------
     obstacle : Obstacle
+        The obstacle to move.
     displacement : (2,) array, m
+        Vector by which the obstacle is moved.
 
     Returns
     -------
     Obstacle
+        A copy of the obstacle at its new position, without a path.
     """
     dx, dy = displacement.tolist()
 

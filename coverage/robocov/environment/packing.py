@@ -1,4 +1,4 @@
-"""Random and dense packings of points with a minimum spacing."""
+"""Random and dense packings: points in an area, any two of which are at least a spacing apart."""
 
 from __future__ import annotations
 
@@ -11,102 +11,115 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 
-_ROW_SPACING = math.sqrt(3) / 2
+_ROW_DISTANCE = math.sqrt(3) / 2
 """Distance between the rows of the hexagonal lattice of spacing 1, the densest packing of the plane.
 
-The area per point is the same number.
+This is also the area per point of the lattice.
 """
 _PACKING_TRIALS = 6
 """Number of random packings from which the densest one is chosen."""
 _MAX_POINTS_FOR_TRIALS = 300
 """Maximum number of points for which several packings are tried; larger packings take longer."""
 _LATTICE_TRIALS = 20
-"""Number of random positions and orientations to try for a lattice."""
+"""Number of random positions and orientations that are tried for a lattice."""
 _MAX_LATTICE_STEPS = 2000
-"""Larger lattices are not tried, because darts fill large areas well enough."""
-_MIN_DARTS = 64
-"""Minimum number of darts that are thrown at a time."""
-_DARTS_PER_POINT = 4
-"""Expected number of darts inside the area that are thrown for each missing point."""
-_MAX_DARTS_PER_HIT = 100
-"""Throwing ends when fewer than one in this number of darts inside the area finds space."""
+"""Maximum number of rows on each side of the middle of a lattice. Larger areas are left to random points."""
+_MIN_CANDIDATES = 64
+"""Minimum number of random candidates for points that are drawn at a time."""
+_CANDIDATES_PER_POINT = 4
+"""Expected number of candidates inside the area that are drawn for each missing point."""
+_MAX_CANDIDATES_PER_NEW_POINT = 100
+"""No more candidates are drawn after fewer than one in this number, inside the area, became a point."""
 _MIN_AREA_FRACTION = 1e-3
-"""Lower limit of the fraction of its bounding box that an area is assumed to fill."""
+"""Smallest fraction of its bounding box that an area is assumed to fill."""
 
 
-def compute_max_points(area: BaseGeometry, spacing: float) -> int:
+def bound_point_count(area: BaseGeometry, spacing: float) -> int:
     """Compute an upper bound on the number of points in any packing of an area.
 
     Parameters
     ----------
     area : geometry, m
+        Area that contains the points.
     spacing : float, m
+        Smallest distance between two points.
 
     Returns
     -------
     int
+        No packing has more points.
     """
-    # Discs of diameter `spacing` around the points lie in the buffered area. No packing of the plane is
-    # denser than the hexagonal lattice; in each separate part, one more disc may fit.
-    max_points = 0
+    # Discs of diameter `spacing` around the points do not overlap, and lie in the area dilated by their
+    # radius. No packing of the plane is denser than the hexagonal lattice. In each separate part of the area,
+    # one more disc may fit.
+    max_count = 0
     for part in shapely.get_parts(area):
-        max_points += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _ROW_SPACING))
-    return max_points
+        max_count += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _ROW_DISTANCE))
+    return max_count
 
 
-def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
-    """Estimate how many points the densest packing of a large area has, from the size of the area.
+def estimate_point_count(area: BaseGeometry, spacing: float) -> int:
+    """Estimate the number of points in the densest packing of a large area.
 
     Parameters
     ----------
     area : geometry, m
+        Area that contains the points.
     spacing : float, m
+        Smallest distance between two points.
 
     Returns
     -------
     int
-        At least 1.
+        At least 1. Effects of the boundary are neglected.
     """
-    return max(1, int(area.area / (spacing**2 * _ROW_SPACING)))
+    return max(1, int(area.area / (spacing**2 * _ROW_DISTANCE)))
 
 
 def pack_densely(area: BaseGeometry, spacing: float) -> Array:
-    """Pack points into an area as densely as possible: the best of several random packings.
+    """Pack points into an area as densely as possible: choose the best of several random packings.
 
-    The result is deterministic.
+    Equal areas and spacings always give the same points.
 
     Parameters
     ----------
     area : geometry, m
+        Area that contains the points.
     spacing : float, m
         Smallest distance between two points.
 
     Returns
     -------
     (k, 2) array, m
+        The points.
     """
-    best = np.empty((0, 2))
-    max_points = compute_max_points(area, spacing)
-    trials = _PACKING_TRIALS if max_points <= _MAX_POINTS_FOR_TRIALS else 1
-    for trial in range(trials):
+    best_points = np.empty((0, 2))
+    max_count = bound_point_count(area, spacing)
+    trial_count = _PACKING_TRIALS if max_count <= _MAX_POINTS_FOR_TRIALS else 1
+    for trial in range(trial_count):
         rng = np.random.default_rng(trial)
-        lattice = pack_lattice(rng, area, max_points, spacing)
-        # In passages that are barely wider than a robot, darts pack more densely than lattices.
-        darts = throw_darts(rng, area, max_points, spacing)
-        for points in (lattice, darts):
-            if len(points) > len(best):
-                best = points
-    return best
+        lattice_points = pack_lattice(rng, area, max_count, spacing)
+        # In passages that are barely wider than a robot, random points are denser than lattices.
+        random_points = add_random_points(rng, area, max_count, spacing)
+        for points in (lattice_points, random_points):
+            if len(points) > len(best_points):
+                best_points = points
+    return best_points
 
 
-def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n random points one after the other, until almost no more fit.
+def add_random_points(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
+    """Add random points to an area, one after another, until almost no more fit.
+
+    Candidates are uniformly distributed in the area. A candidate that is too close to an earlier point is
+    rejected ("random sequential addition").
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the candidates.
     area : geometry, m
-    n : int
+        Area that contains the points.
+    max_count : int
         Maximum number of points.
     spacing : float, m
         Smallest distance between two points.
@@ -114,30 +127,31 @@ def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: f
     Returns
     -------
     (k, 2) array, m
+        The points.
     """
     low_x, low_y, high_x, high_y = area.bounds
     bounding_box_area = (high_x - low_x) * (high_y - low_y)
-    # Most darts thrown at the bounding box of a thin area miss the area.
+    # Candidates are drawn in the bounding box. If the area is thin, most of them are outside of it.
     area_fraction = max(area.area / bounding_box_area, _MIN_AREA_FRACTION)
     points = np.empty((0, 2))
     shapely.prepare(area)
-    while len(points) < n:
-        missing = n - len(points)
-        count = max(_MIN_DARTS, int(_DARTS_PER_POINT * missing / area_fraction))
-        darts = rng.uniform((low_x, low_y), (high_x, high_y), size=(count, 2))
-        darts = darts[shapely.contains_xy(area, darts[:, 0], darts[:, 1])]
+    while len(points) < max_count:
+        missing_count = max_count - len(points)
+        drawn_count = max(_MIN_CANDIDATES, int(_CANDIDATES_PER_POINT * missing_count / area_fraction))
+        candidates = rng.uniform((low_x, low_y), (high_x, high_y), size=(drawn_count, 2))
+        candidates = candidates[shapely.contains_xy(area, candidates[:, 0], candidates[:, 1])]
         if len(points) > 0:
-            distances, _ = cKDTree(points).query(darts)
-            darts = darts[distances >= spacing]
-        new_points = _drop_close_points(darts, spacing)
+            distances, _ = cKDTree(points).query(candidates)
+            candidates = candidates[distances >= spacing]
+        new_points = _drop_close_points(candidates, spacing)
         points = np.concatenate([points, new_points])
-        if len(new_points) < count * area_fraction / _MAX_DARTS_PER_HIT:
+        if len(new_points) < drawn_count * area_fraction / _MAX_CANDIDATES_PER_NEW_POINT:
             break
-    return points[:n]
+    return points[:max_count]
 
 
 def _drop_close_points(points: Array, spacing: float) -> Array:
-    """Drop each point that is closer than `spacing` to an earlier point that is kept."""
+    """Drop each point that is within the spacing of an earlier point that was not dropped."""
     if len(points) == 0:
         return points
     is_kept = np.ones(len(points), dtype=bool)
@@ -149,69 +163,77 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
     return points[is_kept]
 
 
-def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n points of a hexagonal lattice with a random position and orientation.
+def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
+    """Pack points of a hexagonal lattice with a random position and orientation into an area.
 
-    Several positions and orientations are tried, until one has n points in the area. If none does, the result
-    is that with the most points.
+    Several positions and orientations are tried until enough points are in the area. If there are never
+    enough, the result has the most points that were found.
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the positions and orientations.
     area : geometry, m
-    n : int
-        Maximum number of points.
+        Area that contains the points.
+    max_count : int
+        Number of points that is enough. If more are in the area, this number is chosen at random.
     spacing : float, m
         Smallest distance between two points.
 
     Returns
     -------
     (k, 2) array, m
-        Empty for areas that are too large for a lattice.
+        The points; none if the area is too large for a lattice.
     """
     low_x, low_y, high_x, high_y = area.bounds
+    # The lattice must cover the area in every orientation and position, which is shifted by up to one
+    # spacing.
     max_distance = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
-    steps = int(np.ceil(max_distance / (spacing * _ROW_SPACING))) + 1
+    steps = int(np.ceil(max_distance / (spacing * _ROW_DISTANCE))) + 1
     if steps > _MAX_LATTICE_STEPS:
         return np.empty((0, 2))
     lattice = _build_lattice(steps) * spacing
     middle = np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
-    best = np.empty((0, 2))
+    best_points = np.empty((0, 2))
     shapely.prepare(area)
     for _ in range(_LATTICE_TRIALS):
         angle = rng.uniform(0, np.pi / 3)
         rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         points = lattice @ rotation.T + middle + rng.uniform(-spacing, spacing, size=2)
         points = points[shapely.contains_xy(area, points[:, 0], points[:, 1])]
-        if len(points) > len(best):
-            best = points
-        if len(best) >= n:
-            return choose_points(rng, best, n)
-    return best
+        if len(points) > len(best_points):
+            best_points = points
+        if len(best_points) >= max_count:
+            return choose_points(rng, best_points, max_count)
+    return best_points
 
 
 def _build_lattice(steps: int) -> Array:
-    """Return the hexagonal lattice of spacing 1 with `steps` rows and columns on each side of the origin."""
-    numbers = np.arange(-steps, steps + 1)
-    columns, rows = np.meshgrid(numbers, numbers)
-    # Every other row is shifted by half a step.
+    """Build the hexagonal lattice of spacing 1 with `steps` rows and columns on each side of the origin."""
+    indices = np.arange(-steps, steps + 1)
+    columns, rows = np.meshgrid(indices, indices)
+    # Every other row is shifted by half the spacing.
     x = (columns + 0.5 * (rows % 2)).ravel()
-    y = (rows * _ROW_SPACING).ravel()
+    y = (rows * _ROW_DISTANCE).ravel()
     return np.column_stack([x, y])
 
 
-def choose_points(rng: np.random.Generator, points: Array, n: int) -> Array:
-    """Choose n points at random, in their original order.
+def choose_points(rng: np.random.Generator, points: Array, count: int) -> Array:
+    """Choose some of the given points at random, in their original order.
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of the choice.
     points : (k, 2) array, m
-    n : int
+        Points to choose from.
+    count : int
+        Number of points to choose, at most k.
 
     Returns
     -------
-    (n, 2) array, m
+    (count, 2) array, m
+        The chosen points.
     """
-    chosen = rng.choice(len(points), size=n, replace=False)
+    chosen = rng.choice(len(points), size=count, replace=False)
     return points[np.sort(chosen)]

@@ -1,4 +1,4 @@
-"""Passages of the free space: where walls face each other, and the widest disc that fits through."""
+"""Passages of the free space, where walls face each other, and the widest disc that fits through each."""
 
 from __future__ import annotations
 
@@ -16,26 +16,28 @@ from robocov.environment.obstacles import MAX_SAGITTA_M
 from robocov.environment.polygons import GRID_M
 
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
-"""A gap that leads only to a smaller pocket is not a passage: no robot would go there."""
+"""Smallest area of a part of the free space to which a passage may lead; no robot enters a smaller one."""
 _MAX_CRACK_M = 2 * MAX_SAGITTA_M
-"""Walls closer than this count as touching, because the polygon of a touching circle may leave a crack."""
-_FUSED_CRACK_M = 1e-9
+"""Largest distance between walls that count as touching. A circle that touches a wall is represented by a
+polygon, which may leave a crack."""
+_CLOSED_CRACK_M = 1e-9
 """Remaining width of a closed crack, so that walls do not touch in a single point."""
 _MITRE_LIMIT = 100.0
-"""Corners of less than about a degree are cut off."""
-_CORNERS_AT_ONCE = 256
-"""Corners that are examined together; limits the use of memory."""
-_CANDIDATES_AT_ONCE = 512
-"""Candidates that are examined together, the narrowest first: most searches end after the first batch."""
-_FIRST_RANGE_FRACTION = 1 / 4096
-"""First range of the search around each corner, as a fraction of the diagonal; it is then doubled."""
+"""Mitre limit at which only corners of less than about a degree are cut off."""
+_CORNERS_PER_BATCH = 256
+"""Maximum number of corners that are examined together, which limits the use of memory."""
+_CANDIDATES_PER_BATCH = 512
+"""Number of candidates that are examined together, the narrowest first. Most searches end after one batch."""
+_FIRST_WIDTH_FRACTION = 1 / 4096
+"""Largest width of the gaps that are searched for first, as a fraction of the diagonal of the free space."""
 _COSINE_TOLERANCE = 1e-9
-"""Cosines up to this value count as those of right angles."""
+"""Largest cosine of an angle that counts as a right angle or more."""
 _DISC_RELATIVE_TOLERANCE = 1e-9
 _DISC_TOLERANCE_M = 1e-12
-"""Discs are smaller by these amounts, so that rounding does not put the two walls that they touch inside."""
-_DIGITS = 6
-"""Results are rounded to the grid of the derived geometry, a micrometer."""
+"""Amounts by which the radii of discs are reduced, relative and absolute. Otherwise, because of rounding
+errors, the two walls that a disc touches might lie inside it."""
+_DECIMALS = 6
+"""Decimal places to which results are rounded: the grid of the derived geometry, `GRID_M`."""
 
 
 class Gap(NamedTuple):
@@ -44,7 +46,7 @@ class Gap(NamedTuple):
     Attributes
     ----------
     width : float, m
-        Diameter of the largest disc that passes.
+        Diameter of the largest disc that fits through.
     between : pair of (x, y), m
         Points at which the walls face each other.
     """
@@ -63,12 +65,12 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     Parameters
     ----------
     free : MultiPolygon, m
-        Counter-clockwise polygons.
+        Free space, as counter-clockwise polygons.
 
     Returns
     -------
     Gap or None
-        None if there is no passage.
+        The narrowest passage. None if there is no passage.
 
     Examples
     --------
@@ -79,29 +81,30 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     search = PassageSearch(_close_cracks(free))
     diagonal = math.dist(search.free.bounds[:2], search.free.bounds[2:])
     narrowest: Gap | None = None
-    low = _MAX_CRACK_M / 2
-    high = diagonal * _FIRST_RANGE_FRACTION
-    # On most maps, the narrowest gap is far narrower than the map: search near each corner first, for widths
-    # between `low` and `high`, and double the range until a gap is found.
-    while narrowest is None and low < diagonal:
+    # On most maps, the narrowest gap is far narrower than the map. Search for small widths first, which only
+    # compares nearby walls, and double the widths until a gap is found.
+    min_width = _MAX_CRACK_M / 2
+    max_width = diagonal * _FIRST_WIDTH_FRACTION
+    while narrowest is None and min_width < diagonal:
         for corners in search.split_corners():
-            limit = high if narrowest is None else narrowest.width
-            gap = next(search.list_gaps(corners, low, limit), None)
+            limit = max_width if narrowest is None else narrowest.width
+            gap = next(search.find_gaps(corners, min_width, limit), None)
             if gap is not None:
                 narrowest = gap
-        low = high
-        high = 2 * high
+        min_width = max_width
+        max_width = 2 * max_width
     return narrowest
 
 
-def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
-    """Find all passages of a free space that are narrower than a width.
+def find_narrow_gaps(free: MultiPolygon, max_width: float) -> tuple[Gap, ...]:
+    """Find all passages of a free space that are narrower than a given width.
 
     Parameters
     ----------
     free : MultiPolygon, m
-        Counter-clockwise polygons.
-    width : float, m
+        Free space, as counter-clockwise polygons.
+    max_width : float, m
+        All gaps that are found are narrower.
 
     Returns
     -------
@@ -111,65 +114,72 @@ def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
     search = PassageSearch(_close_cracks(free))
     gaps: set[Gap] = set()
     for corners in search.split_corners():
-        gaps.update(search.list_gaps(corners, _MAX_CRACK_M / 2, width))
+        gaps.update(search.find_gaps(corners, _MAX_CRACK_M / 2, max_width))
     return tuple(sorted(gaps, key=lambda gap: (gap.width, gap.between)))
 
 
 class FacingPoints(NamedTuple):
-    """Pairs of a corner p and the nearest point q of an edge.
+    """Pairs of a corner p of the walls and the point q on an edge that is nearest to p.
 
     Attributes
     ----------
-    corner, edge : (k,) int arrays
+    corners : (k,) int array
+        Index of the edge that starts at each corner p.
+    edges : (k,) int array
+        Index of the edge that contains each point q.
     p, q : (k, 2) arrays, m
-    width : (k,) array, m
+        The points of each pair.
+    widths : (k,) array, m
         Distance between p and q.
     """
 
-    corner: IntArray
-    edge: IntArray
+    corners: IntArray
+    edges: IntArray
     p: Array
     q: Array
-    width: Array
+    widths: Array
 
     def select(self, rows: IntArray | BoolArray) -> FacingPoints:
-        """Return the pairs in the given rows.
+        """Return some of the pairs.
 
         Parameters
         ----------
         rows : (r,) int array or (k,) bool array
+            Indices of the pairs, or whether to return each pair.
 
         Returns
         -------
         FacingPoints
+            The selected pairs, in the order of `rows`.
         """
         return FacingPoints(
-            corner=self.corner[rows],
-            edge=self.edge[rows],
+            corners=self.corners[rows],
+            edges=self.edges[rows],
             p=self.p[rows],
             q=self.q[rows],
-            width=self.width[rows],
+            widths=self.widths[rows],
         )
 
 
 class PassageSearch:
-    """Search for passages between the edges of a free space, which lies to the left of each edge.
+    """Search for passages between the edges of a free space.
 
-    As a disc grows, it can reach the same points along the same routes until its diameter exceeds the width
-    of a gap. At a gap, two wall points face each other, and the disc whose diameter is the segment between
-    them contains no other wall point. At least one of the two points is a reflex corner, which juts into the
-    free space.
+    As a disc grows, it can move along the same routes until its diameter exceeds the width of a gap. At a
+    gap, two wall points face each other: the disc whose diameter is the segment between them contains no
+    other wall point. At least one of the two points is a reflex corner, where the free space has an interior
+    angle of more than 180 degrees.
 
     Parameters
     ----------
     free : MultiPolygon, m
-        Counter-clockwise polygons.
+        Free space, as counter-clockwise polygons, so that it lies to the left of each edge.
 
     Attributes
     ----------
     free : MultiPolygon, m
+        Free space.
     edge_starts, edge_ends : (k, 2) arrays, m
-        Ends of each edge.
+        End points of each edge.
     """
 
     def __init__(self, free: MultiPolygon) -> None:
@@ -180,19 +190,20 @@ class PassageSearch:
         all_rings = shapely.get_rings(shapely.get_parts(self.free))
         rings = [shapely.get_coordinates(ring)[:-1] for ring in all_rings]
         sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
-        # The ring, the start and the end of each edge.
-        self._ring = np.repeat(np.arange(len(rings)), sizes)
+        # The index of the ring of each edge.
+        self._ring_indices = np.repeat(np.arange(len(rings)), sizes)
         self.edge_starts = np.concatenate([np.empty((0, 2)), *rings])
         self.edge_ends = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
-        # The edges of ring r are `_first[r]` to `_stop[r] - 1`.
-        self._stop = np.cumsum(sizes)
-        self._first = self._stop - sizes
-        # The edge that ends where each edge starts.
+        # The edges of ring r have the indices from `_ring_firsts[r]` to `_ring_stops[r] - 1`.
+        self._ring_stops = np.cumsum(sizes)
+        self._ring_firsts = self._ring_stops - sizes
+        # The index of the edge before each edge on its ring.
         self._previous = np.arange(len(self.edge_starts)) - 1
-        self._previous[self._first] = self._stop - 1
+        self._previous[self._ring_firsts] = self._ring_stops - 1
+        # The walls turn right at a reflex corner, so that the cross product of its edges is negative.
         turns = _cross(self.edge_starts - self.edge_starts[self._previous], self.edge_ends - self.edge_starts)
         self._reflex_corners = np.flatnonzero(turns < 0)
-        # The index only needs bounding boxes, which can be built in one call.
+        # The tree only needs the bounding boxes of edges, which can be built in one call.
         low = np.minimum(self.edge_starts, self.edge_ends)
         high = np.maximum(self.edge_starts, self.edge_ends)
         self._tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
@@ -205,21 +216,36 @@ class PassageSearch:
         list of (c,) int arrays
             Indices of the edges that start at the corners.
         """
-        group_count = math.ceil(len(self._reflex_corners) / _CORNERS_AT_ONCE)
+        group_count = math.ceil(len(self._reflex_corners) / _CORNERS_PER_BATCH)
         return np.array_split(self._reflex_corners, max(group_count, 1))
 
-    def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
-        """Yield the passages at some corners whose width is between `low` and `high`, the narrowest first."""
-        for facing in self.find_facing_points(corners, low, high):
-            for k in range(len(facing.width)):
-                width = float(facing.width[k])
-                if self._is_passage(facing.corner[k], facing.edge[k], facing.q[k], width):
-                    # Adding zero turns minus zero into zero.
-                    ends = np.round([facing.p[k], facing.q[k]], _DIGITS) + 0.0
-                    first, second = sorted((x, y) for x, y in ends.tolist())
-                    yield Gap(round(width, _DIGITS), (first, second))
+    def find_gaps(self, corners: IntArray, min_width: float, max_width: float) -> Iterator[Gap]:
+        """Find the passages at some corners whose width is between two limits.
 
-    def find_facing_points(self, corners: IntArray, low: float, high: float) -> Iterator[FacingPoints]:
+        Parameters
+        ----------
+        corners : (c,) int array
+            Reflex corners, as returned by `split_corners`.
+        min_width, max_width : float, m
+            Limits of the width, exclusive.
+
+        Yields
+        ------
+        Gap
+            A passage. The narrowest comes first.
+        """
+        for facing in self.find_facing_points(corners, min_width, max_width):
+            for k in range(len(facing.widths)):
+                width = float(facing.widths[k])
+                if self._is_passage(facing.corners[k], facing.edges[k], facing.q[k], width):
+                    # Adding 0.0 turns -0.0 into 0.0.
+                    ends = np.round([facing.p[k], facing.q[k]], _DECIMALS) + 0.0
+                    first, second = sorted((x, y) for x, y in ends.tolist())
+                    yield Gap(round(width, _DECIMALS), (first, second))
+
+    def find_facing_points(
+        self, corners: IntArray, min_width: float, max_width: float
+    ) -> Iterator[FacingPoints]:
         """Find pairs of wall points that face each other across free space.
 
         The disc whose diameter is the segment between the points contains no other wall point.
@@ -228,48 +254,51 @@ class PassageSearch:
         ----------
         corners : (c,) int array
             Reflex corners, as returned by `split_corners`.
-        low, high : float, m
-            The distance between the points is between these limits.
+        min_width, max_width : float, m
+            Limits of the distance between the points, exclusive.
 
         Yields
         ------
         FacingPoints
-            Groups of bounded size, the closest pairs first. Two facing corners are found from both of them.
+            Groups of bounded size, the closest pairs first. A pair of two corners is found twice, once from
+            each corner.
         """
-        candidates = self._find_candidates(corners, low, high)
-        batch_count = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
-        for rows in np.array_split(np.arange(len(candidates.width)), batch_count):
+        candidates = self._find_candidates(corners, min_width, max_width)
+        batch_count = max(1, len(candidates.widths) // _CANDIDATES_PER_BATCH)
+        for rows in np.array_split(np.arange(len(candidates.widths)), batch_count):
             batch = candidates.select(rows)
             yield batch.select(self._has_empty_disc(batch))
 
-    def _find_candidates(self, corners: IntArray, low: float, high: float) -> FacingPoints:
+    def _find_candidates(self, corners: IntArray, min_width: float, max_width: float) -> FacingPoints:
         """Return pairs of a corner and an edge whose distance is between two limits, sorted by distance."""
-        box_low = self.edge_starts[corners] - high
-        box_high = self.edge_starts[corners] + high
+        box_low = self.edge_starts[corners] - max_width
+        box_high = self.edge_starts[corners] + max_width
         boxes = shapely.box(box_low[:, 0], box_low[:, 1], box_high[:, 0], box_high[:, 1])
-        row, edge = self._tree.query(boxes)
-        corner = corners[row]
-        p = self.edge_starts[corner]
-        edge_start = self.edge_starts[edge]
-        along = self.edge_ends[edge] - edge_start
-        fraction = _dot(p - edge_start, along) / _dot(along, along)
-        q = edge_start + np.clip(fraction, 0.0, 1.0)[:, None] * along
-        offset = q - p
-        width = compute_lengths(offset)
-        is_candidate = (width > low) & (width < high)
-        # The disc must not contain part of the two edges that meet at the corner.
-        for other_end in (self.edge_starts[self._previous[corner]], self.edge_ends[corner]):
-            side = other_end - p
-            side_length = compute_lengths(side)
-            is_candidate &= _dot(side, offset) <= _COSINE_TOLERANCE * width * side_length
-        rows = np.flatnonzero(is_candidate)
-        rows = rows[np.argsort(width[rows], kind="stable")]
-        return FacingPoints(corner, edge, p, q, width).select(rows)
+        rows, edges = self._tree.query(boxes)
+        # From here on, each array has one row for each pair.
+        corners = corners[rows]
+        p = self.edge_starts[corners]
+        edge_starts = self.edge_starts[edges]
+        directions = self.edge_ends[edges] - edge_starts
+        fractions = _dot(p - edge_starts, directions) / _dot(directions, directions)
+        q = edge_starts + np.clip(fractions, 0.0, 1.0)[:, None] * directions
+        offsets = q - p
+        widths = compute_lengths(offsets)
+        is_candidate = (widths > min_width) & (widths < max_width)
+        # The disc does not contain part of the two edges that meet at the corner only if the angle between
+        # each of them and the offset is at least a right angle.
+        for other_ends in (self.edge_starts[self._previous[corners]], self.edge_ends[corners]):
+            sides = other_ends - p
+            side_lengths = compute_lengths(sides)
+            is_candidate &= _dot(sides, offsets) <= _COSINE_TOLERANCE * widths * side_lengths
+        selected = np.flatnonzero(is_candidate)
+        selected = selected[np.argsort(widths[selected], kind="stable")]
+        return FacingPoints(corners, edges, p, q, widths).select(selected)
 
     def _has_empty_disc(self, candidates: FacingPoints) -> BoolArray:
         """Return whether the disc whose diameter is the segment of each pair is in the free space, (k,)."""
         middles = shapely.points((candidates.p + candidates.q) / 2)
-        radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
+        radii = candidates.widths / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
         # Unlike `shapely.distance`, this uses the prepared boundary, which is faster with thousands of walls.
         is_empty: BoolArray = ~shapely.dwithin(self._boundary, middles, radii)
         # A disc that touches no wall may still lie entirely inside an obstacle.
@@ -281,15 +310,16 @@ class PassageSearch:
 
         A cut along the gap separates part of the free space only if it joins two points of the same ring.
         """
-        ring = self._ring[corner]
-        if ring != self._ring[edge]:
+        ring = self._ring_indices[corner]
+        if ring != self._ring_indices[edge]:
             return True
-        # The points of the ring, starting at the corner; the cut ends after the first `cut` of them.
-        first = self._first[ring]
-        points = np.roll(self.edge_starts[first : self._stop[ring]], first - corner, axis=0)
-        cut = (edge - corner) % len(points) + 1
-        near_side = np.vstack([points[:cut], q])
-        far_side = np.vstack([q, points[cut:], points[:1]])
+        # The points of the ring, starting at the corner. Point q follows after the first `near_count` of
+        # them.
+        first = self._ring_firsts[ring]
+        points = np.roll(self.edge_starts[first : self._ring_stops[ring]], first - corner, axis=0)
+        near_count = (edge - corner) % len(points) + 1
+        near_side = np.vstack([points[:near_count], q])
+        far_side = np.vstack([q, points[near_count:], points[:1]])
         areas = np.array([_compute_ring_area(near_side), _compute_ring_area(far_side)])
         # The outside of a hole has a negative area and is not a pocket.
         pocket_area = areas.min(where=areas > 0, initial=np.inf)
@@ -297,12 +327,13 @@ class PassageSearch:
 
 
 def _close_cracks(free: MultiPolygon) -> MultiPolygon:
-    """Return the free space without parts that are narrower than `_MAX_CRACK_M`.
+    """Close the cracks of a free space, which are narrower than `_MAX_CRACK_M`.
 
     Cracks between walls that nearly touch shrink to a nanometer. Corners of less than a degree are cut off,
     and vertices that deviate from a straight wall by less than a micrometer are removed.
     """
-    for distance in (-_MAX_CRACK_M / 2, _MAX_CRACK_M / 2 - _FUSED_CRACK_M):
+    # Eroding the free space closes the cracks, and dilating it by nearly the same distance restores the rest.
+    for distance in (-_MAX_CRACK_M / 2, _MAX_CRACK_M / 2 - _CLOSED_CRACK_M):
         free = free.buffer(distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
     free = free.simplify(GRID_M)
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in shapely.get_parts(free)])
@@ -320,6 +351,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _compute_ring_area(ring: Array) -> float:
-    """Return the area of a ring, m², negative if it is clockwise."""
+    """Return the area of a ring, m², which is negative if the ring is clockwise."""
+    # The shoelace formula. Coordinates relative to a point of the ring keep rounding errors small.
     points = ring - ring[0]
     return float(_cross(points[:-1], points[1:]).sum()) / 2

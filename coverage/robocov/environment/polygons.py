@@ -14,10 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 
 GRID_M = 1e-6
-"""Grid of derived geometry, which makes unions and differences robust: shapes that touch up to rounding touch
-exactly, and no slivers remain."""
+"""Grid size to which coordinates of derived geometry are rounded. The grid makes unions and differences
+robust: shapes that touch except for rounding errors touch exactly, and no slivers remain."""
 _MIN_OVERLAP_M2 = 1e-6
-"""Minimum area of an overlap; smaller ones are rounding errors of shapes that touch."""
+"""Minimum area of an overlap. Smaller overlaps are rounding errors of shapes that touch."""
 
 Name = TypeVar("Name", bound=Hashable)
 """Type of the names of shapes."""
@@ -33,9 +33,11 @@ def find_overlaps(
     Parameters
     ----------
     area : geometry, m
+        The area to check.
     others : mapping of name to geometry, m
+        Shapes that should not overlap the area.
     container : geometry or None, m
-        Area that should contain `area`.
+        Shape that should contain the area.
 
     Returns
     -------
@@ -55,18 +57,21 @@ def find_overlaps(
 
 
 def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:
-    """Return the union of shapes, on the grid.
+    """Compute the union of shapes, with coordinates on the grid of `GRID_M`.
 
     Parameters
     ----------
     shapes : (n,) array of geometries, m
+        Shapes, which may overlap.
 
     Returns
     -------
     geometry, m
+        Polygons that do not overlap.
     """
     pairs = STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID_M)
-    # Every shape is paired with itself. Computing a union is slow, and only shapes that meet others need it.
+    # Computing a union is slow, and only shapes that meet others need it. The query pairs every shape with
+    # itself, so that shapes in one pair only meet no others.
     meets_others = np.bincount(pairs[0]) > 1
     separate = shapely.get_parts(shapely.set_precision(shapes[~meets_others], GRID_M))
     united = shapely.union_all(shapes[meets_others], grid_size=GRID_M)
@@ -74,15 +79,17 @@ def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:
 
 
 def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
-    """Return the polygons of a geometry, counter-clockwise, the largest first, without lines and points.
+    """Extract the polygons of a geometry, without lines and points.
 
     Parameters
     ----------
     geometry : geometry, m
+        Geometry of any type, such as the result of an intersection.
 
     Returns
     -------
     MultiPolygon, m
+        Counter-clockwise polygons, the largest first.
     """
     shapes = shapely.get_parts(geometry)
     polygons = [shape for shape in shapes if isinstance(shape, Polygon) and shape.area > 0.0]
@@ -96,13 +103,14 @@ def find_nearest_inside(area: Any, positions: Array) -> Array:
     Parameters
     ----------
     area : geometry or (n,) array of geometries, m
-        One area for all positions, or one for each.
+        One area for all positions, or one area for each position.
     positions : (n, 2) array, m
+        Positions, inside or outside.
 
     Returns
     -------
     (n, 2) array, m
-        The same object if all positions are inside.
+        Nearest points. They are the same object as `positions` if all positions are inside.
 
     Examples
     --------
@@ -116,7 +124,7 @@ def find_nearest_inside(area: Any, positions: Array) -> Array:
         return positions
     areas = np.broadcast_to(area, len(points))
     lines = shapely.shortest_line(areas[outside], points[outside])
-    # Each line has two points; the first one is in the area.
-    moved = positions.copy()
-    moved[outside] = shapely.get_coordinates(lines)[::2]
-    return moved
+    # Each line has two points, of which the first one is in the area.
+    nearest_points = positions.copy()
+    nearest_points[outside] = shapely.get_coordinates(lines)[::2]
+    return nearest_points

@@ -15,19 +15,21 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, Point, compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
+    add_random_points,
+    bound_point_count,
     choose_points,
-    compute_max_points,
-    estimate_max_points,
+    estimate_point_count,
     pack_densely,
     pack_lattice,
-    throw_darts,
 )
 from robocov.errors import StartError, format_count, is_number, quote
 
 MIN_START_GAP_RADII = 0.02
-"""Minimum gap between two robots, and between robots and walls, at the start, in radii of a robot."""
+"""Half of the minimum gap between two robots at the start, and the minimum gap between robots and walls, as a
+multiple of the radius of a robot."""
 MAX_COUNTED_ROBOTS = 2000
-"""Maximum capacity of a start that is found by packing; larger ones are estimated from the area."""
+"""Largest capacity of a start that is determined by packing. Larger capacities are estimated from the
+area."""
 _DISC_QUADRANT_SEGMENTS = 64
 """Edges per quadrant of the polygon that represents the disc of a start."""
 
@@ -39,8 +41,9 @@ class DiscStart:
     Attributes
     ----------
     center : (2,) sequence, m
+        Center of the disc.
     radius : float, m
-        The disc contains the centers of the robots.
+        Radius of the disc, which contains the centers of the robots.
 
     See Also
     --------
@@ -121,7 +124,9 @@ class Start:
     Attributes
     ----------
     name : str
+        Name of the start in the environment.
     spec : DiscStart, UniformStart or PointsStart
+        Where robots may start.
     free : geometry, m
         Free space of the environment.
     """
@@ -138,13 +143,14 @@ class Start:
         n : int
             Number of robots.
         seed : int
-            Ignored if the start is a `PointsStart`.
+            Seed of the random numbers. Ignored if the start is a `PointsStart`.
         radius : float, m
             Radius of the robots.
 
         Returns
         -------
         (n, 2) array, m
+            Positions of the robots.
 
         Raises
         ------
@@ -174,14 +180,15 @@ class Start:
     def estimate_capacity(self, radius: float = DEFAULT_RADIUS_M) -> int:
         """Estimate how many robots of a given radius fit.
 
-        The result depends only on the start and the radius: it is the number of robots in the densest packing
-        that is found, with the same gaps as in `sample`. `sample` finds positions for that many robots with
-        any seed; by chance, one or two more may fit. If there is space for thousands, the result is estimated
-        from the area. For a `PointsStart`, it is the number of its positions.
+        The result is the number of robots in the densest packing that is found, with the same gaps as in
+        `sample`. Up to this number, `sample` finds positions with any seed; with some seeds, it may find
+        positions for one or two more. If there is space for thousands of robots, the result is estimated from
+        the area. For a `PointsStart`, it is the number of its positions.
 
         Parameters
         ----------
         radius : float, m
+            Radius of the robots.
 
         Returns
         -------
@@ -194,24 +201,26 @@ class Start:
         if area.is_empty:
             return 0
         spacing = compute_start_spacing(radius)
-        if compute_max_points(area, spacing) > MAX_COUNTED_ROBOTS:
-            return estimate_max_points(area, spacing)
+        if bound_point_count(area, spacing) > MAX_COUNTED_ROBOTS:
+            return estimate_point_count(area, spacing)
         return len(pack_densely(area, spacing))
 
     def compute_center_area(self, radius: float) -> BaseGeometry:
-        """Compute the area in which the center of a robot may start. Not for a `PointsStart`.
+        """Compute the area in which the center of a robot may be at the start. Not for a `PointsStart`.
 
         Parameters
         ----------
         radius : float, m
+            Radius of the robot.
 
         Returns
         -------
         geometry, m
+            Empty if there is no space for a robot.
         """
         area = self.free.buffer(-compute_start_clearance(radius))
         if isinstance(self.spec, DiscStart):
-            # The disc contains the centers; robots may stick out of it by their radius.
+            # The disc contains the centers of the robots. Robots may extend beyond it by their radius.
             center = shapely.Point(self.spec.center)
             area = area.intersection(center.buffer(self.spec.radius, quad_segs=_DISC_QUADRANT_SEGMENTS))
         return area
@@ -277,10 +286,12 @@ def compute_start_clearance(radius: float) -> float:
     Parameters
     ----------
     radius : float, m
+        Radius of the robot.
 
     Returns
     -------
     float, m
+        Slightly more than the radius.
     """
     return radius * (1.0 + MIN_START_GAP_RADII)
 
@@ -291,23 +302,25 @@ def compute_start_spacing(radius: float) -> float:
     Parameters
     ----------
     radius : float, m
+        Radius of the robots.
 
     Returns
     -------
     float, m
+        Slightly more than the diameter.
     """
     return 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
 
 
 def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Return n random points at least `spacing` apart, or fewer if no more are found.
+    """Return n random points that are at least `spacing` apart, or fewer if no more are found.
 
-    Darts give the most random points. If they do not find enough, a denser lattice is tried, and finally the
-    densest packing, which `Start.estimate_capacity` counts.
+    Three methods are tried, each of which finds more points than the one before, but less random ones: adding
+    independent points, a random lattice, and the dense packing that `Start.estimate_capacity` counts.
     """
-    if n > compute_max_points(area, spacing):
+    if n > bound_point_count(area, spacing):
         return np.empty((0, 2))
-    points = throw_darts(rng, area, n, spacing)
+    points = add_random_points(rng, area, n, spacing)
     if len(points) < n:
         points = pack_lattice(rng, area, n, spacing)
     if len(points) < n <= MAX_COUNTED_ROBOTS:
